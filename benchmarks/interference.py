@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.interference.clearance import ClearanceRows
 from sagline.interference.pairs import cable_rows
 from sagline.kernels.interference import shapes
-from sagline.kernels.interference.hanging_distance import least_distances, memory_for_pieces
+from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
 from tests.interference.scenes import box_mesh
 from tests.kernels.interference.hanging import agreement, all_pairs, nearest_cable_pairs
 
@@ -36,7 +36,7 @@ def measured(rows: Array, pairs: Indices, precision: float, together: bool = Fal
     still, numbers = locked(np.zeros((0, shapes.COLUMNS))), locked(pairs)
     shape = len(rows), len(pairs)
     value, low, nearest = np.empty(shape), np.empty(shape), np.empty((*shape, 2, 3))
-    memory = memory_for_pieces()
+    memory = work_arrays_for_pieces()
     seconds = best_seconds(
         lambda: least_distances(rows, still, numbers, precision, together, *memory, value, low, nearest), RUNS
     )

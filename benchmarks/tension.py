@@ -1,4 +1,4 @@
-"""Sharing the load: verdicts and their proofs, times of every method, and how continuous each is; one core."""
+"""Tension distribution: verdicts and their proofs, times of every method, and how continuous each is; one core."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from rich.progress import track
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.core.arrays import Array
-from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, memory_for
-from sagline.kernels.sharing.nearest import Sharing, new_nearness, share_nearest
-from sagline.kernels.sharing.otherwise import share_otherwise
-from sagline.kernels.sharing.room import forget, new_room
+from sagline.kernels.tension.nearest import Distribution, new_nearness, share_nearest
+from sagline.kernels.tension.other_methods import distribute_by_other_method
+from sagline.kernels.tension.work_arrays import new_work_arrays, reset_work_arrays
 from sagline.tension.options import kernel_options, takes_default_kernel
 from tests.tension.reference import presets, random_poses
 from tests.tension.test_verdicts import sampled, unproved
@@ -55,13 +55,13 @@ def share_batch(  # type: ignore[no-untyped-def]
     sharing_terms, strips, nulls, references, room, previous, otherwise, statuses
 ):
     """The sharing alone, of many poses that are already factored; otherwise as in `inverse_poses`."""
-    sharing = Sharing(*sharing_terms)
+    sharing = Distribution(*sharing_terms)
     r, m = nulls[0].shape
     near, rest = new_nearness(Memory(*room), previous, r)
     rows, at = block(rest.numbers, 0, 2, m)
     tension, offset = rows[0], rows[1]
     rest = Memory(rest.numbers[at:], rest.counters)
-    others = None if otherwise is None else new_room(sharing.method, rest, m, r)
+    others = None if otherwise is None else new_work_arrays(sharing.method, rest, m, r)
     for i in range(m):
         offset[i] = 0.0
     for p in range(strips.shape[0]):
@@ -71,8 +71,8 @@ def share_batch(  # type: ignore[no-untyped-def]
         if others is None:
             statuses[p] = share_nearest(strips[p], nulls[p], near, tension)
         else:
-            forget(others)
-            statuses[p] = share_otherwise(sharing, strips[p], offset, nulls[p], near, others, tension)
+            reset_work_arrays(others)
+            statuses[p] = distribute_by_other_method(sharing, strips[p], offset, nulls[p], near, others, tension)
 
 
 def factored(robot: sl.Robot, poses: sl.Pose) -> tuple[Array, Array]:
@@ -204,7 +204,7 @@ def main() -> None:
     for part in (times, verdicts, continuity):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())
-    show("Sharing the load", rows, console)
+    show("Distribution the load", rows, console)
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ from sagline.cli.line import shown
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses, measure_balance
 from sagline.kernels.jit import FOLDER, is_compiled
-from sagline.kernels.sharing.nearest import new_nearness
+from sagline.kernels.tension.nearest import new_nearness
 from tests.cli import interrupts
 from tests.tiers import extended
 

@@ -10,15 +10,15 @@ from sagline.kernels.balance.setting import new_balance
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.codes import LOWEST_MAXIMUM, LOWEST_SUM
 from sagline.kernels.memory import Memory, block, memory_for
-from sagline.kernels.sharing.nearest import new_nearness
-from sagline.kernels.sharing.room import new_room
+from sagline.kernels.tension.nearest import new_nearness
+from sagline.kernels.tension.work_arrays import new_work_arrays
 from tests.kernels.compiled import from_python, memory
 
 take_block = from_python(block)
 room_for_cables = from_python(new_cables)
 room_for_balance = from_python(new_balance)
 room_for_nearness = from_python(new_nearness)
-room_otherwise = from_python(new_room)
+room_otherwise = from_python(new_work_arrays)
 
 
 def parts_of(words: object) -> list[Array]:
@@ -54,7 +54,7 @@ def test_blocks_do_not_overlap_and_are_all_inside(m: int, n: int, method: int) -
         "matrix": (balance.matrix, (n, m)),
         "null": (balance.null, (m - n, m)),
         "q": (balance.q, (m + 1, m)),
-        "strips": (balance.strips, (3, m)),
+        "bounds": (balance.bounds, (3, m)),
         "labels": (room.labels, (2 * m + 6,)),
         "held": (near.held.labels, (m - n + 2,)),
         "basis": (room.basis.inverse, (m - n + (method == LOWEST_MAXIMUM),) * 2),

@@ -296,7 +296,7 @@ ENTRIES = {
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, DESCRIBE, 57, 6.0, _vibration),
         Entry(VIBRATION_OVER_PULLEYS, DESCRIBE, 39, 4.0, _vibration_over_pulleys, 2, VIBRATION),
-        Entry(CLEARANCES, "interference.hanging_distance.least_distances", 33, 5.0, _clearances),
+        Entry(CLEARANCES, "interference.catenary_distance.least_distances", 33, 5.0, _clearances),
         Entry(READINGS, "calibration.observe.observe", 70, 9.0, _readings),
         Entry(READINGS_OVER_PULLEYS, "calibration.observe.observe", 45, 8.0, _readings_over_pulleys, 2, READINGS),
         Entry(STARTING_LENGTHS, "calibration.starting_lengths.starting_lengths", 30, 4.0, _starting_lengths),

@@ -20,7 +20,7 @@ from sagline.interference.mesh import Mesh, extent_text
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, parts_of, rod_row
 from sagline.kernels.interference import shapes
-from sagline.kernels.interference.hanging_distance import least_distances, memory_for_pieces
+from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
 from sagline.robot.bounds import bounds
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
@@ -87,7 +87,7 @@ class ClearanceRows:
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
-        known, memory = len(self.pairs.by_kernel), memory_for_pieces()  # of its own: threads may measure at once
+        known, memory = len(self.pairs.by_kernel), work_arrays_for_pieces()  # of its own: threads may measure at once
         for part in blocks(count, BLOCK):
             own = state if single else state[part]
             moving = self._moving(own)

@@ -22,7 +22,7 @@ from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.interference.pairs import Pairs
 from sagline.kernels.interference import shapes
-from sagline.kernels.interference.hanging_distance import BEGIN, BULGE, END, PIECE_COLUMNS, cut
+from sagline.kernels.interference.catenary_distance import BEGIN, BULGE, END, PIECE_COLUMNS, cut
 from sagline.robot.pose import Pose
 
 Form = Box | Capsule | Sphere | Mesh

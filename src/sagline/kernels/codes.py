@@ -17,7 +17,7 @@ CABLE_BELOW_VALIDITY = 3  # the empirical model's lowest point lies inside the s
 CABLE_TOO_SLACK = 4  # half its weight exceeds RANGE chord tensions: no practical answer
 CABLE_NOT_CONVERGED = 5
 
-# Ways of sharing the load among redundant cables.
+# Ways of distribution the load among redundant cables.
 MINIMUM_NORM = 0
 CLOSEST = 1
 QUADRATIC_PROGRAM = 2  # up to here: the feasible point nearest to a target
@@ -47,8 +47,8 @@ POSE_SINGULAR = 2  # the structure matrix has lost rank
 POSE_TOO_SLACK = 3  # a cable's chord tension is too small for its weight
 POSE_NOT_CONVERGED = 4
 POSE_NO_CHORD = 5  # both ends of a cable coincide
-POSE_NOT_COVERED = 6  # feasible, but not by the chosen way of sharing
-POSE_UNBOUNDED = 7  # the feasible set has no end, and the chosen way of sharing needs one
+POSE_NOT_COVERED = 6  # feasible, but not by the chosen tension distribution method
+POSE_UNBOUNDED = 7  # the feasible set has no end, and the chosen tension distribution method needs one
 POSE_BORDERLINE = 8  # so near the border that neither tensions nor a proof were found
 
 # How the forward calculation of one sample ended.

@@ -1,4 +1,4 @@
-"""How a kernel is compiled, and where the machine code is kept.
+"""Compilation of kernels, and the place of their machine code.
 
 numba does not notice that a function called from another file was edited and would go on running stale machine code.
 What a file's kernels become is therefore kept in a folder named by a hash of that file and of all that it imports.
@@ -138,6 +138,6 @@ def machine_code(compiled: Callable[..., object], arguments: tuple[object, ...])
 
 
 def is_compiled(function: Callable[..., object], versions: int = 1) -> bool:
-    """Whether the machine code of an entry is on disk, in at least so many versions for different types."""
+    """True if the machine code of an entry is on disk, in at least so many versions for different types."""
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     return sum(1 for _ in folder_of(function.__module__).glob(f"{name}-*{SUFFIX}")) >= versions

@@ -14,7 +14,7 @@ from sagline.kernels.jit import glue
 
 
 class Memory(NamedTuple):
-    """What a kernel may write on.
+    """Memory of a kernel.
 
     Attributes:
         numbers: Flat.

@@ -10,10 +10,10 @@ from sagline.cables.models import Catenary
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
-from sagline.kernels.algebra import strips
+from sagline.kernels.algebra import bounds
 from sagline.kernels.inverse.queries import polygon_of_pose
 from sagline.kernels.memory import memory_for
-from sagline.kernels.sharing.polygon import SPARE_CORNERS
+from sagline.kernels.tension.polygon import SPARE_CORNERS
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
@@ -81,7 +81,7 @@ def polygon_at(
     """The polygon around chord tensions [N] that balance the platform, (m,), given the cables' pulls [N], (m,)."""
     m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
     scale, offset = np.empty(m), np.empty(m)
-    limits = np.empty((strips.STRIP_ROWS, m))
+    limits = np.empty((bounds.STRIP_ROWS, m))
     null = np.empty((r, m))
     corners = np.empty((2 * m + SPARE_CORNERS, 2))
     labels = np.full(2 * m + SPARE_CORNERS, -1, dtype=np.int64)
@@ -94,7 +94,7 @@ def polygon_at(
         memory_for(m),
         (scale, offset, limits, null, corners, labels),
     )
-    origin = limits[strips.START]
+    origin = limits[bounds.START]
     vertices, sides = _sides_of(count if feasible else 0, null, limits, corners, labels)
     return TensionPolygon(
         vertices=locked(vertices),
@@ -118,7 +118,7 @@ def _sides_of(
 ) -> tuple[Array, tuple[Side | None, ...]]:
     """Vertices (h, r) and what the sides are."""
     r, m = null.shape
-    origin, low, high = limits[strips.START], limits[strips.LOW], limits[strips.HIGH]
+    origin, low, high = limits[bounds.START], limits[bounds.LOW], limits[bounds.HIGH]
     if r == 0 or count == 0:
         return np.zeros((count, r)), ()
     if r == 1:

@@ -11,8 +11,8 @@ from sagline.kernels import codes
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics import string as columns
-from sagline.kernels.dynamics.behind import fill_behind
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
+from sagline.kernels.dynamics.routing import fill_routing_compliance
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.several import anchors_of, cables_of, first_of
 from sagline.statics.tables import cable_table
@@ -68,7 +68,9 @@ def strings_of(state: Equilibrium) -> Strings:
         leaving = (cables.frame_end_tension if exact else state.chord_tension).reshape(-1, m)
         terms = cables.model.terms(first_of(state.robot).gravity)
         wraps = np.array(state.contact.wrap_angle).reshape(-1, m)
-        fill_behind(terms, cable_table(state.robot), wraps, np.array(leaving), np.empty((CABLE_ROWS, m)), table)
+        fill_routing_compliance(
+            terms, cable_table(state.robot), wraps, np.array(leaving), np.empty((CABLE_ROWS, m)), table
+        )
     return Strings(table, _axes(state).reshape(-1, m, 3, 3), taut_of(table))
 
 

@@ -1,1 +1,1 @@
-"""Sharing the load among redundant cables: methods, limits, and the polygon of feasible tensions."""
+"""Tension distribution of redundant cables: methods, limits, and the polygon of feasible tensions."""

@@ -12,7 +12,7 @@ from sagline.core.arguments import choice
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kernels.sharing.on_polygon import WALK_CENTROID, WALK_NORM, WALK_SUM
+from sagline.kernels.tension.on_polygon import WALK_CENTROID, WALK_NORM, WALK_SUM
 from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMethod, Variable
 
 

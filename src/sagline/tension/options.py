@@ -10,7 +10,7 @@ from sagline.cables.model import CableModel
 from sagline.core.arrays import locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, SharingTerms
+from sagline.kernels.inverse.poses import DistributionTerms, LimitTerms, ModelTerms
 from sagline.robot.robot import Robot
 from sagline.robot.several import Robots, first_of
 from sagline.tension.method import TensionMethod
@@ -28,7 +28,7 @@ class Options(NamedTuple):
     """
 
     model: ModelTerms
-    sharing: SharingTerms
+    sharing: DistributionTerms
     limits: LimitTerms
 
 

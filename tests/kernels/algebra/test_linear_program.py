@@ -1,4 +1,4 @@
-"""Linear programs over strips against SciPy's, from cold and warm starts."""
+"""Linear programs over bounds against SciPy's, from cold and warm starts."""
 
 import math
 
@@ -21,20 +21,20 @@ def basis_for(d: int) -> lp.Basis:
     return basis
 
 
-def solve(rows: Array, strips: Array, cost: Array, basis: lp.Basis | None = None) -> tuple[int, Array, lp.Basis]:
+def solve(rows: Array, bounds: Array, cost: Array, basis: lp.Basis | None = None) -> tuple[int, Array, lp.Basis]:
     basis = basis_for(cost.size) if basis is None else basis
     point = np.full(cost.size, np.nan)
-    return lowest_point(rows, strips, cost, 0.0, basis, point), point, basis
+    return lowest_point(rows, bounds, cost, 0.0, basis, point), point, basis
 
 
-def by_scipy(rows: Array, strips: Array, cost: Array) -> tuple[int, float]:
-    finite = np.isfinite(strips[2])
-    sides = np.concatenate((strips[0] - strips[1], (strips[2] - strips[0])[finite]))
+def by_scipy(rows: Array, bounds: Array, cost: Array) -> tuple[int, float]:
+    finite = np.isfinite(bounds[2])
+    sides = np.concatenate((bounds[0] - bounds[1], (bounds[2] - bounds[0])[finite]))
     found = linprog(cost, A_ub=np.concatenate((-rows.T, rows.T[finite])), b_ub=sides, bounds=(None, None))
     return {0: LP_SOLVED, 2: LP_EMPTY, 3: LP_UNBOUNDED}[found.status], found.fun
 
 
-def assert_proof(rows: Array, strips: Array, cost: Array, basis: lp.Basis, empty: bool) -> None:
+def assert_proof(rows: Array, bounds: Array, cost: Array, basis: lp.Basis, empty: bool) -> None:
     """The weights of a basis make the cost of its normals, or with the side that contradicts them nothing at all."""
     d, k = rows.shape
     count = d + 1 if empty else d
@@ -44,7 +44,7 @@ def assert_proof(rows: Array, strips: Array, cost: Array, basis: lp.Basis, empty
     signs = np.where(labels[named] % 2 == 0, 1.0, -1.0)
     total = rows[:, labels[named] // 2] @ (weights[named] * signs)
     if empty:
-        low, high = strips[1] - strips[0], strips[0] - strips[2]
+        low, high = bounds[1] - bounds[0], bounds[0] - bounds[2]
         sides = np.where(labels[named] % 2 == 0, low[labels[named] // 2], high[labels[named] // 2])
         np.testing.assert_allclose(total, 0.0, atol=1e-8)
         assert weights[named] @ sides > 0.0
@@ -58,8 +58,8 @@ def test_linear_program(d: int) -> None:
     outcomes = []
     for _ in range(150):
         rows, sides, cost = rng.normal(size=(3 * d + 3, d)), rng.normal(size=3 * d + 3) - 0.3, rng.normal(size=d)
-        space, strips = rows.T.copy(), np.array([np.zeros_like(sides), sides, np.full_like(sides, math.inf)])
-        outcome, point, basis = solve(space, strips, cost)
+        space, bounds = rows.T.copy(), np.array([np.zeros_like(sides), sides, np.full_like(sides, math.inf)])
+        outcome, point, basis = solve(space, bounds, cost)
         found = linprog(cost, A_ub=-rows, b_ub=-sides, bounds=(None, None))
         outcomes.append(outcome)
         assert outcome == {0: LP_SOLVED, 2: LP_EMPTY, 3: LP_UNBOUNDED}[found.status]
@@ -67,16 +67,16 @@ def test_linear_program(d: int) -> None:
             assert cost @ point == pytest.approx(found.fun, rel=1e-8, abs=1e-9)
             assert (rows @ point >= sides - 1e-9).all()
         if outcome != LP_UNBOUNDED:
-            assert_proof(space, strips, cost, basis, outcome == LP_EMPTY)
+            assert_proof(space, bounds, cost, basis, outcome == LP_EMPTY)
     assert LP_SOLVED in outcomes
     assert LP_EMPTY in outcomes
 
 
 def random_program(rng: np.random.Generator, d: int) -> tuple[Array, Array, Array]:
     k = 2 * d + 3
-    strips = np.array([rng.normal(size=k), -rng.uniform(0.1, 2, k), rng.uniform(0.1, 2, k)])
-    strips[2, rng.uniform(size=k) < 0.15] = math.inf
-    return rng.normal(size=(d, k)), strips, rng.normal(size=d)
+    bounds = np.array([rng.normal(size=k), -rng.uniform(0.1, 2, k), rng.uniform(0.1, 2, k)])
+    bounds[2, rng.uniform(size=k) < 0.15] = math.inf
+    return rng.normal(size=(d, k)), bounds, rng.normal(size=d)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 7])
@@ -84,12 +84,12 @@ def test_the_sides_of_the_last_answer_are_a_good_start(d: int) -> None:
     rng = np.random.default_rng(40 + d)
     outcomes = []
     for _ in range(60):
-        rows, strips, cost = random_program(rng, d)
-        outcome, _, basis = solve(rows, strips, cost)
+        rows, bounds, cost = random_program(rng, d)
+        outcome, _, basis = solve(rows, bounds, cost)
         if outcome != LP_SOLVED:
             continue
         for size in (0.0, 1e-6, 0.1, 3.0):
-            moved = strips + size * rng.uniform(-1, 1, strips.shape) * [[1], [0], [0]]
+            moved = bounds + size * rng.uniform(-1, 1, bounds.shape) * [[1], [0], [0]]
             if size == 3.0:  # infinite limits that become finite; the other way round the side stood on would vanish
                 moved[2] = np.minimum(moved[2], 4.0)
             verdict, cold, _ = solve(rows, moved, cost)
@@ -106,24 +106,24 @@ def test_the_sides_of_the_last_answer_are_a_good_start(d: int) -> None:
 
 def test_after_an_empty_set_the_caller_starts_anew() -> None:
     rows, cost = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), np.array([1.0, 1.0])
-    strips = np.array([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [1.0, 2.0, 1.0]])  # x <= 1 and x >= 1.5
-    outcome, _, basis = solve(rows, strips, cost)
+    bounds = np.array([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [1.0, 2.0, 1.0]])  # x <= 1 and x >= 1.5
+    outcome, _, basis = solve(rows, bounds, cost)
     assert outcome == LP_EMPTY
     assert {1, 2} <= set(basis.labels)
-    assert_proof(rows, strips, cost, basis, True)
+    assert_proof(rows, bounds, cost, basis, True)
     basis.labels[0] = -1
-    strips[2, 0] = 1.6
-    outcome, point, _ = solve(rows, strips, cost, basis)
+    bounds[2, 0] = 1.6
+    outcome, point, _ = solve(rows, bounds, cost, basis)
     assert outcome == LP_SOLVED
     np.testing.assert_allclose(point, [1.5, 0.0], atol=1e-15)
 
 
 def test_an_answer_as_far_out_as_the_box_is_infinitely_far() -> None:
-    rows, strips = np.eye(2), np.array([[0.0, 0.0], [1.0, 1.0], [math.inf, 2.0]])
-    outcome, _, basis = solve(rows, strips, np.array([-1.0, -1.0]))
+    rows, bounds = np.eye(2), np.array([[0.0, 0.0], [1.0, 1.0], [math.inf, 2.0]])
+    outcome, _, basis = solve(rows, bounds, np.array([-1.0, -1.0]))
     assert outcome == LP_UNBOUNDED
     assert (basis.labels[:2] >= 4).sum() == 1
-    outcome, point, basis = solve(rows, strips, np.array([1.0, -1.0]))
+    outcome, point, basis = solve(rows, bounds, np.array([1.0, -1.0]))
     assert outcome == LP_SOLVED
     np.testing.assert_array_equal(point, [1.0, 2.0])
     assert sorted(basis.labels[:2]) == [0, 3]
@@ -136,7 +136,7 @@ def test_an_answer_as_far_out_as_the_box_is_infinitely_far() -> None:
         outcome, again, basis = solve(*one_strip, np.array([-sign, -sign]), basis)
         np.testing.assert_allclose(again, point, atol=1e-14)
     # a cost that does not care about a way without end: solved, and tied
-    outcome, point, basis = solve(rows[:, :1].copy(), strips[:, :1].copy(), np.array([1.0, 0.0]))
+    outcome, point, basis = solve(rows[:, :1].copy(), bounds[:, :1].copy(), np.array([1.0, 0.0]))
     assert outcome == LP_SOLVED
     assert point[0] == 1.0
     assert basis.weights[list(basis.labels[:2]).index(3)] == 0.0
@@ -147,16 +147,16 @@ def test_many_sides_through_one_corner(d: int) -> None:
     rng = np.random.default_rng(50 + d)
     for _ in range(40):
         rows = rng.integers(-2, 3, (d, 8 * d)).astype(np.float64)
-        strips = np.zeros((3, 8 * d))
-        strips[1] = -rng.integers(0, 2, 8 * d)
-        strips[2] = rng.integers(0, 2, 8 * d)
+        bounds = np.zeros((3, 8 * d))
+        bounds[1] = -rng.integers(0, 2, 8 * d)
+        bounds[2] = rng.integers(0, 2, 8 * d)
         cost = rng.integers(-1, 2, d).astype(np.float64)
-        outcome, point, basis = solve(rows, strips, cost)
-        verdict, least = by_scipy(rows, strips, cost)
+        outcome, point, basis = solve(rows, bounds, cost)
+        verdict, least = by_scipy(rows, bounds, cost)
         assert outcome == verdict
         if outcome == LP_SOLVED:
             assert cost @ point == pytest.approx(least, abs=1e-10)
-            assert_proof(rows, strips, cost, basis, False)
+            assert_proof(rows, bounds, cost, basis, False)
     # Klee and Minty's way of making programs long: every corner of a cube on the way
     squeezed = np.eye(d) + np.triu(np.full((d, d), 0.3), 1)
     outcome, point, _ = solve(squeezed, np.array([np.zeros(d), np.zeros(d), np.ones(d)]), -squeezed.sum(axis=1))

@@ -1,4 +1,4 @@
-"""The nearest point within strips: optimality, DAQP, and starts from what other problems were left with."""
+"""The nearest point within bounds: optimality, DAQP, and starts from what other problems were left with."""
 
 import math
 
@@ -21,41 +21,41 @@ def held_for(d: int) -> n.Held:
     return held
 
 
-def point_of(rows: Array, strips: Array, target: Array, held: n.Held | None = None) -> Array:
+def point_of(rows: Array, bounds: Array, target: Array, held: n.Held | None = None) -> Array:
     """The point, where there is one."""
-    point = solve(rows, strips, target, held)
+    point = solve(rows, bounds, target, held)
     assert point is not None
     return point
 
 
-def solve(rows: Array, strips: Array, target: Array, held: n.Held | None = None) -> Array | None:
+def solve(rows: Array, bounds: Array, target: Array, held: n.Held | None = None) -> Array | None:
     """The point, from a cold start unless held says otherwise; None for none."""
     held = held_for(target.size) if held is None else held
     point = np.full(target.size, np.nan)
-    return point if nearest_point(rows, strips, target, 1e-12, held, point) else None
+    return point if nearest_point(rows, bounds, target, 1e-12, held, point) else None
 
 
 def one_sided(rows: Array, sides: Array) -> tuple[Array, Array]:
-    """rows x >= sides as strips."""
+    """rows x >= sides as bounds."""
     return rows.T.copy(), np.array([np.zeros_like(sides), sides, np.full_like(sides, math.inf)])
 
 
 def two_sided(rng: np.random.Generator, d: int) -> tuple[Array, Array, Array]:
-    """Rows, strips that have something in common, and a target."""
+    """Rows, bounds that have something in common, and a target."""
     k = 2 * d + 2
     rows, inside = rng.normal(size=(d, k)), rng.normal(size=d)
     start = rng.normal(size=k)
     middle = start + inside @ rows
-    strips = np.array([start, middle - rng.uniform(0.0, 1.0, k), middle + rng.uniform(0.0, 1.0, k)])
-    strips[2, rng.uniform(size=k) < 0.2] = math.inf
-    return rows, strips, inside + 3.0 * rng.normal(size=d)
+    bounds = np.array([start, middle - rng.uniform(0.0, 1.0, k), middle + rng.uniform(0.0, 1.0, k)])
+    bounds[2, rng.uniform(size=k) < 0.2] = math.inf
+    return rows, bounds, inside + 3.0 * rng.normal(size=d)
 
 
-def by_daqp(rows: Array, strips: Array, target: Array) -> Array:
+def by_daqp(rows: Array, bounds: Array, target: Array) -> Array:
     d, k = rows.shape
-    high = np.minimum(strips[2] - strips[0], 1e30)
+    high = np.minimum(bounds[2] - bounds[0], 1e30)
     found, _value, flag, _info = daqp.solve(
-        np.eye(d), -target, rows.T.copy(), high, strips[1] - strips[0], np.zeros(k, dtype=np.int32), primal_tol=1e-11
+        np.eye(d), -target, rows.T.copy(), high, bounds[1] - bounds[0], np.zeros(k, dtype=np.int32), primal_tol=1e-11
     )
     assert flag == 1
     return np.asarray(found)
@@ -85,10 +85,10 @@ def test_projection_keeps_the_optimality_conditions(d: int) -> None:
 def test_daqp_agrees(d: int) -> None:
     rng = np.random.default_rng(d)
     for _ in range(30):
-        rows, strips, target = two_sided(rng, d)
-        point = solve(rows, strips, target)
+        rows, bounds, target = two_sided(rng, d)
+        point = solve(rows, bounds, target)
         assert point is not None
-        np.testing.assert_allclose(point, by_daqp(rows, strips, target), atol=1e-8)
+        np.testing.assert_allclose(point, by_daqp(rows, bounds, target), atol=1e-8)
 
 
 @pytest.mark.parametrize("d", [1, 2, 3, 6, 15])
@@ -96,12 +96,12 @@ def test_a_start_from_a_neighbor_gives_the_same_answer(d: int) -> None:
     rng = np.random.default_rng(100 + d)
     stood = 0
     for _ in range(60):
-        rows, strips, target = two_sided(rng, d)
+        rows, bounds, target = two_sided(rng, d)
         held = held_for(d)
-        assert solve(rows, strips, target, held) is not None
+        assert solve(rows, bounds, target, held) is not None
         before = set(held.labels[1 : 1 + held.labels[0]])
         for size in (1e-9, 1e-3, 0.3):  # the next limits are the same sides, then partly others
-            moved = strips + size * rng.uniform(-1, 1, strips.shape) * [[1], [0], [0]]
+            moved = bounds + size * rng.uniform(-1, 1, bounds.shape) * [[1], [0], [0]]
             goal = target + size * rng.normal(size=d)
             cold, warm = solve(rows, moved, goal), solve(rows, moved, goal, held)
             assert (cold is None) == (warm is None)
@@ -116,58 +116,58 @@ def test_a_start_from_a_neighbor_gives_the_same_answer(d: int) -> None:
 def test_a_start_from_the_wrong_sides_is_forgotten(d: int) -> None:
     rng = np.random.default_rng(200 + d)
     for _ in range(150):
-        rows, strips, target = two_sided(rng, d)
+        rows, bounds, target = two_sided(rng, d)
         rows[:, -1] = rows[:, -2]  # sides that depend on each other
-        strips[:, -1] = strips[:, -2]
+        bounds[:, -1] = bounds[:, -2]
         held = held_for(d)
         count = int(rng.integers(1, d + 1))
-        finite = [label for label in range(2 * rows.shape[1]) if label % 2 == 0 or strips[2, label // 2] < math.inf]
+        finite = [label for label in range(2 * rows.shape[1]) if label % 2 == 0 or bounds[2, label // 2] < math.inf]
         held.labels[0] = count
         held.labels[1 : 1 + count] = rng.choice(finite, count, replace=bool(rng.integers(2)))
-        cold, warm = solve(rows, strips, target), solve(rows, strips, target, held)
+        cold, warm = solve(rows, bounds, target), solve(rows, bounds, target, held)
         assert cold is not None
         assert warm is not None
         np.testing.assert_allclose(warm, cold, atol=2e-11)
-        np.testing.assert_allclose(cold, by_daqp(rows, strips, target), atol=1e-8)
+        np.testing.assert_allclose(cold, by_daqp(rows, bounds, target), atol=1e-8)
 
 
 def test_held_sides_are_those_the_point_stands_on() -> None:
     rng = np.random.default_rng(3)
     for _ in range(100):
-        rows, strips, target = two_sided(rng, 3)
+        rows, bounds, target = two_sided(rng, 3)
         held = held_for(3)
-        point = solve(rows, strips, target, held)
+        point = solve(rows, bounds, target, held)
         assert point is not None
-        value = strips[0] + point @ rows
+        value = bounds[0] + point @ rows
         pull = target - point
         for place, label in enumerate(held.labels[1 : 1 + held.labels[0]]):
             sign = 1.0 if label % 2 == 0 else -1.0
-            assert value[label // 2] == pytest.approx(strips[1 + label % 2, label // 2], abs=1e-12)
+            assert value[label // 2] == pytest.approx(bounds[1 + label % 2, label // 2], abs=1e-12)
             pull = pull + held.pushes[n.PUSH, place] * sign * rows[:, label // 2]
         np.testing.assert_allclose(pull, 0.0, atol=1e-12)  # the pushes are what keeps the point from its target
 
 
 def test_a_target_inside_is_the_answer_and_stands_on_nothing() -> None:
-    rows, strips = np.eye(2), np.array([[0.0, 0.0], [-1.0, -1.0], [1.0, math.inf]])
+    rows, bounds = np.eye(2), np.array([[0.0, 0.0], [-1.0, -1.0], [1.0, math.inf]])
     held = held_for(2)
-    np.testing.assert_array_equal(point_of(rows, strips, np.array([0.5, 9.0]), held), [0.5, 9.0])
+    np.testing.assert_array_equal(point_of(rows, bounds, np.array([0.5, 9.0]), held), [0.5, 9.0])
     assert held.labels[0] == 0
-    np.testing.assert_array_equal(point_of(rows, strips, np.array([3.0, -9.0]), held), [1.0, -1.0])
+    np.testing.assert_array_equal(point_of(rows, bounds, np.array([3.0, -9.0]), held), [1.0, -1.0])
     assert sorted(held.labels[1:3]) == [1, 2]
-    np.testing.assert_array_equal(point_of(rows, strips, np.array([0.5, 9.0]), held), [0.5, 9.0])
+    np.testing.assert_array_equal(point_of(rows, bounds, np.array([0.5, 9.0]), held), [0.5, 9.0])
 
 
 def test_an_empty_set_forgets_what_was_held() -> None:
     rows = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    strips = np.array([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [1.0, 2.0, 1.0]])  # x <= 1 and x >= 1.5
+    bounds = np.array([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0], [1.0, 2.0, 1.0]])  # x <= 1 and x >= 1.5
     held = held_for(2)
-    assert solve(rows, strips, np.array([5.0, 5.0]), held) is None
+    assert solve(rows, bounds, np.array([5.0, 5.0]), held) is None
     assert held.labels[0] == 0
-    strips[2, 0] = 1.6
-    np.testing.assert_allclose(point_of(rows, strips, np.array([5.0, 5.0]), held), [1.6, 1.0], atol=1e-15)
+    bounds[2, 0] = 1.6
+    np.testing.assert_allclose(point_of(rows, bounds, np.array([5.0, 5.0]), held), [1.6, 1.0], atol=1e-15)
 
 
 def test_strips_as_thin_as_a_line_and_met_twice() -> None:
     rows = np.array([[1.0, 2.0, 0.6], [0.0, 0.0, 0.8]])
-    strips = np.array([[0.0, 0.0, 0.0], [2.0, 4.0, -1.0], [2.0, 4.0, 1.0]])  # x = 2, said twice
-    np.testing.assert_allclose(point_of(rows, strips, np.array([7.0, 9.0])), [2.0, -0.25], atol=1e-14)
+    bounds = np.array([[0.0, 0.0, 0.0], [2.0, 4.0, -1.0], [2.0, 4.0, 1.0]])  # x = 2, said twice
+    np.testing.assert_allclose(point_of(rows, bounds, np.array([7.0, 9.0])), [2.0, -0.25], atol=1e-14)

@@ -8,9 +8,9 @@ import pytest
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.algebra.strips import HIGH, LOW, START
+from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.balance import setting as s
-from sagline.kernels.cable import hanging
+from sagline.kernels.cable import states
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material, Model
@@ -42,7 +42,7 @@ need = from_python(s.need)
 start_from_minimum_norm = from_python(s.start_from_minimum_norm)
 room_for_cables = from_python(new_cables)
 room_for_balance = from_python(s.new_balance)
-frame_end_tension = from_python(hanging.frame_end_tension)
+frame_end_tension = from_python(states.frame_end_tension)
 
 EXACT = Model(CATENARY, 0.0, 0.0, GRAVITY)
 NO_PULLEY = Pulley(0.0, 1.0, 0.0, 0.0)
@@ -101,8 +101,8 @@ def test_balance_of_a_pose(m: int, freedom: Array, variable: int) -> None:
         scale = weight * (cosine if variable == HORIZONTAL_TENSION else 1.0)
         np.testing.assert_allclose(balance.scale, scale, rtol=1e-13)
         np.testing.assert_allclose(balance.offset, -half * sine if variable == FRAME_END_TENSION else 0.0, rtol=1e-13)
-        np.testing.assert_allclose(balance.strips[LOW], cables.low * scale, rtol=1e-13)
-        np.testing.assert_allclose(balance.strips[HIGH], cables.high * scale, rtol=1e-13)
+        np.testing.assert_allclose(balance.bounds[LOW], cables.low * scale, rtol=1e-13)
+        np.testing.assert_allclose(balance.bounds[HIGH], cables.high * scale, rtol=1e-13)
         np.testing.assert_allclose(balance.matrix, case.structure, atol=1e-14)
         scaled = case.structure / scale
         large = float(np.linalg.norm(np.linalg.pinv(scaled)))
@@ -113,8 +113,8 @@ def test_balance_of_a_pose(m: int, freedom: Array, variable: int) -> None:
         need(platform, cables, balance)
         np.testing.assert_allclose(balance.right, freedom @ balance.needed, atol=1e-13)
         start_from_minimum_norm(balance)
-        np.testing.assert_allclose(scaled @ balance.strips[START], balance.right, atol=1e-12 * large)
-        np.testing.assert_allclose(balance.null @ balance.strips[START], 0.0, atol=1e-11 * large)
+        np.testing.assert_allclose(scaled @ balance.bounds[START], balance.right, atol=1e-12 * large)
+        np.testing.assert_allclose(balance.null @ balance.bounds[START], 0.0, atol=1e-11 * large)
 
 
 def test_an_infinite_limit_stays_infinite_in_every_variable() -> None:
@@ -123,7 +123,7 @@ def test_an_infinite_limit_stays_infinite_in_every_variable() -> None:
     for variable in VARIABLES:
         for quantity in (LIMITS_OF_CHORD, LIMITS_OF_FRAME_END):
             balance = setting(case, variable, limits=s.Limits(quantity, math.nan)).balance
-            assert list(np.flatnonzero(np.isinf(balance.strips[HIGH]))) == [2]
+            assert list(np.flatnonzero(np.isinf(balance.bounds[HIGH]))) == [2]
 
 
 def test_limits_of_the_frame_end() -> None:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.core.arrays import Array
-from sagline.kernels.cable import models, pulls, turns
-from sagline.kernels.cable.pulls import TURN_ROWS, Curves
+from sagline.kernels.cable import models, sag_force_extrema, sag_forces
+from sagline.kernels.cable.sag_forces import TURN_ROWS, Curves
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CATENARY
-from tests.kernels.cable.room import plain_cables
+from tests.kernels.cable.plain import plain_cables
 from tests.kernels.compiled import compiled, from_python, memory
 
 GRAVITY = 9.81
 
-find_turns = from_python(turns.find_turns)
-pull_range = from_python(pulls.pull_range)
+find_extrema = from_python(sag_force_extrema.find_extrema)
+sag_force_range = from_python(sag_forces.sag_force_range)
 
 
 def random_curves(rng: np.random.Generator, m: int, model: int = CATENARY) -> Curves:
@@ -37,7 +37,7 @@ def random_curves(rng: np.random.Generator, m: int, model: int = CATENARY) -> Cu
 
 def with_turns(curves: Curves) -> Curves:
     """The same, its turns found."""
-    find_turns(curves, curves.cables.low, curves.cables.high, memory())
+    find_extrema(curves, curves.cables.low, curves.cables.high, memory())
     return curves
 
 

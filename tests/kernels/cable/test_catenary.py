@@ -14,7 +14,7 @@ from tests.kernels.compiled import from_python
 is_ordinary = from_python(c.is_ordinary)
 ordinary_length_ratio = from_python(c.ordinary_length_ratio)
 ordinary_length_ratio_near = from_python(c.ordinary_length_ratio_near)
-ordinary_pull_ratio = from_python(c.ordinary_pull_ratio)
+ordinary_sag_force_ratio = from_python(c.ordinary_sag_force_ratio)
 length_ratio = from_python(c.length_ratio)
 pull_ratio = from_python(c.pull_ratio)
 catenary_from_length = from_python(c.catenary_from_length)
@@ -56,7 +56,7 @@ def test_ordinary_cables_without_branches(half_weight: float, sine: float) -> No
         ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
         if strain > c.TAUT_STRAIN:
             ratio = ordinary_length_ratio_near(half_weight, sine, cosine, strain, ratio)
-        pull = ordinary_pull_ratio(half_weight, sine, strain, ratio)
+        pull = ordinary_sag_force_ratio(half_weight, sine, strain, ratio)
         length, force, _ = exact(half_weight, sine, strain, (ratio, pull))
         assert ratio == pytest.approx(length, rel=LAST_DIGITS)
         assert pull == pytest.approx(force, rel=LAST_DIGITS, abs=1e-15)

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.cable import forces, geometry, hanging, models, over_pulleys, pulley
+from sagline.kernels.cable import forces, geometry, models, over_pulleys, pulley, states
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.pulley import Pulley, Wrap
 from sagline.kernels.cable.terms import Chord, Material, Model
@@ -21,7 +21,7 @@ behind = from_python(pulley.behind)
 softness = from_python(pulley.softness)
 energy_behind = from_python(pulley.energy_behind)
 behind_cable = from_python(pulley.behind_cable)
-hang_cable = from_python(hanging.hang_cable)
+solve_cable_state = from_python(states.solve_cable_state)
 free_span, free_rise = from_python(pulley.free_span), from_python(pulley.free_rise)
 from_tension = from_python(models.from_tension)
 cable_forces = from_python(forces.cable_forces)
@@ -130,7 +130,7 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
         over = Pulley(*(float(x) for x in cables[i, tables.PULLEY_RADIUS :]))
         line = Chord(float(chord[i]), math.sin(slope[i]), math.cos(slope[i]))
         material = Material(float(cables[i, tables.DENSITY]), float(cables[i, tables.STIFFNESS]))
-        free, pull, status = hang_cable(model, line, material, over, float(tension[i]))
+        free, pull, status = solve_cable_state(model, line, material, over, float(tension[i]))
         assert status == CABLE_SOLVED
         horizontal, weight = tension[i] * line.cosine, material.density * GRAVITY
         vertical = tension[i] * line.sine + pull

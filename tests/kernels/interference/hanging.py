@@ -12,7 +12,7 @@ import sagline as sl
 from sagline.core.arrays import Array, Indices, locked
 from sagline.interference.pairs import cable_rows
 from sagline.kernels.interference import shapes
-from sagline.kernels.interference.hanging_distance import least_distances, memory_for_pieces
+from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
 
 
 class Hung(NamedTuple):
@@ -133,7 +133,7 @@ def measured(
     shape = (len(moving), len(numbers))
     out = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, 2, 3), np.nan)
     rows, others = locked(np.ascontiguousarray(moving)), locked(beside)
-    least_distances(rows, others, locked(numbers), precision, together, *memory_for_pieces(), *out)
+    least_distances(rows, others, locked(numbers), precision, together, *work_arrays_for_pieces(), *out)
     return out
 
 

@@ -1,4 +1,4 @@
-"""The inverse of poses through its entry: balance, limits, every way of sharing, nothing left from pose to pose."""
+"""Inverse of poses through its entry: balance, limits, every method, no state left from pose to pose."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from sagline.core.arrays import Array, Codes, locked
 from sagline.kernels import codes, tables
-from sagline.kernels.cable import hanging, models
+from sagline.kernels.cable import models, states
 from sagline.kernels.cable.pulley import Pulley
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import (
@@ -31,11 +31,11 @@ from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.inverse.queries import margins_of_poses, polygon_of_pose
 from sagline.kernels.inverse.verdicts import decide_poses
 from sagline.kernels.memory import memory_for
-from sagline.kernels.sharing.polygon import SPARE_CORNERS
+from sagline.kernels.tension.polygon import SPARE_CORNERS
 from tests.kernels.balance.robots import A_POINT, EVERY_MOTION, GRAVITY, IN_A_PLANE, TO_AND_FRO, Case, random_case
 from tests.kernels.compiled import from_python
 
-frame_end_tension = from_python(hanging.frame_end_tension)
+frame_end_tension = from_python(states.frame_end_tension)
 from_tension = from_python(models.from_tension)
 
 OTHERWISE = range(codes.LOWEST_SUM, codes.POLYGON_WALK + 1)
@@ -238,7 +238,7 @@ def test_an_infeasible_pose_leaves_the_tensions_before_it() -> None:
 
 
 def in_variable(case: Case, variable: int, tensions: Array) -> Array:
-    """Chord tensions in the sharing's variable."""
+    """Chord tensions in the distribution's variable."""
     chords = case.chords
     length = np.linalg.norm(chords, axis=1)
     sine, cosine = chords[:, 2] / length, np.hypot(chords[:, 0], chords[:, 1]) / length
@@ -328,7 +328,7 @@ def test_too_little_memory_is_told() -> None:
             solve(case, method=codes.LOWEST_MAXIMUM, otherwise=True, room=room)
 
 
-Room = tuple[Array, np.ndarray]
+WorkArrays = tuple[Array, np.ndarray]
 TERMS = (CATENARY, 4.9, 4.0)
 LIMITS = (LIMITS_OF_CHORD, math.nan)
 
@@ -337,7 +337,7 @@ def robot_terms(case: Case) -> tuple[Array, Array, Array]:
     return fixed(case.freedom), fixed(case.body[None]), fixed(case.robot[None])
 
 
-def decided(case: Case, room: Room) -> Array:
+def decided(case: Case, room: WorkArrays) -> Array:
     m, n = len(case.robot), len(case.freedom)
     nothing = np.full((1, n), np.nan)
     found = (np.full((1, 2), np.nan), nothing, nothing.copy(), np.zeros((1, m), dtype=np.bool_))
@@ -350,7 +350,7 @@ def decided(case: Case, room: Room) -> Array:
     return found[0]
 
 
-def margined(case: Case, room: Room) -> Array:
+def margined(case: Case, room: WorkArrays) -> Array:
     found = np.full(1, np.nan)
     pulls = locked(np.zeros((1, len(case.robot))))
     margins_of_poses(
@@ -359,13 +359,13 @@ def margined(case: Case, room: Room) -> Array:
     return found
 
 
-def polygoned(case: Case, room: Room) -> int:
+def polygoned(case: Case, room: WorkArrays) -> int:
     m, n = len(case.robot), len(case.freedom)
     polygon = (
         np.empty(m), np.empty(m), np.empty((3, m)), np.empty((m - n, m)),
         np.empty((2 * m + SPARE_CORNERS, 2)), np.empty(2 * m + SPARE_CORNERS, dtype=np.int64),
     )  # fmt: skip
-    sharing = (MINIMUM_NORM, 0.0, CHORD_TENSION, fixed(np.ones(m)), fixed(np.zeros(m)))
-    given = (TERMS, sharing, LIMITS, robot_terms(case), fixed(case.pose), fixed(case.wrench))
+    distribution = (MINIMUM_NORM, 0.0, CHORD_TENSION, fixed(np.ones(m)), fixed(np.zeros(m)))
+    given = (TERMS, distribution, LIMITS, robot_terms(case), fixed(case.pose), fixed(case.wrench))
     carried = (fixed(np.full(m, np.nan)), fixed(np.full(m, np.nan)))
     return polygon_of_pose(*given, carried, room, polygon)

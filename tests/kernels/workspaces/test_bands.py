@@ -9,7 +9,7 @@ import pytest
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.kernels.workspaces import bands
-from tests.kernels.cable.room import plain_cables
+from tests.kernels.cable.plain import plain_cables
 
 GRID = 300
 between_ends = cast("Any", bands.range_between_ends).py_func

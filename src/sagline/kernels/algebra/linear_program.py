@@ -1,6 +1,6 @@
-"""Linear programs in few unknowns, over strips: the dual simplex method.
+"""Linear programs in few unknowns, over bounds: the dual simplex method.
 
-It walks over points that are optimal for the sides they stand on until it meets one that keeps all strips, or a side
+It walks over points that are optimal for the sides they stand on until it meets one that keeps all bounds, or a side
 that contradicts those it stands on: the proof that there is none. Where the same rows and cost are met again with other
 limits, the sides of the last answer are still optimal, and it starts from there.
 """
@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.algebra.strips import TOLERANCE, box_radius, inward, largest_number, most_missed, side_of
+from sagline.kernels.algebra.bounds import TOLERANCE, box_radius, inward, largest_bound, most_violated_bound, side_of
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
@@ -28,7 +28,7 @@ class Basis(NamedTuple):
     A limit that was finite must then still be so: a side at infinity is no side to stand on.
 
     Attributes:
-        labels: Of the sides, and of the one that contradicts them if the strips have nothing in common, (d + 1,);
+        labels: Of the sides, and of the one that contradicts them if the bounds have nothing in common, (d + 1,);
             labels[0] is -1 for no basis. From 2k on they name the sides of a box that stands in for infinity.
         weights: What each of them weighs in the combination that proves the answer, (d + 1,), >= 0.
         inverse: Inverse of their normals, (d, d).
@@ -41,7 +41,7 @@ class Basis(NamedTuple):
 
 @glue
 def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
-    """Room for d unknowns, and the memory that is left."""
+    """Work arrays for d unknowns, and the memory that is left."""
     weights, at = block(memory.numbers, 0, 1, d + 1)
     inverse, at = block(memory.numbers, at, d, d)
     labels, after = counters(memory, 0, d + 1)
@@ -50,7 +50,7 @@ def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
 
 @formula
 def along(rows: Array, label: int, inverse: Array, j: int) -> float:
-    """How fast normal . x of a side grows along edge j of the present basis."""
+    """Growth of normal . x of a bound along edge j of the present basis."""
     total = 0.0
     for i in range(inverse.shape[0]):
         total += rows[i, label // 2] * inverse[i, j]
@@ -58,12 +58,12 @@ def along(rows: Array, label: int, inverse: Array, j: int) -> float:
 
 
 @formula
-def miss_of(rows: Array, strips: Array, label: int, radius: float, cost: Array, point: Array) -> float:
+def miss_of(rows: Array, bounds: Array, label: int, radius: float, cost: Array, point: Array) -> float:
     """By how much a point misses a side, or, from 2k on, a side of the box."""
     box = label - 2 * rows.shape[1]
     if box >= 0:
         return -radius - (point[box] if cost[box] >= 0.0 else -point[box])
-    miss = side_of(strips, label)
+    miss = side_of(bounds, label)
     for i in range(point.size):
         miss -= inward(label) * rows[i, label // 2] * point[i]
     return miss
@@ -106,26 +106,26 @@ def exchange(rows: Array, entering: int, leaving: int, miss: float, basis: Basis
 
 
 @glue
-def stand_on(rows: Array, strips: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
+def stand_on(rows: Array, bounds: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
     """Move the point to where all sides of the basis meet: from anywhere, then twice by what they still miss."""
     d = point.size
     for _ in range(3):
         for j in range(d):
-            miss = miss_of(rows, strips, basis.labels[j], radius, cost, point)
+            miss = miss_of(rows, bounds, basis.labels[j], radius, cost, point)
             for i in range(d):
                 point[i] += basis.inverse[i, j] * miss
 
 
 @kernel
-def lowest_point(rows: Array, strips: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
-    """Fill the point (d,) of least cost . x that keeps all strips up to a slack; returns the outcome.
+def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
+    """Fill the point (d,) of least cost . x that keeps all bounds up to a slack; returns the outcome.
 
     A slack of 0 stands for the usual tolerance. A solution as far out as the box is infinitely far.
     """
     labels, weights, inverse = basis
     d = cost.size
-    largest = largest_number(strips)
-    radius = box_radius(largest, strips)
+    largest = largest_bound(bounds)
+    radius = box_radius(largest, bounds)
     if slack == 0.0:
         slack = TOLERANCE * largest
     if labels[0] < 0:
@@ -133,17 +133,17 @@ def lowest_point(rows: Array, strips: Array, cost: Array, slack: float, basis: B
     else:
         for k in range(d):
             point[k] = 0.0
-        stand_on(rows, strips, cost, radius, basis, point)
+        stand_on(rows, bounds, cost, radius, basis, point)
     for pivots in range(PIVOTS):
         careful = pivots > CAREFUL
         far = 0.0
         for k in range(d):
             far = max(far, abs(point[k]))
         seen = max(slack, ROUNDING * d * far)  # far out, rounding hides more than the slack
-        entering = most_missed(rows, strips, point, seen, careful)
+        entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
-            stand_on(rows, strips, cost, radius, basis, point)  # the rounding of many pivots is gone
-            entering = most_missed(rows, strips, point, seen, careful)
+            stand_on(rows, bounds, cost, radius, basis, point)  # the rounding of many pivots is gone
+            entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
             outcome = LP_SOLVED
             for j in range(d):
@@ -169,5 +169,5 @@ def lowest_point(rows: Array, strips: Array, cost: Array, slack: float, basis: B
             labels[d] = entering
             weights[d] = 1.0
             return LP_EMPTY
-        exchange(rows, entering, leaving, miss_of(rows, strips, entering, radius, cost, point), basis, point)
+        exchange(rows, entering, leaving, miss_of(rows, bounds, entering, radius, cost, point), basis, point)
     return LP_GAVE_UP

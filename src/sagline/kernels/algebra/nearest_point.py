@@ -1,4 +1,4 @@
-"""The point nearest to a target that keeps all strips, for any number of unknowns: a dual active-set method.
+"""The point nearest to a target that keeps all bounds, for any number of unknowns: a dual active-set method.
 
 Starting from the target itself, sides that are missed are added one by one, and sides that push the wrong way are
 dropped, until all are kept; docs/model.md, section 5. It starts from the sides that a similar problem was left with,
@@ -15,8 +15,8 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
+from sagline.kernels.algebra.bounds import inward, most_violated_bound, side_of
 from sagline.kernels.algebra.gram_schmidt import keep, take_out
-from sagline.kernels.algebra.strips import inward, most_missed, side_of
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
@@ -45,7 +45,7 @@ class Held(NamedTuple):
 
 @glue
 def new_held(memory: Memory, d: int) -> tuple[Held, Memory]:
-    """Room for d unknowns, and the memory that is left."""
+    """Work arrays for d unknowns, and the memory that is left."""
     frame, at = block(memory.numbers, 0, d + 1, d)
     triangle, at = block(memory.numbers, at, d + 1, d + 1)
     pushes, at = block(memory.numbers, at, 2, d + 1)
@@ -54,7 +54,7 @@ def new_held(memory: Memory, d: int) -> tuple[Held, Memory]:
 
 
 @glue
-def stand_on_held(rows: Array, strips: Array, held: Held, target: Array, point: Array) -> bool:
+def stand_on_held(rows: Array, bounds: Array, held: Held, target: Array, point: Array) -> bool:
     """Fill the point of the held sides' common edge that is nearest to the target; False if that is not optimal."""
     labels, frame, triangle, pushes = held
     count, d = labels[0], point.size
@@ -62,7 +62,7 @@ def stand_on_held(rows: Array, strips: Array, held: Held, target: Array, point: 
         point[k] = target[k]
     for c in range(count):  # how far the edge is from the target along row c of the frame
         label = labels[1 + c]
-        miss = side_of(strips, label)
+        miss = side_of(bounds, label)
         size = 0.0
         for k in range(d):
             frame[c, k] = inward(label) * rows[k, label // 2]
@@ -103,20 +103,20 @@ def drop(rows: Array, held: Held, leaving: int) -> None:
 
 
 @kernel
-def nearest_point(rows: Array, strips: Array, target: Array, slack: float, held: Held, point: Array) -> bool:
-    """Fill the point (d,) nearest to the target (d,) that keeps all strips up to a slack; False where there is none.
+def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: Held, point: Array) -> bool:
+    """Fill the point (d,) nearest to the target (d,) that keeps all bounds up to a slack; False where there is none.
 
     held: what a similar problem left, or labels[0] = 0; filled with what this point stands on.
     """
     labels, frame, triangle, pushes = held
     d = target.size
-    if labels[0] > 0 and not stand_on_held(rows, strips, held, target, point):
+    if labels[0] > 0 and not stand_on_held(rows, bounds, held, target, point):
         labels[0] = 0
     if labels[0] == 0:
         for k in range(d):
             point[k] = target[k]
     for exchange in range(EXCHANGES):
-        entering = most_missed(rows, strips, point, slack, exchange > EXCHANGES // 2)
+        entering = most_violated_bound(rows, bounds, point, slack, exchange > EXCHANGES // 2)
         if entering < 0:
             return True
         push = 0.0
@@ -140,7 +140,7 @@ def nearest_point(rows: Array, strips: Array, target: Array, slack: float, held:
                     leaving = c
             full = math.inf
             if count < d and square > DEPENDENT * DEPENDENT * size:
-                miss = side_of(strips, entering)
+                miss = side_of(bounds, entering)
                 for k in range(d):
                     miss -= inward(entering) * rows[k, entering // 2] * point[k]
                 full = max(miss, 0.0) / square

@@ -13,7 +13,7 @@ from sagline.kernels.jit import formula, glue, kernel
 
 @glue
 def translations_of(freedom: Array) -> int:
-    """How many of the free motions, the first ones, do not turn the platform."""
+    """Number of free translations; they come before the free rotations."""
     count = 0
     for k in range(freedom.shape[0]):
         count += 0 if turns(freedom, k) else 1
@@ -22,7 +22,7 @@ def translations_of(freedom: Array) -> int:
 
 @formula
 def turns(freedom: Array, k: int) -> bool:
-    """Whether free motion k of the platform turns it; the others, which come first, are translations."""
+    """True if free motion k of the platform is a rotation; the translations come first."""
     return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
 
 

@@ -1,4 +1,4 @@
-"""What is given at one pose: cables in place, their limits, and the balance factored.
+"""Data of one pose: cables in place, their limits, and the factored force balance.
 
 This is the one place that sets a pose up. The load is shared in a variable t that is scale times the chord tension plus
 offset: chord, horizontal or frame-end tensions, and weighted ones. Limits and minimum norm are those of t - offset.
@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
-from sagline.kernels.algebra.strips import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.hanging import chord_tension_at_frame_end, taut_at_frame_end
 from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.pulley import pulley_at
+from sagline.kernels.cable.states import chord_tension_at_frame_end, taut_at_frame_end
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     FRAME_END_TENSION,
@@ -36,7 +36,7 @@ SHORTEST_CHORD = 1e-9  # [m]
 
 
 class Platform(NamedTuple):
-    """What is given at one pose.
+    """Platform and loads at one pose.
 
     Attributes:
         freedom: Rows that pick the platform's free motions, translations first, (n, 6).
@@ -54,7 +54,7 @@ class Platform(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What the tensions must keep.
+    """Limits of the tensions.
 
     Attributes:
         quantity: Which tension the robot's limits name.
@@ -73,17 +73,17 @@ class Balance(NamedTuple):
         geometry: Rows of `cable_geometry`, (GEOMETRY_ROWS, m).
         full: Structure matrix, (6, m).
         matrix: Along the free motions, (n, m).
-        reduced: In the sharing's variable, then its reflections, (n, m).
+        reduced: In the distribution's variable, then its reflections, (n, m).
         diagonals: Of its factors, (2, n).
         q: Orthogonal factor, and a row to work in, (m + 1, m).
-        inverse: Transposed pseudo-inverse in the sharing's variable, (n, m).
-        null: Orthonormal null-space basis in the sharing's variable, one vector a row, (r, m).
+        inverse: Transposed pseudo-inverse in the distribution's variable, (n, m).
+        null: Orthonormal null-space basis in the distribution's variable, one vector a row, (r, m).
         needed: Wrench that the chord tensions must supply, (6,).
         right: Its components along the free motions, (n,).
-        scale: Of the sharing's variable, (m,).
-        offset: Of the sharing's variable [N], (m,).
-        strips: The minimum norm as START, and the limits, in the sharing's variable, (3, m).
-        tension: Shared tensions, in the sharing's variable less its offset [N], (m,).
+        scale: Of the distribution's variable, (m,).
+        offset: Of the distribution's variable [N], (m,).
+        bounds: The minimum norm as START, and the limits, in the distribution's variable, (3, m).
+        tension: Shared tensions, in the distribution's variable less its offset [N], (m,).
     """
 
     rotation: Array
@@ -99,13 +99,13 @@ class Balance(NamedTuple):
     right: Array
     scale: Array
     offset: Array
-    strips: Array
+    bounds: Array
     tension: Array
 
 
 @glue
 def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
-    """Room for m cables and n free motions, and the memory that is left."""
+    """Work arrays for m cables and n free motions, and the memory that is left."""
     r = m - n
     numbers = memory.numbers
     rotation, at = block(numbers, 0, 3, 3)
@@ -117,11 +117,11 @@ def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
     inverse = reduced[n:]
     q = inverse[n:]
     null = q[m + 1 :]
-    strips = null[r:]
-    others = strips[STRIP_ROWS:]
+    bounds = null[r:]
+    others = bounds[STRIP_ROWS:]
     balance = Balance(
         rotation, rows[: g.GEOMETRY_ROWS], full[:6], matrix[:n], reduced[:n], diagonals, q[: m + 1], inverse[:n],
-        null[:r], numbers[at : at + 6], numbers[at + 6 : at + 6 + n], others[0], others[1], strips[:STRIP_ROWS],
+        null[:r], numbers[at : at + 6], numbers[at + 6 : at + 6 + n], others[0], others[1], bounds[:STRIP_ROWS],
         others[2],
     )  # fmt: skip
     return balance, Memory(numbers[at + 6 + n :], memory.counters)
@@ -133,7 +133,7 @@ def set_pose(
 ) -> int:
     """Fill cables, with the pulls of first order, and balance of one pose; returns POSE_SOLVED or why there is none.
 
-    weight: root weights of the cables in the sharing's variable, (m,).
+    weight: root weights of the cables in the distribution's variable, (m,).
     """
     cable_geometry(platform.robot, platform.body, platform.pose, balance.rotation, balance.geometry)
     if not place_cables(model, limits, platform.robot, balance.geometry, cables):
@@ -197,14 +197,14 @@ def choose_variable(variable: int, weight: Array, cables: Cables, balance: Balan
 
 @glue
 def scale_limits(cables: Cables, balance: Balance, i: int) -> None:
-    """Fill the limits of one cable in the sharing's variable."""
-    balance.strips[LOW, i] = cables.low[i] * balance.scale[i]
-    balance.strips[HIGH, i] = cables.high[i] * balance.scale[i] if cables.high[i] < math.inf else math.inf
+    """Fill the limits of one cable in the distribution's variable."""
+    balance.bounds[LOW, i] = cables.low[i] * balance.scale[i]
+    balance.bounds[HIGH, i] = cables.high[i] * balance.scale[i] if cables.high[i] < math.inf else math.inf
 
 
 @glue
 def factor_balance(balance: Balance) -> bool:
-    """Fill pseudo-inverse and null space in the sharing's variable; False if rank is lost."""
+    """Fill pseudo-inverse and null space in the distribution's variable; False if rank is lost."""
     n, m = balance.matrix.shape
     matrix, reduced, q = balance.matrix, balance.reduced, balance.q
     for i in range(m):
@@ -230,5 +230,5 @@ def need(platform: Platform, cables: Cables, balance: Balance) -> None:
 
 @glue
 def start_from_minimum_norm(balance: Balance) -> None:
-    """Fill START of the strips with the tensions of least norm that supply the needed wrench."""
-    minimum_norm(balance.inverse, balance.right, balance.strips[START])
+    """Fill START of the bounds with the tensions of least norm that supply the needed wrench."""
+    minimum_norm(balance.inverse, balance.right, balance.bounds[START])

@@ -11,7 +11,7 @@ from sagline.kernels.cable.catenary import (
     is_ordinary,
     ordinary_length_ratio,
     ordinary_length_ratio_near,
-    ordinary_pull_ratio,
+    ordinary_sag_force_ratio,
 )
 from sagline.kernels.cable.models import from_length, from_tension
 from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
@@ -84,7 +84,7 @@ def batch_from_tension(
                 for i in range(size):
                     ratio[i] = ordinary_length_ratio_near(half[i], sine[i], cosine[i], tau[i] / ea[i], ratio[i])
             for i in range(size):
-                pull[i] = ordinary_pull_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
+                pull[i] = ordinary_sag_force_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
             for i in range(size):
                 ratio[i] *= chord[i]
         for i in range(size):
@@ -132,6 +132,6 @@ def batch_from_length(
 def batch_end(
     horizontal: Array, vertical: Array, length: Array, weight: Array, stiffness: Array, x_out: Array, z_out: Array
 ) -> None:
-    """Where exact catenaries of the given forces and lengths end; all operands of full length."""
+    """Platform ends of exact catenaries with the given forces and lengths; all operands of full length."""
     for i in range(x_out.shape[0]):
         x_out[i], z_out[i] = catenary_end(horizontal[i], vertical[i], length[i], weight[i], stiffness[i])

@@ -78,7 +78,7 @@ class Cables(NamedTuple):
 
 @glue
 def new_cables(memory: Memory, m: int, machine: bool) -> tuple[Cables, Memory]:
-    """Room for m cables, behind which there may be something (machine), and the memory that is left."""
+    """Work arrays for m cables, behind which there may be something (machine), and the memory that is left."""
     own, at = block(memory.numbers, 0, 20, m)
     other, at = block(memory.numbers, at, 6, m)
     free = other if machine else own[:6]
@@ -104,11 +104,11 @@ def free_chord_of(cables: Cables, i: int) -> Chord:
 
 @glue
 def pulley_of(cables: Cables, i: int) -> Pulley:
-    """What is behind one cable."""
+    """Pulley and dead length of one cable."""
     return Pulley(cables.radius[i], cables.entry[i], cables.dead[i], cables.rise[i])
 
 
 @glue
 def material_of(cables: Cables, i: int) -> Material:
-    """What one cable is made of."""
+    """Material of one cable."""
     return Material(cables.density[i], cables.stiffness[i])

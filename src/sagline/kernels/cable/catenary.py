@@ -65,7 +65,7 @@ def catenary_end(
 
 @formula
 def is_ordinary(half_weight: float, strain: float) -> bool:
-    """Whether the ordinary steps lead to the last digit: X <= 2 and e <= 0.1."""
+    """True if the ordinary steps are exact to the last digit: X <= 2 and e <= 0.1."""
     return half_weight * half_weight <= POLYNOMIAL_LIMIT and strain <= ORDINARY_STRAIN
 
 
@@ -160,7 +160,7 @@ def pull_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> 
 
 
 @formula
-def ordinary_pull_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
+def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
     """The same for an ordinary cable, free of branches."""
     taut = 1.0 - strain * ratio
     y = half_weight * half_weight * taut * taut

@@ -24,7 +24,7 @@ SETTLED = 1e-8  # turns, or of all turns: the step after would be its square
 
 @formula
 def detour(distance: float, offset: float) -> float:
-    """How much longer the run to the pulley is for its being slanted; without end the distance, it is none [m]."""
+    """Extra length of the run to the pulley because it is slanted; zero at infinite distance [m]."""
     return offset * offset / (math.sqrt(distance * distance + offset * offset) + distance)
 
 
@@ -37,7 +37,7 @@ def turn_length(drum: Array, layer: int) -> float:
 
 @formula
 def exit_place(drum: Array, layer: int, turns: float) -> tuple[float, float]:
-    """Where the cable leaves after so many turns of a layer, from the pulley's middle, and how it goes on in a turn."""
+    """Place where the cable leaves the drum in a layer, from the pulley's middle, and its advance per turn."""
     if layer % 2 == 0:
         return drum[OFFSET] + drum[GROOVE_PITCH] * turns, drum[GROOVE_PITCH]
     return drum[OFFSET] + drum[GROOVE_PITCH] * (drum[LAYER_TURNS] - turns), -drum[GROOVE_PITCH]
@@ -118,7 +118,7 @@ def follow_memory(
         rest_strain: Of the cable that lies on the drum at first, (m,).
         unstrained: Which of the two lengths are given.
         found_out: The others [m], (N, m).
-        memory: Room, (MEMORY_ROWS, N).
+        memory: Work array, (MEMORY_ROWS, N).
     """
     for i in range(given.shape[1]):
         depth, begun = 0, False

@@ -86,7 +86,7 @@ def step_twice(gravity: float, cables: Array, asked: Asked, rows: Array) -> None
 
 @formula
 def has_arrived(rows: Array, i: int) -> bool:
-    """Whether the second step's answer is exact; false for NaN."""
+    """True if the second step is exact; false for NaN."""
     first, second, kappa = rows[t.FIRST, i], rows[t.SECOND, i], rows[t.KAPPA, i]
     near = abs(first - rows[t.PARAMETER, i]) <= CLOSE * (first + kappa)
     return near and abs(second - first) <= SMALL_HALLEY_STEP * (second + kappa) and 0.0 < second < ORDINARY

@@ -9,8 +9,8 @@ from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.angle import angle
 from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry
-from sagline.kernels.cable.hanging import chord_tension_at_frame_end, hang_cable
 from sagline.kernels.cable.pulley import Pulley, Wrap, behind_cable, pulley_at
+from sagline.kernels.cable.states import chord_tension_at_frame_end, solve_cable_state
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import entry, kernel
@@ -29,7 +29,7 @@ def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, t
     """A cable at a chord tension, with what is on its pulley and behind it; pull: T_z - tau sin phi."""
     weightless = model.code == STRAIGHT or model.code == ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
-    length, pull, _status = hang_cable(model, chord, material, pulley, tau)
+    length, pull, _status = solve_cable_state(model, chord, material, pulley, tau)
     horizontal, vertical = tau * chord.cosine, tau * chord.sine + pull - weight * length
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
     # cables of the shallow models leave along their chord, and have its tension behind it
@@ -63,8 +63,8 @@ def lengths_at_frame_ends(
         tension: At the frame ends [N], (m,).
         tension_out: What they are at these lengths: others, where no cable hangs with so little [N], (m,).
         length_out: (m,).
-        rotation: Room, (3, 3).
-        geometry: Room, (GEOMETRY_ROWS, m).
+        rotation: Work array, (3, 3).
+        geometry: Work array, (GEOMETRY_ROWS, m).
     """
     model = model_of(terms)
     cable_geometry(cables, body, pose, rotation, geometry)

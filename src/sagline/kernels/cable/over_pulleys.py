@@ -40,7 +40,7 @@ ORDINARY_END = math.sqrt(EXCESS_LIMIT)  # of u = wL/(T_A + T_B): up to here the 
 
 @formula
 def material_at(cables: Array, i: int) -> Material:
-    """What one cable of the cable_table is made of."""
+    """Material of one cable of the cable_table."""
     return Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
 
 
@@ -52,7 +52,7 @@ def chord_at(rows: Array, i: int) -> Chord:
 
 @formula
 def wrap_at(rows: Array, i: int) -> Wrap:
-    """How far one cable of a pose lies on its pulley, after `take_answers`."""
+    """Wrap of one cable of a pose on its pulley, after `take_answers`."""
     return Wrap(rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], rows[t.WRAP, i])
 
 
@@ -215,7 +215,7 @@ def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
 
 @formula
 def fed(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
-    """How the platform end moves at a fixed force for a meter of cable more, x and z, and for a newton more of H.
+    """Motion of the platform end at a fixed force per meter of cable, x and z, and per newton of H.
 
     The last is along the first, of which it is the share by which the part behind P gives way.
     """

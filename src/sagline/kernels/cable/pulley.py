@@ -20,7 +20,7 @@ from sagline.kernels.jit import formula, kernel
 
 
 class Pulley(NamedTuple):
-    """What stands behind one frame anchor.
+    """Pulley and dead length behind one frame anchor.
 
     Attributes:
         radius: R [m]; 0 for an eyelet.
@@ -36,7 +36,7 @@ class Pulley(NamedTuple):
 
 
 class Wrap(NamedTuple):
-    """How far a cable lies on its pulley: the wrap angle psi [rad], its sine and its cosine."""
+    """Wrap of a cable on its pulley: angle psi [rad], its sine and its cosine."""
 
     sine: float
     cosine: float
@@ -51,7 +51,7 @@ class Behind(NamedTuple):
 
 
 class Change(NamedTuple):
-    """What changes of one cable: L [m], w [N/m], EA [N], R [m], dead cable [m]."""
+    """Changes of the data of one cable: L [m], w [N/m], EA [N], R [m], dead length [m]."""
 
     length: float
     weight: float
@@ -69,7 +69,7 @@ class Motion(NamedTuple):
 
 @formula
 def pulley_at(cables: Array, i: int) -> Pulley:
-    """What stands behind one cable of the cable_table."""
+    """Pulley and dead length of one cable of the cable_table."""
     return Pulley(
         cables[i, tables.PULLEY_RADIUS],
         cables[i, tables.ENTRY],
@@ -80,7 +80,7 @@ def pulley_at(cables: Array, i: int) -> Pulley:
 
 @kernel
 def robot_has_machine(cables: Array) -> bool:
-    """Whether a cable of a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead cable."""
+    """True if a cable of a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead length."""
     total = 0.0
     for i in range(cables.shape[0]):
         total += cables[i, tables.PULLEY_RADIUS] + cables[i, tables.DEAD_CABLE]
@@ -89,7 +89,7 @@ def robot_has_machine(cables: Array) -> bool:
 
 @kernel
 def robots_have_machine(robots: Array) -> bool:
-    """Whether one of several robots' cables has, (1 or N, m, CABLE_COLUMNS)."""
+    """True if a cable of several robots has one, (1 or N, m, CABLE_COLUMNS)."""
     for p in range(robots.shape[0]):
         if robot_has_machine(robots[p]):
             return True
@@ -182,7 +182,7 @@ def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: floa
 def length_behind_by(
     pulley: Pulley, weight: float, stiffness: float, force: Force, free: float, change: Change, grown: float
 ) -> tuple[float, float]:
-    """How wrap angle and unstrained cable behind P follow a change at a fixed force on the platform end.
+    """Derivatives of wrap angle and unstrained length behind P at a fixed force on the platform end.
 
     Args:
         pulley: What stands behind.
@@ -226,7 +226,7 @@ def length_behind_by(
 def end_by(
     pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: Motion
 ) -> Motion:
-    """How the platform end moves at a fixed force on it when a cable's own data change; docs/model.md, section 10.
+    """Motion of the platform end at a fixed force on it per change of a cable's data; docs/model.md, section 10.
 
     by_weight: how it moves by w alone at a fixed free length [m^2/N].
     """

@@ -1,4 +1,4 @@
-"""What a solved cable looks like: points along it, its sag, and how well it closes."""
+"""Shape of a solved cable: points along it, its sag, and its closure error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a cable's force on its platform end follows its own data, the ends held: by L, rho and EA, in its plane."""
+"""Derivatives of a cable's force on its platform end, ends held: by L, rho and EA, in its plane."""
 
 from __future__ import annotations
 

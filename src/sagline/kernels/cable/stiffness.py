@@ -23,7 +23,7 @@ from sagline.kernels.jit import formula, kernel
 
 
 class ShallowSlopes(NamedTuple):
-    """How tau of a shallow cable follows x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
+    """Derivatives of tau of a shallow cable by x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
 
     by_x: float
     by_z: float
@@ -34,7 +34,7 @@ class ShallowSlopes(NamedTuple):
 
 @formula
 def force_of(rows: Array, i: int) -> Force:
-    """What acts on the platform end of one cable of a pose."""
+    """Force on the platform end of one cable of a pose."""
     return Force(rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], rows[t.TENSION, i])
 
 
@@ -106,7 +106,7 @@ def elastic_stiffness(span: float, rise: float, length: float, tension: float, s
 def shallow_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> ShallowSlopes:
-    """How tau of a shallow cable follows its chord and its own data.
+    """Derivatives of tau of a shallow cable by its chord and its own data.
 
     From L (1 + s/EA) = D (1 + S/tau^2), S = k (rho x_B)^2, s = |T| (empirical) or tau (parabolic).
     """

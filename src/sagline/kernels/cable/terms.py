@@ -38,7 +38,7 @@ def model_of(terms: Terms) -> Model:
 
 
 class Material(NamedTuple):
-    """What a cable is made of.
+    """Material of a cable.
 
     Attributes:
         density: Mass per length [kg/m].
@@ -64,7 +64,7 @@ class Chord(NamedTuple):
 
 
 class Force(NamedTuple):
-    """What acts on a cable at its platform end.
+    """Force on a cable at its platform end.
 
     Attributes:
         horizontal: T_x [N].

@@ -1,1 +1,1 @@
-"""What readings say of a robot, pose by pose; docs/model.md, section 14."""
+"""Residuals and derivatives of readings, pose by pose; docs/model.md, section 14."""

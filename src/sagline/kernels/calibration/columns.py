@@ -1,4 +1,4 @@
-"""What every unknown does to the readings of one pose: by the platform's motion, and directly."""
+"""Derivatives of the readings of one pose by every unknown: through the platform's motion, and directly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the platform moves by a wrench on it, and what that does to the readings of one pose."""
+"""Motion of the platform by a wrench on it, and its effect on the readings of one pose."""
 
 from __future__ import annotations
 

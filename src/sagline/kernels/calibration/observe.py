@@ -1,4 +1,4 @@
-"""What readings at equilibria say of a robot's numbers: residuals and slopes, whitened; docs/model.md, section 14.
+"""Whitened residuals and derivatives of readings at equilibria; docs/model.md, section 14.
 
 The true lengths at every pose are unknowns too. They are eliminated pose by pose: the residual counts what the lengths
 that were read do to it as noise, of covariance diag(sigma^2) + sigma_L^2 A A^T.
@@ -88,7 +88,7 @@ def observe(
     room: tuple[Array, Indices],
     found: ObservedArrays,
 ) -> None:
-    """What the readings at N equilibria say; NaN where the platform has no stable one.
+    """Residuals and derivatives at N equilibria; NaN where the platform has no stable one.
 
     Args:
         model: Cable model, the exact or the weightless one, as of `forward_poses`.

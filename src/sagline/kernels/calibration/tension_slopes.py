@@ -1,4 +1,4 @@
-"""How the tension at a cable's frame end follows the force on its platform end, and its own data."""
+"""Derivatives of the tension at a cable's frame end by the force on its platform end and by its own data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the calibration kernels pass to each other: sensors, readings, what is looked for, and memory to work in."""
+"""Records of the calibration kernels: sensors, readings, unknowns and work arrays."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Sensing(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What was read at N poses, or nothing: then a residual is zero; NaN where a sensor was silent.
+    """Readings at N poses; without readings a residual is zero; NaN where a sensor gave none.
 
     Attributes:
         lengths: That the winches say [m], (N, m).
@@ -72,7 +72,7 @@ class Sought(NamedTuple):
 
 
 class Observed(NamedTuple):
-    """What is filled; rows of a pose are its load cells, three of its position and three of its rotation.
+    """Output arrays; rows of a pose are its load cells, three of its position and three of its rotation.
 
     R is m + 6, or m where no system measures positions or rotations.
 
@@ -95,7 +95,7 @@ class Observed(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """What the P numbers change at one pose.
+    """Derivatives by the P numbers at one pose.
 
     Attributes:
         work: Of the readings, first with the platform held, (R, P).

@@ -1,4 +1,4 @@
-"""What cables without mass bring to the platform beside their pull, and to their frame ends and drums."""
+"""Loads of massless cables on the platform beside their tension, and on frame ends and drums."""
 
 from __future__ import annotations
 

@@ -194,7 +194,7 @@ def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
 
 @kernel
 def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """What the winch loses by letting out a length [N]: H = T + T^2/(2 EA) - w z, less what enters moves.
+    """Energy that the winch loses per unwound length [N]: H = T + T^2/(2 EA) - w z, less kinetic energy.
 
     The energies of `kinetic` and `potential` change by -H times the rate.
     """

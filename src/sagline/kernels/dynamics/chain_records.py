@@ -1,4 +1,4 @@
-"""What is written down of a platform on chains, and how they are divided anew."""
+"""Records of a platform on chains, and the new division of the chains."""
 
 from __future__ import annotations
 

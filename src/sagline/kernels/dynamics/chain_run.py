@@ -43,7 +43,7 @@ class Chains(NamedTuple):
 
 
 class ChainRun(NamedTuple):
-    """What a run works on; arrays as in `chains.run_chains`."""
+    """State and arrays of a run, as in `chains.run_chains`."""
 
     chains: Chains
     step: float
@@ -71,7 +71,7 @@ class ChainRun(NamedTuple):
 def run_of(
     rules: Rules, numbers: Numbers, body: Body, data: Array, courses: Courses, kept: Kept, chain_arrays: ChainArrays
 ) -> ChainRun:
-    """What a run works on, from what `chains.run_chains` is given."""
+    """State and arrays of a run from the arguments of `chains.run_chains`."""
     kind, remembered, _stride = rules
     step, gravity, _filtering = numbers
     state, rows, now, layers, audit, at, room = kept

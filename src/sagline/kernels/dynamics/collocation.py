@@ -165,7 +165,7 @@ def cable_at(
 def dynamic_stiffnesses(
     strings: Array, waves: Numbers, phase: float, room: Numbers, found: Numbers, counts: Indices
 ) -> None:
-    """What N rows of m strings add to their stiffness at rest when they vibrate.
+    """Dynamic part of the stiffness of N rows of m strings.
 
     Args:
         strings: (N, m, STRING_COLUMNS).

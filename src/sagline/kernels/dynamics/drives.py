@@ -1,4 +1,4 @@
-"""What turns the drums: a winch that keeps its set points, one that lags behind them, or motor, loops and friction.
+"""Drives: a winch that keeps its set points, one that lags behind them, or motor, loops and friction.
 
 Lengths s count along the path of winding, outward; docs/model.md, sections 10 and 11.
 """

@@ -27,7 +27,7 @@ Records = tuple[Array, Array, Array, Array, Array]  # states, tensions, lengths,
 
 
 class MasslessRun(NamedTuple):
-    """What a run works on; arrays as in `motion.run`."""
+    """State and arrays of a run, as in `motion.run`."""
 
     model: Model
     work: int
@@ -63,7 +63,7 @@ class MasslessRun(NamedTuple):
 def run_of(
     model: ModelTerms, rules: Rules, numbers: Numbers, robot: Robot, data: Array, courses: Courses, kept: Kept
 ) -> MasslessRun:
-    """What a run works on, from what `motion.run` is given."""
+    """State and arrays of a run from the arguments of `motion.run`."""
     _integrator, kind, remembered, work, _stride = rules
     step, loss_time, air, _filtering = numbers
     state, rows, now, layers, audit, at, room = kept

@@ -1,4 +1,4 @@
-"""What comes before and after the steps of a controller's period: the next set points, and what sensors read."""
+"""Tasks before and after the steps of a controller's period: set points and sensor readings."""
 
 from __future__ import annotations
 

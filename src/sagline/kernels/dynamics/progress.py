@@ -1,4 +1,4 @@
-"""How runs in time are counted, and what is told of them: columns of records, and notes of what begins by itself."""
+"""Counters of runs in time: columns of records, and notes of events that begin by themselves."""
 
 from __future__ import annotations
 
@@ -52,5 +52,5 @@ def note(drives: Drives, rows: Array, cables: Array, at: Indices, now: float, we
 
 @glue
 def has_room(at: Indices, notes: Array, cables: int) -> bool:
-    """Whether all that may begin in a step can be noted."""
+    """True if all events that may begin in a step can be noted."""
     return at[NOTES] + 2 * cables <= notes.shape[0]

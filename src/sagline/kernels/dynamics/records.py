@@ -1,4 +1,4 @@
-"""What is written down of a platform on cables without mass."""
+"""Records of a platform on massless cables."""
 
 from __future__ import annotations
 

@@ -92,7 +92,7 @@ def longest(string: String, start: float, end: float, omega: float, phase: float
 
 @formula
 def ended(string: String, s: float) -> bool:
-    """Whether a sum of elements' lengths is the cable's, but for rounding."""
+    """True if the sum of the elements' lengths equals the cable's but for rounding."""
     return s >= string.length * (1.0 - 1e-12)
 
 

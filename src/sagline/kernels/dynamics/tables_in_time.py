@@ -1,4 +1,4 @@
-"""What is given in time: rows of numbers at instants, and cubics between them."""
+"""Time tables: rows of numbers at instants, and cubics between them."""
 
 from __future__ import annotations
 
@@ -59,5 +59,5 @@ def follow(course: Course, at: int, now: float, shift: float, value: Array, rate
 
 @glue
 def ends(course: Course, at: int, moment: float) -> bool:
-    """Whether the interval that is known ends by a moment, and another follows."""
+    """True if the current interval ends by a moment and another follows."""
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]

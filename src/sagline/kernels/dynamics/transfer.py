@@ -35,7 +35,7 @@ NODES, WEIGHTS, INTEGRALS = (locked(values) for values in _gauss())  # kernels t
 
 
 class Wave(NamedTuple):
-    """What the two equations know of a frequency: mu, and the factors of C across and along the cable."""
+    """Terms of the two wave equations at a frequency: mu, and the factors of C across and along the cable."""
 
     mu: Any
     across: Any

@@ -1,4 +1,4 @@
-"""What lies on a drum that remembers at which tension it was wound: cable in bins, each at one strain."""
+"""Cable on a drum with its winding tension: bins of cable, each at one strain."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def descend(problem: Problem, pose: Array, space: Space, known: float) -> tuple[
 
 @glue
 def promised_gain(matrix: Array, gradient: Array, step: Array) -> float:
-    """What the quadratic model of the energy loses along a step."""
+    """Decrease of the quadratic model of the energy along a step."""
     gain = 0.0
     for j in range(step.shape[0]):
         gain -= gradient[j] * step[j]

@@ -63,7 +63,7 @@ PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # ways to the equilibrium, the later
 
 @glue
 def stability(low: float, high: float) -> int:
-    """What the extreme stiffnesses say of an equilibrium."""
+    """Stability of an equilibrium from its extreme stiffnesses."""
     if low < -FLAT * high:
         return FORWARD_UNSTABLE
     return FORWARD_SOLVED if low > FLAT * high else FORWARD_SINGULAR
@@ -71,7 +71,7 @@ def stability(low: float, high: float) -> int:
 
 @glue
 def hold(model: Model, cables: Array, rows: Array, needed: int) -> int:
-    """How the cables hold a stable platform; needed: how many must pull."""
+    """Way in which the cables hold a stable platform; needed: number of taut cables required."""
     taut = 0
     strain = 0.0
     for i in range(cables.shape[0]):

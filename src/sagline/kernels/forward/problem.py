@@ -1,4 +1,4 @@
-"""What the forward kernels pass to each other: a batch given and found, one pose to find, and memory to work in."""
+"""Records of the forward kernels: a batch and its results, one pose to find, and work arrays."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Given(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What is filled of a batch.
+    """Output arrays of a batch.
 
     Attributes:
         poses: Pose rows (N, POSE_COLUMNS).
@@ -67,7 +67,7 @@ class Found(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """What a chain of samples remembers of its last equilibrium, from one call to the next; NaN: nothing.
+    """Last equilibrium of a sequence of samples, kept from one call to the next; NaN: none.
 
     Attributes:
         rows: Of the cables, (CABLE_ROWS, m).
@@ -148,7 +148,7 @@ class Motions(NamedTuple):
 
 @glue
 def new_motions(memory: Memory, n: int) -> tuple[Motions, Memory]:
-    """Room for n free motions, and the memory that is left."""
+    """Work arrays for n free motions, and the memory that is left."""
     rows, at = block(memory.numbers, 0, 2 * n, 6)
     poses, at = block(memory.numbers, at, 2, tables.POSE_COLUMNS)
     return Motions(rows[:n], rows[n:], poses[0], poses[1]), Memory(memory.numbers[at:], memory.counters)

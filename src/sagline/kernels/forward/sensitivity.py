@@ -1,4 +1,4 @@
-"""What a platform in equilibrium feels when it moves, and when its cables' data change."""
+"""Stiffness of a platform in equilibrium, and its sensitivity to its cables' data."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def describe_states(
     slopes: Array,
     levers: Array,
 ) -> None:
-    """What N samples feel; NaN without lengths and for straight cables.
+    """Stiffness and sensitivities of N samples; NaN without lengths and for straight cables.
 
     Args:
         model: Cable model and the empirical one's constants; whether anything may be behind the cables, or None.

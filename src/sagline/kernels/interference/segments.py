@@ -56,7 +56,7 @@ def in_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float, flo
 
 @kernel
 def outside(coordinate: float, half: float) -> float:
-    """How far a coordinate lies beyond a box's faces, with its sign; 0 between them."""
+    """Signed distance of a coordinate beyond a box's faces; 0 between them."""
     return coordinate - min(max(coordinate, -half), half)
 
 

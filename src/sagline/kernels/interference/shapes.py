@@ -1,4 +1,4 @@
-"""What distances are measured between: hanging cables, straight rods and boxes, each a row of numbers in the world.
+"""Shapes between which distances are measured: catenaries, straight rods and boxes, each a row of numbers in the world.
 
 A rod is a cable without weight; a capsule is a rod with a radius, a sphere one without length.
 """
@@ -69,7 +69,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
 
 @kernel
 def turn(row: Array) -> float:
-    """Where a hanging cable runs level, as a share of its length, which may lie beyond its ends; outside for others."""
+    """Position of the level tangent of a catenary as a fraction of its length, possibly beyond its ends."""
     if row[KIND] != HANGING:
         return -1.0
     return 1.0 - row[VERTICAL] / (row[WEIGHT] * row[LENGTH])
@@ -77,7 +77,7 @@ def turn(row: Array) -> float:
 
 @kernel
 def bulge(row: Array, first: float, last: float, chord2: float) -> float:
-    """How far at most a piece's points lie from its chord [m], whose square is given.
+    """Largest distance of a piece's points from its chord [m]; the square of the chord is given.
 
     The lesser of |r''| (s1 - s0)^2/8 with the least tension on the piece, and of what a cable of the piece's length
     leaves between its ends, which holds for folds too.

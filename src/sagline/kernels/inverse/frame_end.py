@@ -1,20 +1,20 @@
-"""Sharing in the tension at the frame end, which is no linear function: linearized where the last round left it."""
+"""Distribution in the tension at the frame end, linearized at the tensions of the last iteration."""
 
 from __future__ import annotations
 
 from sagline.kernels.balance.setting import Balance, factor_balance, scale_limits
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
-from sagline.kernels.cable.hanging import frame_end_tension
+from sagline.kernels.cable.states import frame_end_tension
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import kernel
-from sagline.kernels.sharing.nearest import Sharing
+from sagline.kernels.tension.nearest import Distribution
 
-STILL = 1e-9  # relative change of tension at which a sharing in frame-end tensions stands still
+STILL = 1e-9  # relative change of tension at which a distribution in frame-end tensions stands still
 SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
 
 
 @kernel
-def linearize_ends(model: Model, sharing: Sharing, cables: Cables, balance: Balance) -> bool:
+def linearize_ends(model: Model, distribution: Distribution, cables: Cables, balance: Balance) -> bool:
     """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
     for i in range(cables.tau.size):
         tau = cables.tau[i]
@@ -23,6 +23,6 @@ def linearize_ends(model: Model, sharing: Sharing, cables: Cables, balance: Bala
         below = frame_end_tension(model, chord, material, pulley, tau * (1.0 - SLOPE_STEP))
         slope = (above - below) / (2.0 * SLOPE_STEP * tau)
         balance.offset[i] = frame_end_tension(model, chord, material, pulley, tau) - slope * tau
-        balance.scale[i] = slope * sharing.weight[i]
+        balance.scale[i] = slope * distribution.weight[i]
         scale_limits(cables, balance, i)
     return factor_balance(balance)

@@ -18,17 +18,17 @@ from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
-from sagline.kernels.inverse.rounds import remember, share_and_hang
+from sagline.kernels.inverse.iterations import distribute_and_solve_cables, remember
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
-from sagline.kernels.sharing.nearest import Sharing, new_nearness
-from sagline.kernels.sharing.room import new_room
+from sagline.kernels.tension.nearest import Distribution, new_nearness
+from sagline.kernels.tension.work_arrays import new_work_arrays
 
 FORCE, MOMENT = 0, 1  # columns of the residuals
 
 # as they come from Python, which passes plain tuples fastest
 ModelTerms = tuple[int, float, float]  # code, k_h, k_p
-SharingTerms = tuple[int, float, int, Array, Array]  # Sharing
+DistributionTerms = tuple[int, float, int, Array, Array]  # Distribution
 LimitTerms = tuple[int, float]  # Limits
 Robots = tuple[Array, Array, Array]  # freedom, bodies, robots
 Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residuals, needed, pose_statuses
@@ -37,7 +37,7 @@ Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residua
 @entry
 def inverse_poses(
     model_terms: ModelTerms,
-    sharing_terms: SharingTerms,
+    distribution_terms: DistributionTerms,
     limit_terms: LimitTerms,
     robot_terms: Robots,
     poses: Array,
@@ -53,16 +53,16 @@ def inverse_poses(
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
-        sharing_terms: How the load is shared: `Sharing`.
+        distribution_terms: Tension distribution: `Distribution`.
         limit_terms: What tensions must keep: `Limits`.
         robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or N,
             BODY_COLUMNS); cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial, about the center of mass, (1 or N, 6).
-        previous: Tensions in the sharing's variable (m,) to stay close to, NaN for the minimum norm; with CLOSEST the
-            last feasible ones on return.
+        previous: Tensions in the distribution's variable (m,) to stay close to, NaN for the minimum norm; with
+            CLOSEST the last feasible ones on return.
         room: `memory_for` as many cables.
-        otherwise: None for the ways of sharing nearest to a reference, in chord or horizontal tensions: all others are
+        otherwise: None for the methods that project onto a reference, in chord or horizontal tensions: all others are
             then left out of the machine code. True for any.
         answers: Filled: span and rise of the free spans, length of all cable off the drum, T_x, T_z, tau, and where
             anything is behind a cable the rows of what is, (RESULT_ROWS, N, m); status of each cable, (N, m);
@@ -71,7 +71,7 @@ def inverse_poses(
         first: Pose to begin with.
         last: Pose to end before.
     """
-    sharing = Sharing(*sharing_terms)
+    distribution = Distribution(*distribution_terms)
     limits = Limits(*limit_terms)
     freedom, bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
@@ -81,7 +81,7 @@ def inverse_poses(
     cables, rest = new_cables(Memory(*room), m, machine)
     balance, rest = new_balance(rest, m, n)
     near, rest = new_nearness(rest, previous, m - n)
-    others = None if otherwise is None else new_room(sharing.method, rest, m, m - n)
+    others = None if otherwise is None else new_work_arrays(distribution.method, rest, m, m - n)
     for p in range(first, last):
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
@@ -89,13 +89,15 @@ def inverse_poses(
         model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
         for i in range(m):
             statuses[p, i] = CABLE_SOLVED
-        status = set_pose(model, limits, sharing.variable, sharing.weight, platform, cables, balance)
+        status = set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
         if status == POSE_SOLVED:
-            status = share_and_hang(model, sharing, platform, cables, balance, near, others, statuses[p])
+            status = distribute_and_solve_cables(
+                model, distribution, platform, cables, balance, near, others, statuses[p]
+            )
         if status == POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
-            if sharing.method == CLOSEST:
-                remember(model, sharing, cables, others, near)
+            if distribution.method == CLOSEST:
+                remember(model, distribution, cables, others, near)
         else:
             residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
         for k in range(n):

@@ -6,7 +6,7 @@ import math
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.strips import STRIP_ROWS
+from sagline.kernels.algebra.bounds import STRIP_ROWS
 from sagline.kernels.balance.freedom import translations_of
 from sagline.kernels.balance.setting import (
     Limits,
@@ -21,19 +21,19 @@ from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CHORD_TENSION, FRAME_END_TENSION, POSE_NO_CHORD
 from sagline.kernels.inverse.frame_end import linearize_ends
-from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, SharingTerms
+from sagline.kernels.inverse.poses import DistributionTerms, LimitTerms, ModelTerms, Robots
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.sharing.margin import capacity_margin
-from sagline.kernels.sharing.nearest import Sharing
-from sagline.kernels.sharing.on_polygon import feasible_interval
-from sagline.kernels.sharing.polygon import feasible_polygon
+from sagline.kernels.tension.margin import capacity_margin
+from sagline.kernels.tension.nearest import Distribution
+from sagline.kernels.tension.on_polygon import feasible_interval
+from sagline.kernels.tension.polygon import feasible_polygon
 
 
 @entry
 def polygon_of_pose(
     model_terms: ModelTerms,
-    sharing_terms: SharingTerms,
+    distribution_terms: DistributionTerms,
     limit_terms: LimitTerms,
     robot_terms: Robots,
     pose: Array,
@@ -46,7 +46,7 @@ def polygon_of_pose(
 
     Args:
         model_terms: As in `inverse_poses`.
-        sharing_terms: As in `inverse_poses`; its variable counts.
+        distribution_terms: As in `inverse_poses`; its variable counts.
         limit_terms: As in `inverse_poses`.
         robot_terms: As in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
@@ -57,37 +57,37 @@ def polygon_of_pose(
             (r, m); for r = 2 corners and labels as `feasible_polygon`; for r = 1 corners[0, 0] and corners[1, 0] are
             the ends of the interval (infinite where it has none); for r = 0 nothing more.
     """
-    sharing = Sharing(*sharing_terms)
+    distribution = Distribution(*distribution_terms)
     freedom, bodies, robots = robot_terms
     tensions, pulls = carried
-    scale, offset, strips, null, corners, labels = polygon
+    scale, offset, bounds, null, corners, labels = polygon
     r, m = null.shape
     cables, rest = new_cables(Memory(*room), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, freedom.shape[0])
     platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
     model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY], None)
-    set_pose(model, Limits(*limit_terms), sharing.variable, sharing.weight, platform, cables, balance)
+    set_pose(model, Limits(*limit_terms), distribution.variable, distribution.weight, platform, cables, balance)
     if not math.isnan(tensions[0]):
         for i in range(m):
             cables.tau[i] = tensions[i]
             cables.pull[i] = pulls[i]
-        if sharing.variable == FRAME_END_TENSION:
-            linearize_ends(model, sharing, cables, balance)
+        if distribution.variable == FRAME_END_TENSION:
+            linearize_ends(model, distribution, cables, balance)
     need(platform, cables, balance)
     start_from_minimum_norm(balance)
     for i in range(m):
         scale[i] = balance.scale[i]
         offset[i] = balance.offset[i]
         for row in range(STRIP_ROWS):
-            strips[row, i] = balance.strips[row, i]
+            bounds[row, i] = balance.bounds[row, i]
         for k in range(r):
             null[k, i] = balance.null[k, i]
     count = 1
     if r == 1:
-        corners[0, 0], corners[1, 0] = feasible_interval(strips, null)
+        corners[0, 0], corners[1, 0] = feasible_interval(bounds, null)
         count = 2
     elif r == 2:
-        count = feasible_polygon(strips, null, corners, labels)
+        count = feasible_polygon(bounds, null, corners, labels)
     return count
 
 

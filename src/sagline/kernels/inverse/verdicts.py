@@ -1,4 +1,4 @@
-"""Whether poses that were left open have an answer on the cables' exact curves; the proof and the shortfall if not."""
+"""Feasibility of open poses on the cables' exact curves, with proof and shortfall if infeasible."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from sagline.core.arrays import Array, Codes, Flags, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.strips import START
+from sagline.kernels.algebra.bounds import START
 from sagline.kernels.balance.freedom import translations_of
 from sagline.kernels.balance.setting import (
     Balance,
@@ -21,7 +21,7 @@ from sagline.kernels.balance.wrench import along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.pulley import robots_have_machine
-from sagline.kernels.cable.pulls import new_curves, pulls_at
+from sagline.kernels.cable.sag_forces import new_curves, sag_forces_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     CABLE_NOT_CONVERGED,
@@ -35,12 +35,12 @@ from sagline.kernels.codes import (
     POSE_SOLVED,
     POSE_TOO_SLACK,
 )
+from sagline.kernels.inverse.iterations import limits_admit_tensions
 from sagline.kernels.inverse.poses import Answers, LimitTerms, ModelTerms, Robots, measure_balance, write
-from sagline.kernels.inverse.rounds import limits_leave_room
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.sharing.bracket import along, decide
-from sagline.kernels.sharing.least_change import Change, Demand, length_of
+from sagline.kernels.tension.bracket import along, decide
+from sagline.kernels.tension.least_change import Change, Demand, length_of
 
 SUPPORT = 1e-9  # of the largest component along the proof: cables that count less do not stand against the wrench
 AT_LIMIT = 1e-9  # of a limit: what is this near stands at it
@@ -60,7 +60,7 @@ def decide_poses(
     answers: Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
-    """Decide those of N poses that the rounds of sharing called infeasible, in chord tensions.
+    """Decide those of N poses that the distribution iterations called infeasible, in chord tensions.
 
     Those that are feasible after all get the tensions that were found.
 
@@ -71,7 +71,7 @@ def decide_poses(
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial, about the center of mass, (1 or N, 6).
         which: Which poses, (K,).
-        covers: Whether the way of sharing covers all that is feasible; what it does not is POSE_NOT_COVERED.
+        covers: True if the method finds every feasible distribution; where it does not: POSE_NOT_COVERED.
         memory: `memory_for` as many cables.
         answers: As in `inverse_poses`; filled anew for these poses.
         verdicts: Filled for these poses: what is proved and what suffices of the smallest change of the force [N],
@@ -99,7 +99,7 @@ def decide_poses(
         platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
         model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
         set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance)
-        if not limits_leave_room(cables):
+        if not limits_admit_tensions(cables):
             brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
             for i in range(m):
                 blocking[p, i] = not cables.low[i] <= cables.high[i]
@@ -107,13 +107,13 @@ def decide_poses(
         need(platform, cables, balance)
         start_from_minimum_norm(balance)
         for i in range(m):
-            change.tau[i] = balance.strips[START, i]
+            change.tau[i] = balance.bounds[START, i]
         demand, lever = demand_of(
             platform, cables, balance, Demand(rows[:n], rows[n : 2 * n], vectors[2], translations, 0.0)
         )
         curves, left = new_curves(model, cables, statuses[p], rest)
         status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide(curves, demand, change, left)
-        pulls_at(curves, change.tau, change.pull)
+        sag_forces_at(curves, change.tau, change.pull)
         if status == POSE_SOLVED:
             status = status_of(statuses[p])
         if status == POSE_SOLVED and not covers:

@@ -1,4 +1,4 @@
-"""What the cables of one pose can do: their chord tensions, and between which pulls T_z - tau sin phi they hang."""
+"""Bands of the cables of one pose: their chord tensions, and bounds of their sag forces T_z - tau sin phi."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels.cable.cables import Cables
-from sagline.kernels.cable.pulls import LOOSEST, Curves, Section, pull_range, pulls_at
-from sagline.kernels.cable.turns import find_turns
+from sagline.kernels.cable.sag_force_extrema import find_extrema
+from sagline.kernels.cable.sag_forces import LOOSEST, Curves, Section, sag_force_range, sag_forces_at
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory
@@ -49,19 +49,19 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
             pull = cables.pull[i]  # of first order, and the same at every tension
             bands[PULL_LOW, i] = bands[PULL_HIGH, i] = bands[LEAST, i] = bands[MOST, i] = pull
         return True
-    pulls_at(curves, bands[LOW], bands[PULL_LOW])
-    pulls_at(curves, bands[TAUT], bands[PULL_HIGH])
+    sag_forces_at(curves, bands[LOW], bands[PULL_LOW])
+    sag_forces_at(curves, bands[TAUT], bands[PULL_HIGH])
     hang = True
     sought = False
     for i in range(m):
         bands[LEAST, i], bands[MOST, i] = range_between_ends(cables, i, bands)
         sought = sought or not bands[LEAST, i] <= bands[MOST, i]
     if sought:
-        find_turns(curves, bands[LOW], bands[TAUT], memory)
+        find_extrema(curves, bands[LOW], bands[TAUT], memory)
         for i in range(m):
             if not bands[LEAST, i] <= bands[MOST, i]:
                 section = Section(bands[LOW, i], bands[TAUT, i], bands[PULL_LOW, i], bands[PULL_HIGH, i])
-                bands[LEAST, i], bands[MOST, i] = pull_range(curves, i, section)
+                bands[LEAST, i], bands[MOST, i] = sag_force_range(curves, i, section)
             hang = hang and bands[LEAST, i] <= bands[MOST, i]
     return hang
 

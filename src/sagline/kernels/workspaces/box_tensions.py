@@ -8,12 +8,12 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.pulls import LOOSEST, Curves, pulls_at
+from sagline.kernels.cable.sag_forces import LOOSEST, Curves, sag_forces_at
 from sagline.kernels.codes import CATENARY, LIMITS_OF_CHORD
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.workspaces.centered import FARTHEST, Centered, find_center, leave
 from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place
-from sagline.kernels.workspaces.pull_bounds import most_pull, pull_slope, sags
+from sagline.kernels.workspaces.sag_force_bounds import most_pull, pull_slope, sags
 
 SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
 SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the pull
@@ -150,7 +150,7 @@ def weigh(curves: Curves, place: Place, center: Array, load: Array, centered: Ce
         ranges: Its pulls are filled.
     """
     n, m = place.matrix.shape
-    pulls_at(curves, centered.tau, ranges.pull)
+    sag_forces_at(curves, centered.tau, ranges.pull)
     z = center[tables.MASS] * center[tables.GRAVITY] - load[2]
     x, y = -load[3], -load[4]
     for i in range(m):

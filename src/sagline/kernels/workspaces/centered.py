@@ -53,7 +53,7 @@ class Centered(NamedTuple):
 
 @glue
 def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
-    """Room for m cables and n rows, and the memory that is left; the tensions are not known yet."""
+    """Work arrays for m cables and n rows, and the memory that is left; the tensions are not known yet."""
     wide, at = block(memory.numbers, 0, 6, m)
     thin, at = block(memory.numbers, at, 3 + n, n)
     centered = Centered(wide[0], wide[1], wide[2], wide[3], wide[4], wide[5], thin[0], thin[1], thin[3:], thin[2])

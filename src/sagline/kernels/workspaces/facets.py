@@ -36,7 +36,7 @@ MEMBERS: Final = np.array([([i for i in range(6) if bits >> i & 1] + [0] * 6)[:6
 
 
 class Facets(NamedTuple):
-    """Where the walk over the facets is.
+    """State of the walk over the facets.
 
     Attributes:
         table: A row for each column of the basis: along the m columns, in world axes, and the sum of the absolute
@@ -56,7 +56,7 @@ class Facets(NamedTuple):
 
 @glue
 def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
-    """Room for n free motions and m cables, and the memory that is left."""
+    """Work arrays for n free motions and m cables, and the memory that is left."""
     table, at = block(memory.numbers, 0, n, m + 7)
     others, at = block(memory.numbers, at, m - n, n)
     minors, at = block(memory.numbers, at, n, 1 << n)

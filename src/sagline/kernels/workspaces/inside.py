@@ -1,18 +1,18 @@
-"""Whether a policy of tensions keeps the limits all over a box of poses: then a robot can work there."""
+"""Proof that a tension policy keeps the limits all over a box of poses: the robot can work there."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
-from sagline.kernels.cable.pulls import Curves
+from sagline.kernels.cable.sag_forces import Curves
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.box_tensions import Ranges, lift, spread_of_slopes
 from sagline.kernels.workspaces.centered import Centered, factor_normal
 from sagline.kernels.workspaces.loads import Loads, dot6, reach
 from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place, most_of_linear, norm3
-from sagline.kernels.workspaces.pull_bounds import fall_rate, pull_slope, rise_rate
+from sagline.kernels.workspaces.sag_force_bounds import fall_rate, pull_slope, rise_rate
 
 POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which nothing is proved: the place is all but singular
 HEADROOM = 1.2  # a box of tensions is tried that much larger than a first estimate
@@ -20,7 +20,7 @@ ROUNDS = 3  # of that estimate
 
 
 class Precision(NamedTuple):
-    """What the proofs allow for; both are there for tests that switch them off.
+    """Allowances of the proofs; tests switch them off.
 
     Attributes:
         bends: How much of what the slopes leave out is counted: 1.
@@ -36,7 +36,7 @@ def is_inside(
     place: Place, box: Box, curves: Curves, loads: Loads, centered: Centered, ranges: Ranges, precision: Precision,
     memory: Memory,
 ) -> bool:  # fmt: skip
-    """Whether the policy tau + J^+ z, z what the box and the loads ask for, stays within the limits all over a box.
+    """True if the policy tau + J^+ z stays within the limits all over a box; z is the demand of box and loads.
 
     Also fills centered.give with what the set of wrenches alone changes of each tension [N].
     """

@@ -1,4 +1,4 @@
-"""How far a set of wrenches reaches from its center, for proofs; docs/model.md, section 13."""
+"""Extent of a wrench set from its center, for proofs; docs/model.md, section 13."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def along_axis(axes: Array, k: int, against: Array) -> float:
 
 @formula
 def reach_of_ellipsoid(axes: Array, against: Array) -> float:
-    """How far an ellipsoid reaches to either side of its center."""
+    """Extent of an ellipsoid to either side of its center."""
     square = 0.0
     for k in range(6):
         along = along_axis(axes, k, against)

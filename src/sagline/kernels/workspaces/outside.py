@@ -1,4 +1,4 @@
-"""Whether a direction separates what is asked of the cables from all that they give, all over a box of poses."""
+"""Proof that a direction separates the demand from the available wrenches all over a box of poses."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
-from sagline.kernels.cable.pulls import Curves
+from sagline.kernels.cable.sag_forces import Curves
 from sagline.kernels.jit import formula, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.box_tensions import Ranges, lift, spread_of_slopes
@@ -14,7 +14,7 @@ from sagline.kernels.workspaces.centered import Centered, factor_normal
 from sagline.kernels.workspaces.inside import Precision
 from sagline.kernels.workspaces.loads import dot6
 from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place, most_of_linear, norm3
-from sagline.kernels.workspaces.pull_bounds import fall, fall_rate, pull_slope, rise, rise_rate
+from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, pull_slope, rise, rise_rate
 
 BORNE = 0.3  # share of the gap that a free cable may take of it
 PIECES = 4  # of the tensions below a cable's own, each half as long as the one above
@@ -28,7 +28,7 @@ def is_outside(
     place: Place, box: Box, curves: Curves, smoothing: float, centered: Centered, ranges: Ranges, precision: Precision,
     memory: Memory,
 ) -> bool:  # fmt: skip
-    """Whether a direction y, turning with the pose, separates the demand from what the cables give all over a box.
+    """True if a direction y, turning with the pose, separates the demand from the available wrenches all over a box.
 
     It is what the centered tensions leave, and how that turns; a small change of it keeps cables that are free from
     giving more than nothing along it.

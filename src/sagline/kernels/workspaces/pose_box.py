@@ -63,7 +63,7 @@ class Place(NamedTuple):
 
 @glue
 def new_place(memory: Memory, m: int, n: int) -> tuple[Place, Memory]:
-    """Room for m cables and n free motions, and the memory that is left."""
+    """Work arrays for m cables and n free motions, and the memory that is left."""
     numbers = memory.numbers
     rows, at = block(numbers, 0, n, 6)
     wide, at = block(numbers, at, 6 + n + 3 + 5, m)

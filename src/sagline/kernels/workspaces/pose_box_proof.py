@@ -1,4 +1,4 @@
-"""Whether a robot can work at every pose of a box, or at none: proofs of either; docs/model.md, section 13.
+"""Proofs that a robot can work at every pose of a box, or at none; docs/model.md, section 13.
 
 Inside: a policy of tensions that balances every wrench at every pose stays within the limits. Outside: one wrench of
 the set, and a direction that turns with the pose, along which the cables together fall short of it.
@@ -14,7 +14,7 @@ from sagline.kernels.balance.setting import Limits, place_cables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.pulls import new_curves
+from sagline.kernels.cable.sag_forces import new_curves
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots
 from sagline.kernels.jit import entry

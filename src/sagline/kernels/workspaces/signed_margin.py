@@ -1,4 +1,4 @@
-"""How much more load a pose can take than a whole set of loads, and below zero how much too much the set is.
+"""Signed margin of a pose over a whole set of loads; negative: the excess of the set.
 
 docs/model.md, section 13: the least distance of the set to the facets of what the cables can exert, signed. Weight
 makes the pulls of the cables uncertain while their tensions are: with the pulls that hurt the margin is a lower end,
@@ -24,7 +24,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
-from sagline.kernels.cable.pulls import new_curves
+from sagline.kernels.cable.sag_forces import new_curves
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
     MARGIN_FEASIBLE,
@@ -98,7 +98,7 @@ Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 
 
 
 class Count(NamedTuple):
-    """What counts at the facets of one pose.
+    """Weights of the facets of one pose.
 
     Attributes:
         rows: Of the cables, (COUNT_ROWS, m).
@@ -430,7 +430,7 @@ def steepest(counts: Count, direction: Array) -> int:
 
 @glue
 def status_of(margin: Array) -> int:
-    """What a bracket (3,) says."""
+    """Status of a bracket (3,)."""
     if margin[BELOW] >= 0.0:
         return MARGIN_FEASIBLE
     return MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else MARGIN_OPEN

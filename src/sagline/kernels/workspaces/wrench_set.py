@@ -1,4 +1,4 @@
-"""How far a set of loads reaches against a direction: its support function, the sum of those of its parts."""
+"""Support function of a set of loads against a direction: the sum of those of its parts."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class WrenchSet(NamedTuple):
 
 @glue
 def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSet, Memory]:
-    """Room for what differs from pose to pose, and the memory that is left."""
+    """Work arrays for what differs from pose to pose, and the memory that is left."""
     own, at = block(memory.numbers, 0, 9, 6)
     wrenches = WrenchSet(own, terms[2], terms[3], terms[4], terms[5])
     return wrenches, Memory(memory.numbers[at:], memory.counters)

@@ -1,0 +1,203 @@
+"""All cables of one pose at once: ratios and pulls at given chord tensions, and limits as chord tensions."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.core.arrays import Codes
+from sagline.kernels.cable.cables import Cables, chord_of, free_chord_of, material_of, pulley_of
+from sagline.kernels.cable.catenary import (
+    TAUT_STRAIN,
+    is_ordinary,
+    ordinary_length_ratio,
+    ordinary_length_ratio_near,
+    ordinary_sag_force_ratio,
+)
+from sagline.kernels.cable.models import from_tension
+from sagline.kernels.cable.pulley import Pulley, free_rise, free_span
+from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
+from sagline.kernels.jit import glue, kernel
+
+# Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
+# X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that rounds which stand still end in the last digit.
+NEAR = 1e-3
+# passes until a cable leaves its pulley where its force says; a taut one is 1e-4, 4e-8, 1e-11, 0 off
+CONTACTS = 40
+SAME_PULL = 4e-16  # of the tension: a pull that changes by no more stands still
+LIMIT_STEPS = 30
+LIMIT_PRECISION = 1e-13  # relative
+LIMIT_MISS = 1e-6  # relative: more than what the passes for a slack cable's pulley leave
+SECANT = 1e-6  # relative step below which a slope between two steps is rounding
+TAUT = 1.25  # of wD/2: a chord tension above that of the least tension at the frame end
+
+
+@glue
+def leave_pulleys(model: Model, cables: Cables, fresh: bool) -> None:
+    """Fill the free spans and their tensions, from where the forces at the pulleys say that the cables leave them.
+
+    The forces are those of the last length and pull (fresh: of first order) at the present chord tensions. Cables of
+    the shallow models leave along their chord.
+    """
+    exact = model.code == CATENARY
+    for i in range(cables.tau.size):
+        chord, pulley = chord_of(cables, i), pulley_of(cables, i)
+        half_density = 0.5 * cables.density[i] * model.gravity
+        horizontal = cables.tau[i] * chord.cosine
+        hanging = -half_density * chord.length
+        if not fresh:
+            hanging = cables.pull[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
+        vertical_a = cables.tau[i] * chord.sine + hanging
+        inverse = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+        sine = horizontal * inverse if exact else chord.cosine
+        cosine = pulley.entry * (vertical_a * inverse if exact else chord.sine)
+        span, rise = free_span(pulley, chord, cosine), free_rise(pulley, chord, sine)
+        length = math.sqrt(span * span + rise * rise)
+        inverse = 1.0 / length
+        cables.wrap_sine[i] = sine
+        cables.wrap_cosine[i] = cosine
+        cables.free_chord[i] = length
+        cables.free_sine[i] = rise * inverse
+        cables.free_cosine[i] = span * inverse
+        cables.free_tau[i] = horizontal / span * length
+        cables.free_half_weight[i] = half_density * length
+
+
+@glue
+def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> int:
+    """Fill slackness, strain, ratio and pull of all cables, and the statuses (m,), at their chord tensions.
+
+    Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one. Cables leave
+    their pulleys where the lengths and pulls before said.
+
+    Args:
+        model: Cable model.
+        cables: The cables of one pose.
+        fresh: Whether there are no lengths and pulls yet.
+        near: Whether their ratios are the answer at tensions less than NEAR away.
+        statuses: Filled.
+
+    Returns:
+        The gravest status.
+    """
+    m = cables.tau.size
+    if cables.machine:
+        leave_pulleys(model, cables, fresh)
+    for i in range(m):
+        cables.slackness[i] = cables.free_half_weight[i] / cables.free_tau[i]
+    for i in range(m):
+        cables.strain[i] = cables.free_tau[i] / cables.stiffness[i]
+    if model.code == CATENARY:
+        stretched = 0
+        if not near:
+            for i in range(m):
+                cables.ratio[i] = ordinary_length_ratio(
+                    cables.slackness[i], cables.free_sine[i], cables.free_cosine[i], cables.strain[i]
+                )
+            for i in range(m):
+                stretched += 1 if cables.strain[i] > TAUT_STRAIN else 0
+        if near or stretched > 0:
+            for i in range(m):
+                cables.ratio[i] = ordinary_length_ratio_near(
+                    cables.slackness[i], cables.free_sine[i], cables.free_cosine[i], cables.strain[i], cables.ratio[i]
+                )
+        for i in range(m):
+            cables.free_pull[i] = cables.free_tau[i] * ordinary_sag_force_ratio(
+                cables.slackness[i], cables.free_sine[i], cables.strain[i], cables.ratio[i]
+            )
+    gravest = CABLE_SOLVED
+    for i in range(m):
+        statuses[i] = CABLE_SOLVED
+        if model.code != CATENARY or not is_ordinary(cables.slackness[i], cables.strain[i]):
+            free = free_chord_of(cables, i)
+            length, pull, status = from_tension(model, free, material_of(cables, i), cables.free_tau[i])
+            cables.ratio[i] = length / free.length
+            cables.free_pull[i] = pull
+            statuses[i] = status
+            gravest = max(gravest, status)
+    if cables.machine:
+        for i in range(m):
+            vertical = cables.free_tau[i] * cables.free_sine[i] + cables.free_pull[i]
+            cables.pull[i] = vertical - cables.tau[i] * cables.sine[i]
+    return gravest
+
+
+@kernel
+def solve_cable_state(
+    model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float
+) -> tuple[float, float, int]:
+    """Free unstrained length [m], pull T_z - tau sin phi [N] and status of one cable at a chord tension."""
+    length, pull, status = from_tension(model, chord, material, tau)
+    if pulley.radius > 0.0 and model.code == CATENARY:
+        horizontal, weight = tau * chord.cosine, material.density * model.gravity
+        for _ in range(CONTACTS):
+            vertical_a = tau * chord.sine + pull - weight * length
+            tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
+            span = free_span(pulley, chord, pulley.entry * vertical_a / tension)
+            rise = free_rise(pulley, chord, horizontal / tension)
+            line = math.sqrt(span * span + rise * rise)
+            free = Chord(line, rise / line, span / line)
+            length, own, status = from_tension(model, free, material, horizontal / free.cosine)
+            before = pull
+            pull = horizontal / free.cosine * free.sine + own - tau * chord.sine
+            if not abs(pull - before) > SAME_PULL * tau:
+                break
+    return length, pull, status
+
+
+@kernel
+def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> float:
+    """Tension at the frame end of a cable's free span at a chord tension [N]."""
+    if model.code == STRAIGHT or model.code == ELASTIC:
+        return tau
+    length, pull, _status = solve_cable_state(model, chord, material, pulley, tau)
+    return math.hypot(tau * chord.cosine, tau * chord.sine + pull - material.density * model.gravity * length)
+
+
+@kernel
+def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
+    """Chord tension at which the tension at the frame end has a given value, on the taut side.
+
+    What no cable hangs with is answered by the chord tension, if any, at which a parabola's frame-end tension is least.
+    """
+    loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
+    return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
+
+
+@kernel
+def taut_at_frame_end(
+    model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float, otherwise: float
+) -> float:
+    """Chord tension at which the tension at the frame end has a given value, on the taut side.
+
+    A sagging cable's frame-end tension has a least value, up to 3/4 wD cos(phi). It is convex in the chord tension,
+    with a slope of at most 1 + wD/EA: from the taut side steps by secants come down to the root, or to where the slope
+    is none.
+
+    Args:
+        model: Cable model.
+        chord: Chord.
+        material: Material.
+        pulley: What stands behind.
+        tension: At the frame end [N].
+        otherwise: The answer where no cable hangs with so little.
+    """
+    weight = material.density * model.gravity
+    if model.code == STRAIGHT or model.code == ELASTIC or weight == 0.0 or tension == math.inf:
+        return tension
+    half = 0.5 * weight * chord.length
+    along, across = half * chord.sine, half * chord.cosine
+    tau = max(along + math.sqrt(max(tension * tension - across * across, 0.0)), TAUT * half)
+    before, before_value, slope = 0.0, 0.0, 1.0 + 2.0 * half / material.stiffness
+    miss = math.inf
+    for k in range(LIMIT_STEPS):
+        value = frame_end_tension(model, chord, material, pulley, tau)
+        if k > 0 and abs(tau - before) > SECANT * tau:
+            slope = (value - before_value) / (tau - before)
+        if not slope > 0.0:
+            break
+        before, before_value, miss = tau, value, value - tension
+        tau = max(tau - miss / slope, 0.5 * tau)
+        if abs(tau - before) <= LIMIT_PRECISION * tau:
+            break
+    return before if abs(miss) <= LIMIT_MISS * tension else otherwise

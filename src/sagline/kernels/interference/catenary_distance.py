@@ -1,0 +1,304 @@
+"""Least distances of cables as they hang, from each other, from rods and from boxes: certified, by branch and bound.
+
+A piece of a cable lies within its bulge of its chord, so chords tell a lower bound; points of the cables themselves
+tell the upper one, which Newton's method takes to the last digit. Pieces whose lower bound is within the precision of
+it are set aside, the others split: pieces of a cable are shared by all its pairs. docs/model.md, section 13.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sagline.core.arrays import Array, Indices
+from sagline.kernels.interference.nearest import nearest_of_curves, nearest_to_box, square_between
+from sagline.kernels.interference.segments import between_segments, nearest_in_box, to_box
+from sagline.kernels.interference.shapes import AXES, BOX, FIRST, HALF, KIND, LAST, PLACE, RADIUS, bulge, point, turn
+from sagline.kernels.jit import entry, kernel
+
+# Columns of a piece: its chord's ends (six), its bulge, its range as shares, and the first of its two parts (0: whole).
+BULGE = 6
+BEGIN = 7
+END = 8
+PARTS = 9
+PIECE_COLUMNS = 10
+
+PIECES = 8192  # of all cables of a pose
+COUNTER = PIECES - 1  # the row that is none: its last column says how many there are, the others take an edge
+WAITING = 4096  # pairs of pieces
+PAIRS = 100_000  # of pieces that are looked at for one distance: then the lower bound is what it is
+ROUNDING = 1e-13  # of the sizes at hand: what rounding may take off a lower bound
+FAR = 1e300
+
+
+def work_arrays_for_pieces() -> tuple[Array, Array]:
+    """Work arrays for pieces and for the pairs that wait."""
+    return np.empty((PIECES, PIECE_COLUMNS)), np.empty((WAITING, 3))
+
+
+@kernel
+def set_piece(piece: Array, row: Array, first: float, last: float) -> None:
+    """Range and bulge of a piece whose ends are there."""
+    dx, dy, dz = piece[3] - piece[0], piece[4] - piece[1], piece[5] - piece[2]
+    piece[BULGE] = bulge(row, first, last, dx * dx + dy * dy + dz * dz)
+    piece[BEGIN] = first
+    piece[END] = last
+    piece[PARTS] = 0.0
+
+
+@kernel
+def whole_piece(piece: Array, row: Array) -> None:
+    """The piece that is all of a cable that counts."""
+    piece[0], piece[1], piece[2] = point(row, row[FIRST])
+    piece[3], piece[4], piece[5] = point(row, row[LAST])
+    set_piece(piece, row, row[FIRST], row[LAST])
+
+
+@kernel
+def split(pieces: Array, index: int, row: Array) -> None:
+    """Split a piece in the middle, or where the cable turns, which straightens a fold."""
+    count = int(pieces[COUNTER, PARTS])
+    piece, one, other = pieces[index], pieces[count], pieces[count + 1]
+    middle = 0.5 * (piece[BEGIN] + piece[END])
+    width = piece[END] - piece[BEGIN]
+    bottom = turn(row)
+    if piece[BEGIN] + 1e-3 * width < bottom < piece[END] - 1e-3 * width:
+        middle = bottom
+    x, y, z = point(row, middle)
+    for k in range(3):
+        one[k] = piece[k]
+        other[3 + k] = piece[3 + k]
+    one[3], one[4], one[5] = x, y, z
+    other[0], other[1], other[2] = x, y, z
+    set_piece(one, row, piece[BEGIN], middle)
+    set_piece(other, row, middle, piece[END])
+    piece[PARTS] = count
+    pieces[COUNTER, PARTS] = count + 2
+
+
+@kernel
+def chords(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[float, float, float, float]:
+    """Distance of two pieces' chords [m], a lower bound of the pieces' own, and the nearest shares of the cables."""
+    one = pieces[i]
+    if to_a_box:
+        square, low, s = to_box(one, box)
+        return math.sqrt(square), math.sqrt(low) - one[BULGE], one[BEGIN] + s * (one[END] - one[BEGIN]), 0.0
+    other = pieces[j]
+    square, low, s, t = between_segments(one, other)
+    return (
+        math.sqrt(square),
+        math.sqrt(low) - one[BULGE] - other[BULGE],
+        one[BEGIN] + s * (one[END] - one[BEGIN]),
+        other[BEGIN] + t * (other[END] - other[BEGIN]),
+    )
+
+
+@kernel
+def refined(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
+    """Distance where it is least around two points of a pair [m], and these points."""
+    if to_a_box:
+        square, s = nearest_to_box(one, other, s)
+    else:
+        square, s, t = nearest_of_curves(one, other, s, t)
+    return math.sqrt(square), s, t
+
+
+@kernel
+def square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> float:
+    """Squared distance of two points of a pair [m^2]."""
+    if not to_a_box:
+        return square_between(one, other, s, t)
+    x, y, z = point(one, s)
+    bx, by, bz = nearest_in_box(other, x, y, z)
+    return (x - bx) * (x - bx) + (y - by) * (y - by) + (z - bz) * (z - bz)
+
+
+@kernel
+def least_of_pair(
+    one: Array,
+    other: Array,
+    i: int,
+    j: int,
+    precision: float,
+    enough: float,
+    pieces: Array,
+    waiting: Array,
+) -> tuple[float, float, float, float]:
+    """Least distance of a cable from another or a box [m], a proved lower bound, and where.
+
+    What lies farther than `enough` is not looked at closely: the lower bound then is at least `enough` - precision.
+    """
+    to_a_box = other[KIND] == BOX
+    distance, low, s, t = chords(pieces, i, j, other, to_a_box)
+    if math.isnan(distance):
+        return math.nan, math.nan, math.nan, math.nan
+    best, best_s, best_t = distance, s, t
+    if low < enough - precision:
+        best, best_s, best_t = refined(one, other, to_a_box, s, t)
+    else:
+        best = math.sqrt(square_at(one, other, to_a_box, s, t))
+    size = ROUNDING * (abs(pieces[i, 0]) + abs(pieces[i, 1]) + abs(pieces[i, 2]) + best)
+    proved = FAR
+    waiting[0, 0], waiting[0, 1], waiting[0, 2] = i, j, low
+    height, looked = 1, 0
+    while height > 0:
+        height -= 1
+        a, b, low = int(waiting[height, 0]), int(waiting[height, 1]), waiting[height, 2]
+        bulge_a, bulge_b = pieces[a, BULGE], 0.0 if to_a_box else pieces[b, BULGE]
+        count = int(pieces[COUNTER, PARTS])
+        stuck = looked >= PAIRS or count + 2 > COUNTER or height + 2 > WAITING or bulge_a + bulge_b == 0.0
+        if stuck or low >= min(best, enough) - precision:
+            proved = min(proved, low)
+            continue
+        of_one = bulge_a >= bulge_b
+        index = a if of_one else b
+        if pieces[index, PARTS] == 0.0:
+            split(pieces, index, one if of_one else other)
+        first = int(pieces[index, PARTS])
+        for k in range(first, first + 2):
+            new_a, new_b = (k, b) if of_one else (a, k)
+            distance, low, s, t = chords(pieces, new_a, new_b, other, to_a_box)
+            looked += 1
+            if distance < best and square_at(one, other, to_a_box, s, t) < best * best:
+                found, at_s, at_t = refined(one, other, to_a_box, s, t)
+                if found < best:
+                    best, best_s, best_t = found, at_s, at_t
+            if low >= min(best, enough) - precision:
+                proved = min(proved, low)
+            else:
+                waiting[height, 0], waiting[height, 1], waiting[height, 2] = new_a, new_b, low
+                height += 1
+        if height >= 2 and waiting[height - 1, 2] > waiting[height - 2, 2]:  # the nearer one first
+            for k in range(3):
+                waiting[height - 1, k], waiting[height - 2, k] = waiting[height - 2, k], waiting[height - 1, k]
+    return best, max(min(proved, best) - size, 0.0), best_s, best_t
+
+
+@kernel
+def edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
+    """One of the four edges of a box along an axis."""
+    for k in range(3):
+        middle = box[PLACE + k]
+        along = box[AXES + 3 * k + axis] * box[HALF + axis]
+        for side in range(2):
+            other = (axis + 1 + side) % 3
+            sign = 1.0 if (corner >> side) & 1 else -1.0
+            middle += sign * box[AXES + 3 * k + other] * box[HALF + other]
+        edge[k] = middle - along
+        edge[3 + k] = middle + along
+
+
+@kernel
+def edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
+    """Least distance of a box's edges from another box [m], if it is below one that is known; its points if so."""
+    for axis in range(3):
+        for corner in range(4):
+            edge_of(box, axis, corner, edge)
+            square, _, t = to_box(edge, other)
+            if math.sqrt(square) < best:
+                best = math.sqrt(square)
+                for k in range(3):
+                    nearest[0, k] = edge[k] + t * (edge[3 + k] - edge[k])
+                nearest[1, 0], nearest[1, 1], nearest[1, 2] = nearest_in_box(
+                    other, nearest[0, 0], nearest[0, 1], nearest[0, 2]
+                )
+    return best
+
+
+@kernel
+def least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> float:
+    """Least distance of two boxes [m], 0 where they touch: an edge of one is part of it, or lies in the other."""
+    best = edges_to_box(box, other, edge, nearest, FAR)
+    turned = edges_to_box(other, box, edge, nearest, best)
+    if turned < best:
+        for k in range(3):
+            nearest[0, k], nearest[1, k] = nearest[1, k], nearest[0, k]
+    return turned
+
+
+@kernel
+def set_nearest(one: Array, other: Array, s: float, t: float, nearest: Array) -> None:
+    """The nearest points of a pair, from their shares."""
+    x, y, z = point(one, s)
+    nearest[0, 0], nearest[0, 1], nearest[0, 2] = x, y, z
+    if other[KIND] == BOX:
+        nearest[1, 0], nearest[1, 1], nearest[1, 2] = nearest_in_box(other, x, y, z)
+    else:
+        nearest[1, 0], nearest[1, 1], nearest[1, 2] = point(other, t)
+
+
+@entry
+def least_distances(
+    moving: Array,
+    still: Array,
+    pairs: Indices,
+    precision: float,
+    together: bool,
+    pieces: Array,
+    waiting: Array,
+    distance_out: Array,
+    low_out: Array,
+    nearest_out: Array,
+) -> None:
+    """Least distances of pairs at every pose, less their radii, with proved lower bounds and the nearest points.
+
+    Args:
+        moving: What differs from pose to pose, shape (N, K, COLUMNS).
+        still: What does not, shape (S, COLUMNS).
+        pairs: Which, numbered through both, a box behind what is none, shape (P, 2).
+        precision: How far the lower bound may stay below the distance [m].
+        together: Whether the least of all distances of a pose is enough: of the others then only so much is known.
+        pieces: Memory, of `work_arrays_for_pieces`.
+        waiting: Memory.
+        distance_out: [m], shape (N, P).
+        low_out: Proved lower bounds [m], shape (N, P).
+        nearest_out: Nearest points on the center lines or boxes [m], shape (N, P, 2, 3).
+    """
+    poses, several = moving.shape[0], moving.shape[1]
+    count = several + still.shape[0]
+    for k in range(still.shape[0]):
+        if still[k, KIND] != BOX:
+            whole_piece(pieces[several + k], still[k])
+    for n in range(poses):
+        pieces[COUNTER, PARTS] = count
+        for k in range(several):
+            if moving[n, k, KIND] != BOX:
+                whole_piece(pieces[k], moving[n, k])
+        for k in range(still.shape[0]):
+            pieces[several + k, PARTS] = 0.0
+        least = FAR
+        for p in range(pairs.shape[0]):
+            i, j = pairs[p, 0], pairs[p, 1]
+            one = moving[n, i] if i < several else still[i - several]
+            other = moving[n, j] if j < several else still[j - several]
+            radii = one[RADIUS] + other[RADIUS]
+            nearest = nearest_out[n, p]
+            if one[KIND] == BOX:
+                distance = least_of_boxes(one, other, pieces[COUNTER], nearest)
+                distance_out[n, p] = distance - radii
+                low_out[n, p] = distance * (1.0 - ROUNDING) - radii
+            else:
+                enough = least + radii if together else FAR
+                distance, low, s, t = least_of_pair(one, other, i, j, precision, enough, pieces, waiting)
+                distance_out[n, p] = distance - radii
+                low_out[n, p] = low - radii
+                set_nearest(one, other, s, t, nearest)
+            if distance_out[n, p] < least:
+                least = distance_out[n, p]
+
+
+@entry
+def cut(row: Array, ranges: Array, pieces_out: Array) -> None:
+    """Pieces of one cable or rod.
+
+    Args:
+        row: The cable, shape (COLUMNS,).
+        ranges: First and last shares of the pieces, shape (K, 2).
+        pieces_out: Chords and bulges, shape (K, PIECE_COLUMNS).
+    """
+    for k in range(ranges.shape[0]):
+        piece, first, last = pieces_out[k], ranges[k, 0], ranges[k, 1]
+        piece[0], piece[1], piece[2] = point(row, first)
+        piece[3], piece[4], piece[5] = point(row, last)
+        set_piece(piece, row, first, last)

@@ -1,0 +1,153 @@
+"""Iterations of tension distribution and cable states until the sag forces converge; docs/model.md, section 5."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.core.arrays import Codes
+from sagline.kernels.balance.setting import Balance, Platform, need, start_from_minimum_norm
+from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
+from sagline.kernels.cable.states import NEAR, frame_end_tension, solve_cable_states
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.codes import (
+    CABLE_NOT_CONVERGED,
+    CABLE_TOO_SLACK,
+    CATENARY,
+    FRAME_END_TENSION,
+    HORIZONTAL_TENSION,
+    POSE_INFEASIBLE,
+    POSE_NOT_CONVERGED,
+    POSE_SINGULAR,
+    POSE_SOLVED,
+    POSE_TOO_SLACK,
+)
+from sagline.kernels.inverse.frame_end import STILL, linearize_ends
+from sagline.kernels.jit import glue
+from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nearest, refer, share_nearest
+from sagline.kernels.tension.other_methods import distribute_by_other_method
+from sagline.kernels.tension.work_arrays import WorkArrays, reset_work_arrays
+
+ROUNDS = 30
+FREE_ROUNDS = 8  # then a choice that jumps with the last digits of the pulls is held where it is
+SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest tension, have settled
+
+
+@glue
+def distribute_and_solve_cables(
+    model: Model, distribution: Distribution, platform: Platform, cables: Cables, balance: Balance,
+    near: ReferencePoint, room: WorkArrays | None, statuses: Codes,
+) -> int:  # fmt: skip
+    """Share the load and hang the cables until their pulls stand still; returns the pose's status.
+
+    Args:
+        model: Cable model.
+        distribution: Tension distribution.
+        platform: What is given at the pose.
+        cables: Those of `set_pose`; tensions, ratios and pulls are filled.
+        balance: That of `set_pose`.
+        near: Reference of the projection.
+        room: Work arrays for the methods that are not projections, and for frame-end tensions; None leaves them out.
+        statuses: Filled: status of each cable, (m,).
+    """
+    near.held.labels[0] = 0
+    if room is not None:
+        reset_work_arrays(room)
+    refer(distribution, balance.offset, balance.null, near)
+    hung = False
+    need(platform, cables, balance)
+    possible = limits_admit_tensions(cables)
+    status = POSE_NOT_CONVERGED if possible else POSE_INFEASIBLE
+    for k in range(ROUNDS if possible else 0):
+        start_from_minimum_norm(balance)
+        if room is None:
+            status = share_nearest(balance.bounds, balance.null, near, balance.tension)
+        elif is_nearest(distribution) or k >= FREE_ROUNDS:
+            if k >= FREE_ROUNDS and not is_nearest(distribution):
+                stay(balance, near)
+            status = share_nearest(balance.bounds, balance.null, near, balance.tension)
+        else:
+            status = distribute_by_other_method(
+                distribution, balance.bounds, balance.offset, balance.null, near, room, balance.tension
+            )
+        if status != POSE_SOLVED:
+            break
+        moved, largest = take_tensions(cables, balance)
+        gravest = solve_cable_states(model, cables, not hung, hung and moved < NEAR, statuses)
+        if gravest == CABLE_TOO_SLACK or gravest == CABLE_NOT_CONVERGED:
+            status = POSE_TOO_SLACK if gravest == CABLE_TOO_SLACK else POSE_NOT_CONVERGED
+            break
+        status = POSE_NOT_CONVERGED
+        stands = model.code != CATENARY or sag_force_change(cables) <= SETTLED + 1e-15 * largest
+        if room is None or distribution.variable != FRAME_END_TENSION:
+            if stands:
+                status = POSE_SOLVED
+                break
+        else:
+            if stands and hung and moved <= STILL:
+                status = POSE_SOLVED
+                break
+            if not linearize_ends(model, distribution, cables, balance):
+                status = POSE_SINGULAR
+                break
+            refer(distribution, balance.offset, balance.null, near)
+            reset_work_arrays(room)
+        hung = True
+        need(platform, cables, balance)
+    return status
+
+
+@glue
+def limits_admit_tensions(cables: Cables) -> bool:
+    """True if every cable has a tension within its limits; by the article's (54) a level one has none."""
+    for i in range(cables.low.size):
+        if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
+            return False
+    return True
+
+
+@glue
+def stay(balance: Balance, near: ReferencePoint) -> None:
+    """Let the tensions to be near to be those just shared; the bound of a tie, which may be held, is gone."""
+    near.held.labels[0] = 0
+    for k in range(balance.null.shape[0]):
+        near.reference[k] = 0.0
+        for i in range(balance.null.shape[1]):
+            near.reference[k] += balance.null[k, i] * balance.tension[i]
+
+
+@glue
+def take_tensions(cables: Cables, balance: Balance) -> tuple[float, float]:
+    """Give the cables the tensions just shared; returns the largest relative change and the largest tension [N]."""
+    largest = 0.0
+    moved = 0.0
+    for i in range(cables.tau.size):
+        new = balance.tension[i] / balance.scale[i]
+        moved = max(moved, abs(new - cables.tau[i]) / new)
+        largest = max(largest, new)
+        cables.tau[i] = new
+        cables.last_pull[i] = cables.pull[i]
+    return moved, largest
+
+
+@glue
+def sag_force_change(cables: Cables) -> float:
+    """Largest change of a pull in this round [N]."""
+    change = 0.0
+    for i in range(cables.tau.size):
+        change = max(change, abs(cables.pull[i] - cables.last_pull[i]))
+    return change
+
+
+@glue
+def remember(
+    model: Model, distribution: Distribution, cables: Cables, room: WorkArrays | None, near: ReferencePoint
+) -> None:
+    """Keep the tensions, in the variable they were shared in, for the pose that follows."""
+    for i in range(cables.tau.size):
+        near.previous[i] = cables.tau[i]
+        if distribution.variable == HORIZONTAL_TENSION:
+            near.previous[i] = cables.tau[i] * cables.cosine[i]
+        elif room is not None and distribution.variable == FRAME_END_TENSION:
+            near.previous[i] = frame_end_tension(
+                model, chord_of(cables, i), material_of(cables, i), pulley_of(cables, i), cables.tau[i]
+            )

@@ -1,1 +1,0 @@
-"""Which of the tensions that balance the platform."""

@@ -1,0 +1,1 @@
+"""Tension distribution: one of the tensions that balance the platform."""

@@ -1,0 +1,300 @@
+"""Feasibility of a wrench with tensions within their limits, decided on the cables' exact curves.
+
+Feasible is what tensions show that balance it. Infeasible is what a direction proves: along y each cable gives at most
+the largest value of its curve, and where these together fall short of the demand, nothing balances it. Where neither
+is at hand, every direction says of each cable how far from its best it may be, which narrows the ranges of tensions;
+where these stand still, the range of the cable whose pull is least certain is split in two.
+
+The shortfall lies between the gap of the first proof and what the least change leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.core.arrays import Array
+from sagline.kernels.algebra.householder import factorize, orthogonal_factor, pseudo_inverse
+from sagline.kernels.cable.sag_force_extrema import find_extrema
+from sagline.kernels.cable.sag_forces import (
+    LOOSEST,
+    Curves,
+    Section,
+    most_along,
+    sag_force_at,
+    sag_force_range,
+    slopes_at,
+)
+from sagline.kernels.codes import CATENARY, POSE_BORDERLINE, POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.tension.least_change import Change, Demand, least_change, length_of
+
+PLENTY = 1e6  # of the largest force at hand: more than any cable carries that has no limit
+FEASIBLE = 1e-9  # of the largest force at hand: what is left of the balance is taken for none
+CERTAIN = 1e-14  # of the numbers at hand: limits that contradict by less may do so by rounding
+NODES = 300  # ranges looked at before the answer is that there is none
+DEPTH = 40  # ranges that wait at once
+STANDSTILL = 0.7  # pulls that stay this uncertain do not grow more certain by looking again
+
+# Rows of a range (RANGE_ROWS, m): least and largest tensions, and the pulls at them.
+LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3
+RANGE_ROWS = 4
+
+
+class Search(NamedTuple):
+    """State of the search.
+
+    Attributes:
+        tops: The most each cable gives along a direction [N], (m,).
+        ranges: Those that wait, the last one is next, (DEPTH, RANGE_ROWS, m).
+    """
+
+    tops: Array
+    ranges: Array
+
+
+@glue
+def new_search(memory: Memory, m: int) -> tuple[Search, Memory]:
+    """Work arrays for m cables, and the memory that is left."""
+    tops, at = block(memory.numbers, 0, 1, m)
+    ranges, at = block(memory.numbers, at, DEPTH, RANGE_ROWS * m)
+    search = Search(tops[0], ranges.reshape((DEPTH, RANGE_ROWS, m)))
+    return search, Memory(memory.numbers[at:], memory.counters)
+
+
+@glue
+def section_of(range_: Array, i: int) -> Section:
+    """The tensions of cable i in a range."""
+    return Section(range_[LEAST, i], range_[LARGEST, i], range_[AT_LEAST, i], range_[AT_LARGEST, i])
+
+
+@formula
+def along(columns: Array, direction: Array, i: int) -> float:
+    """Component of a column along a direction."""
+    total = 0.0
+    for k in range(direction.size):
+        total += direction[k] * columns[k, i]
+    return total
+
+
+@kernel
+def spare_along(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
+    """Capacity of the cables along a direction beyond the demand [N]; negative proves infeasibility.
+
+    It is the upper end of what rounding leaves open. Fills the most each cable gives, (m,).
+    """
+    spare = 0.0
+    size = 0.0
+    for k in range(direction.size):
+        spare -= direction[k] * demand.right[k]
+        size += abs(direction[k] * demand.right[k])
+    for i in range(tops.size):
+        a, b = along(demand.matrix, direction, i), along(demand.hanging, direction, i)
+        tops[i] = most_along(curves, i, section_of(range_, i), a, b)
+        spare += tops[i]
+        size += abs(a) * range_[LARGEST, i] + abs(b) * max(abs(range_[AT_LEAST, i]), abs(range_[AT_LARGEST, i]))
+    return spare + CERTAIN * size
+
+
+@kernel
+def narrow(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
+    """Take from a range the tensions with which a cable falls short of its best by more than is spare.
+
+    Returns:
+        Whether anything is left of it.
+    """
+    if not spare < math.inf:
+        return True
+    for i in range(tops.size):
+        a, b = along(demand.matrix, direction, i), along(demand.hanging, direction, i)
+        least, most = sag_force_range(curves, i, section_of(range_, i))
+        needed = tops[i] - spare + min(b * least, b * most)
+        if a > 0.0 and needed / a > range_[LEAST, i]:
+            if needed / a > range_[LARGEST, i]:
+                return False
+            range_[LEAST, i] = needed / a
+            range_[AT_LEAST, i] = sag_force_at(curves, i, range_[LEAST, i])
+        elif a < 0.0 and needed / a < range_[LARGEST, i]:
+            if needed / a < range_[LEAST, i]:
+                return False
+            range_[LARGEST, i] = needed / a
+            range_[AT_LARGEST, i] = sag_force_at(curves, i, range_[LARGEST, i])
+    return True
+
+
+@kernel
+def narrow_free(curves: Curves, demand: Demand, range_: Array, change: Change, tops: Array, memory: Memory) -> bool:
+    """Narrow a range along the directions in which one cable between its limits counts and the others do not.
+
+    Returns:
+        Whether anything is left of it.
+    """
+    n, m = demand.matrix.shape
+    count = 0
+    for i in range(m):
+        count += 1 if range_[LEAST, i] < change.tau[i] < range_[LARGEST, i] else 0
+    if count == 0 or count > n:
+        return True
+    rows, at = block(memory.numbers, 0, 2 * count + n + 2, n)
+    diagonals, at = block(memory.numbers, at, 2, count)
+    reduced, inverse = rows[:count], rows[count : 2 * count]
+    slopes_at(curves, change.tau, tops, curves.cables.slackness)
+    count = 0
+    for i in range(m):
+        if range_[LEAST, i] < change.tau[i] < range_[LARGEST, i]:
+            for k in range(n):
+                reduced[count, k] = demand.matrix[k, i] - demand.hanging[k, i] * tops[i]
+            count += 1
+    if not factorize(reduced, diagonals):
+        return True
+    q = rows[2 * count : 2 * count + n + 1]
+    orthogonal_factor(reduced, diagonals, q)
+    pseudo_inverse(reduced, diagonals, q, inverse)
+    direction = rows[2 * count + n + 1]
+    for c in range(2 * count):
+        for k in range(n):
+            direction[k] = inverse[c // 2, k] if c % 2 == 0 else -inverse[c // 2, k]
+        spare = spare_along(curves, demand, range_, direction, tops)
+        if spare < 0.0 or not narrow(curves, demand, range_, direction, spare, tops):
+            return False
+    return True
+
+
+@glue
+def least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
+    """The cable whose pull is least certain in a range, and by how much all pulls together are [N]."""
+    worst = -1
+    largest = 0.0
+    total = 0.0
+    for i in range(range_.shape[1]):
+        least, most = sag_force_range(curves, i, section_of(range_, i))
+        total += most - least
+        if most - least > largest:
+            worst, largest = i, most - least
+    return worst, total
+
+
+@glue
+def split(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
+    """Split the tensions of one cable in two: what holds its present one comes last and so is next."""
+    for row in range(RANGE_ROWS):
+        for j in range(waiting.shape[2]):
+            waiting[top + 1, row, j] = waiting[top, row, j]
+    low, high = waiting[top, LEAST, i], waiting[top, LARGEST, i]
+    middle = math.sqrt(low * high) if low > 0.0 else 0.5 * high
+    pull = sag_force_at(curves, i, middle)
+    lower, upper = (top + 1, top) if tau <= middle else (top, top + 1)
+    waiting[lower, LARGEST, i] = middle
+    waiting[lower, AT_LARGEST, i] = pull
+    waiting[upper, LEAST, i] = middle
+    waiting[upper, AT_LEAST, i] = pull
+
+
+@glue
+def first_range(curves: Curves, size: float, range_: Array) -> None:
+    """Fill the range that the limits allow, never a wider one, but for cables that are all but slack (LOOSEST).
+
+    Where there is no upper limit, sagging cables are stretched to twice their length at most, and others carry a
+    million times the largest force at hand.
+    """
+    cables = curves.cables
+    for i in range(cables.low.size):
+        low, high = cables.low[i], cables.high[i]
+        sags = curves.model.code == CATENARY and cables.half_weight[i] > 0.0
+        if high == math.inf:
+            high = max(low, cables.stiffness[i] if sags else PLENTY * size)
+        if sags:
+            low = min(max(low, cables.half_weight[i] / LOOSEST), high)
+        range_[LEAST, i] = low
+        range_[LARGEST, i] = high
+        range_[AT_LEAST, i] = sag_force_at(curves, i, low)
+        range_[AT_LARGEST, i] = sag_force_at(curves, i, high)
+
+
+@glue
+def come_near(curves: Curves, demand: Demand, range_: Array, trial: Change, memory: Memory) -> tuple[float, bool]:
+    """Let tensions in a range come as near to the demand as they can.
+
+    Returns:
+        The force that is left [N], infinite where moments are out of reach: then the direction is one of moments alone;
+        and whether the moments balance.
+    """
+    n, m = demand.matrix.shape
+    first = demand.soft
+    for i in range(m):
+        trial.tau[i] = min(max(trial.tau[i], range_[LEAST, i]), range_[LARGEST, i])
+    left = math.inf
+    if first > 0:
+        left = least_change(curves, demand, range_, trial, memory)
+    if left < math.inf or left != left:
+        return left, length_of(trial.residual, first, n) <= FEASIBLE * demand.size
+    moments = Demand(demand.matrix[first:], demand.hanging[first:], demand.right[first:], n - first, demand.size)
+    part = Change(trial.tau, trial.pull, trial.residual[first:], trial.direction[first:])
+    least_change(curves, moments, range_, part, memory)
+    for k in range(first):
+        trial.direction[k] = 0.0
+    return math.inf, False
+
+
+@glue
+def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tuple[int, float, float, bool]:
+    """Feasibility of a demand with tensions within the cables' limits.
+
+    Args:
+        curves: The cables of one pose.
+        demand: What is asked of them.
+        change: Where to begin; filled with the tensions that leave least, what they leave and along what.
+        memory: To work in.
+
+    Returns:
+        POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED where the arithmetic broke down; the
+        bracket of the shortfall [N]; whether the direction alone proves infeasibility, over the whole first range.
+    """
+    n, m = demand.matrix.shape
+    search, rest = new_search(memory, m)
+    kept, at = block(rest.numbers, 0, 1, m)
+    tau, at = block(rest.numbers, at, 3, max(m, n))
+    rest = Memory(rest.numbers[at:], rest.counters)
+    trial = Change(tau[0, :m], kept[0], tau[1, :n], tau[2, :n])
+    first_range(curves, demand.size, search.ranges[0])
+    find_extrema(curves, search.ranges[0, LEAST], search.ranges[0, LARGEST], rest)
+    for i in range(m):
+        trial.tau[i] = change.tau[i]
+    enough = math.inf
+    top = 0
+    for node in range(NODES):
+        range_ = search.ranges[top]
+        left, balanced = come_near(curves, demand, range_, trial, rest)
+        if node == 0 and not (demand.size < math.inf and left == left):
+            return POSE_NOT_CONVERGED, 0.0, math.inf, False
+        if node == 0 or (balanced and left < enough):
+            for i in range(m):
+                change.tau[i] = trial.tau[i]
+            for k in range(n):
+                change.residual[k] = trial.residual[k]
+        if balanced:
+            enough = min(enough, left)
+        if balanced and left <= FEASIBLE * demand.size:
+            return POSE_SOLVED, 0.0, 0.0, False
+        spare = spare_along(curves, demand, range_, trial.direction, search.tops)
+        if node == 0:
+            for k in range(n):
+                change.direction[k] = trial.direction[k]
+            if spare < 0.0:
+                return POSE_INFEASIBLE, -spare if left < math.inf else math.inf, enough, True
+        _, before = least_certain(curves, range_)
+        possible = spare >= 0.0 and narrow(curves, demand, range_, trial.direction, spare, search.tops)
+        possible = possible and narrow_free(curves, demand, range_, trial, search.tops, rest)
+        if possible:
+            worst, after = least_certain(curves, range_)
+            if after > STANDSTILL * before or worst < 0:
+                if worst < 0 or top + 1 >= DEPTH:
+                    break
+                split(curves, search.ranges, top, worst, trial.tau[worst])
+                top += 1
+        else:
+            top -= 1
+            if top < 0:
+                return POSE_INFEASIBLE, 0.0, enough, False
+    return POSE_BORDERLINE, 0.0, enough, False

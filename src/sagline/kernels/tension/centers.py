@@ -1,0 +1,143 @@
+"""The analytic center of the feasible tensions: the largest product of the distances to all limits."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.core.arrays import Array
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound
+from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.linear_program import LP_SOLVED, lowest_point
+from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
+from sagline.kernels.jit import kernel
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.tension.on_polygon import centroid, feasible_corners
+from sagline.kernels.tension.programs import status_of
+from sagline.kernels.tension.work_arrays import WorkArrays
+
+THIN = 1e-9  # of the largest tension: a set thinner than this has no inside worth centering in
+NEWTON_STEPS = 200
+CENTERED = 1e-18  # square of the Newton decrement at which the center is found
+
+
+@kernel
+def share_at_center(bounds: Array, null: Array, point: Array, room: WorkArrays) -> int:
+    """Move the point (r,) to the analytic center, from that of the round before if there was one."""
+    corners, labels, known = room.corners, room.labels, room.known
+    if known[0] > 0 and is_inside(bounds, null, point) and analytic_center(bounds, null, room.rest, point):
+        return POSE_SOLVED
+    known[0] = 0
+    r, m = null.shape
+    if r > 2:
+        status = deepest_point(bounds, null, room, point)
+        if status != POSE_SOLVED:
+            return status
+    else:
+        count = feasible_corners(bounds, null, corners, labels)
+        if count == 0:
+            return POSE_INFEASIBLE
+        for k in range(count):
+            if labels[k] >= 2 * m:
+                return POSE_UNBOUNDED
+        x, y = centroid(corners, count)
+        point[0] = x
+        if r == 2:
+            point[1] = y
+    if not analytic_center(bounds, null, room.rest, point):
+        return POSE_NOT_CONVERGED
+    known[0] = 1
+    return POSE_SOLVED
+
+
+@kernel
+def is_inside(bounds: Array, null: Array, point: Array) -> bool:
+    """True if a point keeps all limits by more than the smallest thickness."""
+    slack = THIN * largest_bound(bounds)
+    for i in range(null.shape[1]):
+        tension = bounds[START, i]
+        for k in range(point.size):
+            tension += null[k, i] * point[k]
+        if not min(tension - bounds[LOW, i], bounds[HIGH, i] - tension) > slack:
+            return False
+    return True
+
+
+@kernel
+def deepest_point(bounds: Array, null: Array, room: WorkArrays, point: Array) -> int:
+    """Fill the point (r,) whose tensions keep farthest from their nearest limits; returns the pose's status."""
+    r, m = null.shape
+    rows, at = block(room.rest.numbers, 0, r + 1, 2 * m)
+    halves, at = block(
+        room.rest.numbers, at, STRIP_ROWS, 2 * m
+    )  # every side one of its own, which depth makes narrower
+    vectors, at = block(room.rest.numbers, at, 2, r + 1)
+    cost, found = vectors[0], vectors[1]
+    for i in range(m):
+        for k in range(r):
+            rows[k, i], rows[k, m + i] = null[k, i], -null[k, i]
+        rows[r, i] = rows[r, m + i] = -1.0
+        halves[START, i], halves[LOW, i], halves[HIGH, i] = bounds[START, i], bounds[LOW, i], math.inf
+        halves[START, m + i], halves[LOW, m + i] = -bounds[START, i], -bounds[HIGH, i]
+        halves[HIGH, m + i] = math.inf
+    for k in range(r):
+        cost[k] = 0.0
+    cost[r] = -1.0
+    slack = TOLERANCE * largest_bound(bounds)
+    room.basis.labels[0] = -1
+    outcome = lowest_point(rows, halves, cost, slack, room.basis, found)
+    for k in range(r):
+        point[k] = found[k]
+    return POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else status_of(outcome)
+
+
+@kernel
+def analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -> bool:
+    """Move a point inside the feasible set (r,) to the one of largest product of distances to all limits.
+
+    Newton's method with damped steps on the barrier, which is self-concordant; infinite limits do not count. A set
+    too thin to have an inside keeps the point it was given.
+
+    Returns:
+        Whether the center was found.
+    """
+    r, m = null.shape
+    vectors, at = block(memory.numbers, 0, 2, r)
+    curve, at = block(memory.numbers, at, r, r)
+    slope, step = vectors[0], vectors[1]
+    largest = largest_bound(bounds)
+    for _ in range(NEWTON_STEPS):
+        for k in range(r):
+            slope[k] = 0.0
+            for j in range(k + 1):
+                curve[k, j] = 0.0
+        for i in range(m):
+            tension = bounds[START, i]
+            for k in range(r):
+                tension += null[k, i] * point[k]
+            below = tension - bounds[LOW, i]
+            above = bounds[HIGH, i] - tension
+            if not min(below, above) > THIN * largest:
+                return True
+            below = 1.0 / below
+            above = 1.0 / above
+            push = above - below
+            weight = below * below + above * above
+            for k in range(r):
+                slope[k] += push * null[k, i]
+                for j in range(k + 1):
+                    curve[k, j] += weight * null[k, i] * null[j, i]
+        if not factor_positive(curve, 0.0, curve):
+            return False
+        for k in range(r):
+            step[k] = -slope[k]
+        solve_lower(curve, step)
+        decrement = 0.0
+        for k in range(r):
+            decrement += step[k] * step[k]
+        solve_upper(curve, step)
+        share = 1.0 if decrement < 0.0625 else 1.0 / (1.0 + math.sqrt(decrement))
+        for k in range(r):
+            point[k] += share * step[k]
+        if decrement < CENTERED:
+            return True
+    return False

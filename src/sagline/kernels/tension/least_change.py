@@ -1,0 +1,334 @@
+"""The least change of the wrench with which tensions within their limits balance it, on the cables' exact curves.
+
+Cable i gives the platform the wrench J_i tau - G_i pull_i(tau), a curve. Newton steps replace the curves by their
+tangents; each step is a least-squares problem between limits, with the moments as hard equations, so that what is left
+is force alone, and with a small weight on the change of the tensions, so that it has one answer.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.core.arrays import Array
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, inward, largest_bound
+from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
+from sagline.kernels.algebra.nearest_point import Held, nearest_point, new_held
+from sagline.kernels.cable.sag_forces import Curves, sag_forces_at, slopes_at
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
+
+NEWTON_STEPS = 40
+HALVINGS = 12
+STEADINESS = 1e-8  # what the square of a newton of changed tension weighs against that of a changed wrench
+DECREASE = 1e-4  # share of a full step's promise that a step must keep
+STIFFEST = 1e3  # largest weight of a bend, which the normal matrix still bears beside that
+STANDS = 1e-13  # of the largest force at hand: a step that promises less is none
+STEADY = 1e-6  # of what is left: tensions that move by less no longer turn its direction
+
+
+class Demand(NamedTuple):
+    """Demand on the cables of one pose; moments are divided by the lever arm, so that every row is in newtons.
+
+    Attributes:
+        matrix: J, what a chord tension gives, (n, m).
+        hanging: G, what a pull takes away, (n, m).
+        right: Wrench to be supplied beside the pulls, (n,).
+        soft: How many of the rows, the first ones, may leave something; the others, hard ones, leave nothing.
+        size: The largest force at hand [N], by which tolerances are measured.
+    """
+
+    matrix: Array
+    hanging: Array
+    right: Array
+    soft: int
+    size: float
+
+
+class Change(NamedTuple):
+    """A state of the search, for m cables and n rows.
+
+    Attributes:
+        tau: Chord tensions [N], (m,).
+        pull: Their pulls [N], (m,).
+        residual: What they leave of the demand [N], moments per lever arm, (n,).
+        direction: y, along which the rest is; moments per lever arm, (n,).
+    """
+
+    tau: Array
+    pull: Array
+    residual: Array
+    direction: Array
+
+
+class Tangents(NamedTuple):
+    """One Newton step, with h hard and k soft rows and d = m - h unknowns.
+
+    Attributes:
+        matrix: J - G dpull/dtau, (n, m).
+        reduced: Its hard rows, then their reflections, (h, m).
+        diagonals: Of their factors, (2, h).
+        q: Orthogonal factor, and a row to work in, (m + 1, m).
+        inverse: Transposed pseudo-inverse of the hard rows, (h, m).
+        soft: The soft rows along the null space of the hard ones, (k, d).
+        normal: Normal matrix of these and the weight of change, then its factor, (d, d).
+        rows: What each unknown changes the tensions by, (d, m).
+        bounds: Tensions that are best without limits, and the limits, (3, m).
+        unknowns: A right side, a target of zeros and the point, (3, d).
+        held: Limits that the last point stands on.
+        push: Slopes of the pulls, then what the limits push with, (m,).
+        bend: What the square of a change of each tension weighs, (m,).
+        multipliers: What the step before left, and what its hard rows cost [N], (n,).
+        trial: Tensions, (m,), pulls, (m,), and residual of a step that is tried, (n,).
+    """
+
+    matrix: Array
+    reduced: Array
+    diagonals: Array
+    q: Array
+    inverse: Array
+    soft: Array
+    normal: Array
+    rows: Array
+    bounds: Array
+    unknowns: Array
+    held: Held
+    push: Array
+    bend: Array
+    multipliers: Array
+    trial: tuple[Array, Array, Array]
+
+
+@glue
+def new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[Tangents, Memory]:
+    """Work arrays for a step with so many hard rows, and the memory that is left."""
+    d = m - hard
+    numbers = memory.numbers
+    wide, at = block(numbers, 0, n + 2 * hard + (m + 1) + d + STRIP_ROWS + 4, m)
+    reduced = wide[n:]
+    q = reduced[hard:]
+    inverse = q[m + 1 :]
+    rows = inverse[hard:]
+    bounds = rows[d:]
+    others = bounds[STRIP_ROWS:]
+    diagonals, at = block(numbers, at, 2, hard)
+    soft, at = block(numbers, at, n - hard, d)
+    normal, at = block(numbers, at, d, d)
+    unknowns, at = block(numbers, at, 3, d)
+    left, at = block(numbers, at, 2, n)
+    held, rest = new_held(Memory(numbers[at:], memory.counters), d)
+    held.labels[0] = 0
+    tangents = Tangents(
+        wide[:n], reduced[:hard], diagonals, q[: m + 1], inverse[:hard], soft, normal, rows[:d], bounds[:STRIP_ROWS],
+        unknowns, held, others[0], others[1], left[1], (others[2], others[3], left[0]),
+    )  # fmt: skip
+    return tangents, rest
+
+
+@glue
+def leave(curves: Curves, demand: Demand, tau: Array, pull: Array, residual: Array) -> None:
+    """Fill the pulls (m,) of tensions (m,) and what they leave of the demand (n,)."""
+    sag_forces_at(curves, tau, pull)
+    for k in range(residual.size):
+        residual[k] = demand.right[k]
+        for i in range(tau.size):
+            residual[k] += demand.hanging[k, i] * pull[i] - demand.matrix[k, i] * tau[i]
+
+
+@formula
+def length_of(vector: Array, first: int, last: int) -> float:
+    """Euclidean length of part of a vector."""
+    total = 0.0
+    for k in range(first, last):
+        total += vector[k] * vector[k]
+    return math.sqrt(total)
+
+
+@glue
+def set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: Tangents) -> bool:
+    """Fill the tangents at given tensions, and the normal matrix; False where the hard rows depend on each other.
+
+    The curves' bend counts with the multipliers (n,) of the step before, where it is against going on: without it the
+    steps go to and fro across a valley.
+    """
+    n, m = step.matrix.shape
+    soft = demand.soft
+    hard = n - soft
+    d = m - hard
+    slopes_at(curves, tau, step.push, step.bend)
+    for i in range(m):
+        along = 0.0
+        for k in range(n):
+            step.matrix[k, i] = demand.matrix[k, i] - demand.hanging[k, i] * step.push[i]
+            along += demand.hanging[k, i] * multipliers[k]
+        step.bend[i] = min(max(along * step.bend[i], 0.0), STIFFEST) + STEADINESS
+        for k in range(hard):
+            step.reduced[k, i] = step.matrix[soft + k, i]
+    if not factorize(step.reduced, step.diagonals):
+        return False
+    orthogonal_factor(step.reduced, step.diagonals, step.q)
+    pseudo_inverse(step.reduced, step.diagonals, step.q, step.inverse)
+    for k in range(soft):
+        for j in range(d):
+            step.soft[k, j] = 0.0
+            for i in range(m):
+                step.soft[k, j] += step.matrix[k, i] * step.q[i, hard + j]
+    for j in range(d):
+        for b in range(d):
+            step.normal[j, b] = 0.0
+            for k in range(soft):
+                step.normal[j, b] += step.soft[k, j] * step.soft[k, b]
+            for i in range(m):
+                step.normal[j, b] += step.q[i, hard + j] * step.bend[i] * step.q[i, hard + b]
+    return factor_positive(step.normal, 0.0, step.normal)
+
+
+@glue
+def find_step(demand: Demand, ranges: Array, change: Change, step: Tangents) -> bool:
+    """Fill the tensions of a full step, and what the limits push with; False where hard rows and limits contradict."""
+    n, m = step.matrix.shape
+    soft = demand.soft
+    hard = n - soft
+    d = m - hard
+    base, z = step.bounds[START], step.unknowns[0]
+    minimum_norm(step.inverse, change.residual[soft:], base)
+    for j in range(d):
+        z[j] = 0.0
+        step.unknowns[1, j] = 0.0
+    for k in range(soft):
+        left = change.residual[k]
+        for i in range(m):
+            left -= step.matrix[k, i] * base[i]
+        for j in range(d):
+            z[j] += step.soft[k, j] * left
+    for j in range(d):
+        for i in range(m):
+            z[j] -= step.q[i, hard + j] * step.bend[i] * base[i]
+    solve_lower(step.normal, z)
+    solve_upper(step.normal, z)
+    for i in range(m):
+        base[i] += change.tau[i]
+        for j in range(d):
+            base[i] += step.q[i, hard + j] * z[j]
+        step.bounds[LOW, i] = ranges[0, i]
+        step.bounds[HIGH, i] = ranges[1, i]
+        for j in range(d):
+            step.rows[j, i] = step.q[i, hard + j]
+            for b in range(j):
+                step.rows[j, i] -= step.normal[j, b] * step.rows[b, i]
+            step.rows[j, i] /= step.normal[j, j]
+    slack = TOLERANCE * largest_bound(step.bounds)
+    if not nearest_point(step.rows, step.bounds, step.unknowns[1], slack, step.held, step.unknowns[2]):
+        return False
+    trial = step.trial[0]
+    for i in range(m):
+        step.push[i] = 0.0
+        trial[i] = base[i]
+        for j in range(d):
+            trial[i] += step.unknowns[2, j] * step.rows[j, i]
+        trial[i] = min(max(trial[i], ranges[0, i]), ranges[1, i])
+    for c in range(step.held.labels[0]):
+        label = step.held.labels[1 + c]
+        step.push[label // 2] += inward(label) * step.held.pushes[0, c]
+    return True
+
+
+@glue
+def point_along(soft: int, change: Change, step: Tangents) -> float:
+    """Fill the direction along which the step leaves its rest, soft part of length 1; returns the rest's length [N].
+
+    On the free cables it is perpendicular to the tangents; where a limit holds a cable, it points beyond that limit.
+    """
+    n, m = step.matrix.shape
+    hard = n - soft
+    y, along, trial = change.direction, step.bounds[START], step.trial[0]
+    for k in range(soft):
+        y[k] = change.residual[k]
+        for i in range(m):
+            y[k] -= step.matrix[k, i] * (trial[i] - change.tau[i])
+    for i in range(m):
+        along[i] = step.push[i] - step.bend[i] * (trial[i] - change.tau[i])
+        for k in range(soft):
+            along[i] += y[k] * step.matrix[k, i]
+    rest = length_of(y, 0, soft)
+    for k in range(hard):
+        y[soft + k] = 0.0
+        for i in range(m):
+            y[soft + k] -= step.inverse[k, i] * along[i]
+    for k in range(n):
+        y[k] = y[k] / rest if rest > 0.0 else 0.0
+    return rest
+
+
+@glue
+def take_step(curves: Curves, demand: Demand, rest: float, change: Change, step: Tangents) -> bool:
+    """Go as far along a step as keeps its promise, halving it; False where there is nothing to gain.
+
+    What hard rows leave counts by more than their multipliers, so that a step that pays for it elsewhere is none.
+    """
+    n, m = demand.matrix.shape
+    soft = demand.soft
+    trial, trial_pull, left = step.trial
+    known = STANDS * demand.size
+    price = 1.0
+    for k in range(soft, n):
+        price = max(price, 2.0 * abs(change.direction[k]))
+    before = length_of(change.residual, 0, soft) + price * length_of(change.residual, soft, n)
+    moved = 0.0
+    for i in range(m):
+        moved = max(moved, abs(trial[i] - change.tau[i]))
+    if before - rest <= known and (moved <= STEADY * rest or rest <= known):
+        return False
+    share = 1.0
+    after = math.inf
+    for _ in range(HALVINGS):
+        leave(curves, demand, trial, trial_pull, left)
+        after = length_of(left, 0, soft) + price * length_of(left, soft, n)
+        if after <= before - DECREASE * share * (before - rest) + known:
+            break
+        share *= 0.5
+        for i in range(m):
+            trial[i] = 0.5 * (trial[i] + change.tau[i])
+    if not after <= before + known:
+        return False
+    for i in range(m):
+        change.tau[i] = trial[i]
+        change.pull[i] = trial_pull[i]
+    for k in range(n):
+        change.residual[k] = left[k]
+    return True
+
+
+@kernel
+def least_change(curves: Curves, demand: Demand, ranges: Array, change: Change, memory: Memory) -> float:
+    """Change tensions within their ranges until what they leave of the demand is least; returns its length [N].
+
+    Args:
+        curves: The cables of one pose.
+        demand: What is asked of them.
+        ranges: Least and largest tensions, rows 0 and 1.
+        change: Where to begin, and filled.
+        memory: To work in.
+
+    Returns:
+        Length of what the soft rows leave [N]; infinite where hard rows and ranges contradict, on the tangents; NaN
+        where the hard rows depend on each other.
+    """
+    n, m = demand.matrix.shape
+    soft = demand.soft
+    step, _ = new_tangents(memory, n, m, n - soft)
+    leave(curves, demand, change.tau, change.pull, change.residual)
+    for k in range(n):
+        step.multipliers[k] = 0.0
+    for _ in range(NEWTON_STEPS):
+        if not set_tangents(curves, demand, change.tau, step.multipliers, step):
+            return math.nan
+        if not find_step(demand, ranges, change, step):
+            return math.inf
+        rest = point_along(soft, change, step)
+        for k in range(n):
+            step.multipliers[k] = rest * change.direction[k]
+        if not take_step(curves, demand, rest, change, step):
+            break
+    return length_of(change.residual, 0, soft)

@@ -1,0 +1,136 @@
+"""Capacity margin of a pose: distance to the faces of the available wrench set.
+
+The wrenches of all tensions within their limits fill a zonotope. Each of its faces is parallel to n - 1
+columns of the structure matrix; the distance to it along the force part of its normal is the extra force
+that reaches it, whatever its direction.
+
+Source:
+    Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of
+    wrenches"; Guay, Cardou, Cruz-Ruiz & Caro 2014, "Measuring how well a structure supports varying external
+    wrenches" (the capacity margin).
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.core.arrays import Array, Indices
+from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block, counters
+
+MOST_FACES = 1 << 40  # more than there can be
+ALONG = 1e-13  # of a unit normal and a column: a column in the face itself
+DEPENDENT = 1e-20  # share of a column's square outside the span of others below which it depends on them
+
+
+@glue
+def next_choice(chosen: Indices, m: int) -> int:
+    """The next combination in order, in place; returns the first place that changed, -1 after the last."""
+    count = chosen.size
+    place = -1
+    for k in range(count):
+        if chosen[k] < m - count + k:
+            place = k
+    if place >= 0:
+        chosen[place] += 1
+        for j in range(place + 1, count):
+            chosen[j] = chosen[j - 1] + 1
+    return place
+
+
+@glue
+def extend(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
+    """Add the chosen columns from a place on to the orthonormal frame (n, n); returns how many it then has.
+
+    Fewer than were chosen where a column depends on those before it.
+    """
+    n = matrix.shape[0]
+    held = first
+    for c in range(first, chosen.size):
+        size = 0.0
+        for k in range(n):
+            frame[c, k] = matrix[k, chosen[c]]
+            size += frame[c, k] * frame[c, k]
+        square = take_out(frame, c, triangle)
+        if not square > DEPENDENT * size:
+            break
+        keep(frame, c, triangle, square)
+        held = c + 1
+    return held
+
+
+@glue
+def complete(frame: Array, triangle: Array) -> None:
+    """Fill the last row of a frame (n, n): what is perpendicular to all others."""
+    n = frame.shape[0]
+    best = 0
+    least = math.inf
+    for k in range(n):
+        covered = 0.0
+        for b in range(n - 1):
+            covered += frame[b, k] * frame[b, k]
+        if covered < least:
+            least, best = covered, k
+    for k in range(n):
+        frame[n - 1, k] = 1.0 if k == best else 0.0
+    keep(frame, n - 1, triangle, take_out(frame, n - 1, triangle))
+
+
+@formula
+def reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
+    """Largest normal . J t, and largest -normal . J t, over all t within their limits; may be infinite."""
+    n, m = matrix.shape
+    forward = 0.0
+    backward = 0.0
+    for i in range(m):
+        along = 0.0
+        for k in range(n):
+            along += normal[k] * matrix[k, i]
+        least = along * low[i]
+        most = along * high[i] if abs(along) > ALONG else least
+        forward += max(least, most)
+        backward -= min(least, most)
+    return forward, backward
+
+
+@kernel
+def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
+    """Largest force [N] in any direction that can be added to the needed wrench; negative where it is not feasible.
+
+    Args:
+        matrix: Structure matrix along the free motions, translations first, (n, m).
+        needed: Wrench to supply, in the same rows, (n,).
+        low: Least tensions (m,).
+        high: Largest tensions (m,), may be infinite.
+        translations: How many of the rows are forces.
+        memory: To work in.
+    """
+    n, m = matrix.shape
+    frame, at = block(memory.numbers, 0, n, n)
+    triangle, at = block(memory.numbers, at, n, n)
+    chosen, _ = counters(memory, 0, n - 1)
+    for c in range(n - 1):
+        chosen[c] = c
+    normal = frame[n - 1]
+    least = math.inf
+    held = 0  # columns of the choice in the frame
+    for _ in range(MOST_FACES):
+        held = extend(matrix, chosen, held, frame, triangle)
+        if held == n - 1:
+            complete(frame, triangle)
+            force = 0.0
+            along = 0.0
+            for k in range(n):
+                along += normal[k] * needed[k]
+                if k < translations:
+                    force += normal[k] * normal[k]
+            if force > 1e-18:
+                force = math.sqrt(force)
+                forward, backward = reach(matrix, low, high, normal)
+                least = min(least, (forward - along) / force, (backward + along) / force)
+        changed = next_choice(chosen, m)
+        if changed < 0:
+            break
+        held = min(held, changed)
+    return least

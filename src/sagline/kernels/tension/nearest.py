@@ -1,0 +1,114 @@
+"""Distribution nearest to a reference: minimum norm, closest to the tensions before, quadratic program.
+
+docs/model.md, section 5. With an orthonormal null-space basis N, the objective (55) of the article, closest to given
+tensions, is the projection of lambda_ref = N^T (t_ref - t0) onto the feasible set; the minimum norm is that of 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from sagline.core.arrays import Array
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
+from sagline.kernels.algebra.nearest_point import Held, nearest_point, new_held
+from sagline.kernels.codes import CLOSEST, POSE_INFEASIBLE, POSE_SOLVED, QUADRATIC_PROGRAM
+from sagline.kernels.jit import formula, glue
+from sagline.kernels.memory import Memory, block
+
+
+class Distribution(NamedTuple):
+    """Tension distribution of one pose.
+
+    Attributes:
+        method: Which choice.
+        parameter: Its exponent, or which optimum of the polygon walk.
+        variable: In which variable.
+        weight: Root weights of the cables, (m,).
+        goal: Tensions of a quadratic program to be near to [N], (m,).
+    """
+
+    method: int
+    parameter: float
+    variable: int
+    weight: Array
+    goal: Array
+
+
+class ReferencePoint(NamedTuple):
+    """Reference point of a nearest-point method, in coordinates of the null space.
+
+    Attributes:
+        previous: Tensions in the distribution's variable to stay close to (m,), NaN for none.
+        reference: lambda_ref, (r,).
+        held: The limits that the last projection met.
+        point: The last projection, (r,).
+    """
+
+    previous: Array
+    reference: Array
+    held: Held
+    point: Array
+
+
+@glue
+def new_nearness(memory: Memory, previous: Array, r: int) -> tuple[ReferencePoint, Memory]:
+    """Work arrays for r redundant cables, and the memory that is left."""
+    rows, at = block(memory.numbers, 0, 2, r)
+    held, rest = new_held(Memory(memory.numbers[at:], memory.counters), r)
+    return ReferencePoint(previous, rows[0], held, rows[1]), rest
+
+
+@glue
+def refer(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
+    """Fill the point of the null space that the shared tensions shall be nearest to.
+
+    offset: of the distribution's variable (m,).
+    """
+    from_before = distribution.method == CLOSEST and not math.isnan(near.previous[0])
+    for k in range(null.shape[0]):
+        near.reference[k] = 0.0
+        for i in range(null.shape[1]):
+            goal = near.previous[i] if from_before else distribution.goal[i]
+            near.reference[k] += null[k, i] * distribution.weight[i] * (goal - offset[i])
+
+
+@formula
+def set_point(bounds: Array, null: Array, point: Array, tension: Array) -> None:
+    """Fill the tensions (m,) of a point in the null space."""
+    for i in range(tension.size):
+        tension[i] = bounds[START, i]
+    for k in range(point.size):
+        for i in range(tension.size):
+            tension[i] += null[k, i] * point[k]
+
+
+@formula
+def satisfies_limits(bounds: Array, tension: Array, slack: float) -> bool:
+    """True if every tension keeps its limits up to a tolerance."""
+    for i in range(tension.size):
+        if not bounds[LOW, i] - slack <= tension[i] <= bounds[HIGH, i] + slack:
+            return False
+    return True
+
+
+@glue
+def share_nearest(bounds: Array, null: Array, near: ReferencePoint, tension: Array) -> int:
+    """Fill the tensions (m,) nearest to the reference; returns POSE_SOLVED or POSE_INFEASIBLE."""
+    set_point(bounds, null, near.reference, tension)
+    if satisfies_limits(bounds, tension, 0.0):
+        near.held.labels[0] = 0
+        return POSE_SOLVED
+    slack = TOLERANCE * largest_bound(bounds)
+    if null.shape[0] == 0:
+        return POSE_SOLVED if satisfies_limits(bounds, tension, slack) else POSE_INFEASIBLE
+    if not nearest_point(null, bounds, near.reference, slack, near.held, near.point):
+        return POSE_INFEASIBLE
+    set_point(bounds, null, near.point, tension)
+    return POSE_SOLVED
+
+
+@glue
+def is_nearest(distribution: Distribution) -> bool:
+    """True if a method is a projection onto a reference."""
+    return distribution.method <= QUADRATIC_PROGRAM

@@ -1,0 +1,177 @@
+"""The feasible tensions of least p-norm: Newton steps, each projected onto the feasible set in its own metric."""
+
+from __future__ import annotations
+
+import math
+
+from sagline.core.arrays import Array, Indices
+from sagline.kernels.algebra.bounds import START, TOLERANCE, largest_bound, most_violated_bound
+from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.nearest_point import nearest_point
+from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
+from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block
+from sagline.kernels.tension.nearest import ReferencePoint
+
+STEPS = 200
+HALVINGS = 40
+CLOSE = 1e-2  # of the largest tension: a step shorter than this lets the exponent grow
+STILL = 1e-12  # of the largest tension: a step shorter than this ends the search
+
+
+@kernel
+def share_by_norm(
+    p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, known: Indices, memory: Memory
+) -> int:
+    """Fill the point (r,) of near whose tensions have the least p-norm.
+
+    known: whether that point is the answer of a round before, (1,), from which the search then starts.
+    """
+    point = near.point
+    slack = TOLERANCE * largest_bound(bounds)
+    if known[0] > 0:
+        lasts, _ = block(memory.numbers, 0, 1, point.size)
+        last = lasts[0]
+        for k in range(point.size):
+            last[k] = point[k]
+        kept = nearest_point(null, bounds, last, slack, near.held, point)
+        if kept and lowest_p_norm(p, p, bounds, offset, null, near, memory):
+            return POSE_SOLVED
+    known[0] = 0
+    near.held.labels[0] = 0
+    if not nearest_point(null, bounds, near.reference, slack, near.held, point):
+        return POSE_INFEASIBLE
+    if not lowest_p_norm(min(4.0, p), p, bounds, offset, null, near, memory):
+        return POSE_NOT_CONVERGED
+    known[0] = 1
+    return POSE_SOLVED
+
+
+@formula
+def tension_at(bounds: Array, null: Array, point: Array, i: int) -> float:
+    """Tension of cable i at a point of the null space, in the distribution's variable without its offset."""
+    tension = bounds[START, i]
+    for k in range(point.size):
+        tension += null[k, i] * point[k]
+    return tension
+
+
+@formula
+def size_of(bounds: Array, offset: Array, null: Array, point: Array, p: float, scale: float) -> float:
+    """Sum of the p-th powers of the tensions over a scale."""
+    total = 0.0
+    for i in range(null.shape[1]):
+        total += abs((tension_at(bounds, null, point, i) + offset[i]) / scale) ** p
+    return total
+
+
+@glue
+def newton_target(
+    bounds: Array, offset: Array, null: Array, point: Array, p: float, slope: Array, curve: Array, target: Array
+) -> float:
+    """Fill slope, Cholesky factor of the curvature, and the point that Newton's step leads to without limits.
+
+    Returns the largest tension [N], in which both are measured; where it is 0 there is nothing to do.
+    """
+    r, m = null.shape
+    scale = 0.0
+    for i in range(m):
+        scale = max(scale, abs(tension_at(bounds, null, point, i) + offset[i]))
+    for k in range(r):
+        slope[k] = 0.0
+        for j in range(k + 1):
+            curve[k, j] = 0.0
+    for i in range(m):
+        size = abs(tension_at(bounds, null, point, i) + offset[i]) / scale
+        power = max(size, 1e-9) ** (p - 2.0)
+        for k in range(r):
+            slope[k] += power * size * null[k, i] * scale
+            for j in range(k + 1):
+                curve[k, j] += (p - 1.0) * power * null[k, i] * null[j, i]
+    largest = 0.0
+    for k in range(r):
+        largest = max(largest, curve[k, k])
+    for k in range(r):
+        curve[k, k] += 1e-13 * largest
+    factor_positive(curve, 0.0, curve)
+    for k in range(r):
+        target[k] = -slope[k]
+    solve_lower(curve, target)
+    solve_upper(curve, target)
+    for k in range(r):
+        target[k] += point[k]
+    return scale
+
+
+@glue
+def turn(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -> None:
+    """Fill null space (r, m) and target (r,) in coordinates in which the metric L L^T is the ordinary one."""
+    r, m = null.shape
+    for k in range(r):
+        goal[k] = 0.0
+        for j in range(k, r):
+            goal[k] += curve[j, k] * target[j]
+        for i in range(m):
+            turned[k, i] = null[k, i]
+        for j in range(k):
+            for i in range(m):
+                turned[k, i] -= curve[k, j] * turned[j, i]
+        for i in range(m):
+            turned[k, i] /= curve[k, k]
+
+
+@kernel
+def lowest_p_norm(
+    first: float, p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, memory: Memory
+) -> bool:
+    """Move the feasible point (r,) of near to that of least p-norm.
+
+    The exponent doubles from the first as the steps become short until it is p, so that Newton starts near.
+
+    Returns:
+        Whether it was found.
+    """
+    r, m = null.shape
+    point = near.point
+    vectors, at = block(memory.numbers, 0, 4, r)
+    slope, target, trial, goal = vectors[0], vectors[1], vectors[2], vectors[3]
+    curve, at = block(memory.numbers, at, r, r)
+    turned, at = block(memory.numbers, at, r, m)
+    largest = largest_bound(bounds)
+    slack = TOLERANCE * largest
+    exponent = first
+    for _ in range(STEPS):
+        scale = newton_target(bounds, offset, null, point, exponent, slope, curve, target)
+        if scale == 0.0:
+            return True
+        if most_violated_bound(null, bounds, target, 0.0, True) >= 0:
+            turn(null, curve, target, turned, goal)
+            if not nearest_point(turned, bounds, goal, slack * max(curve[0, 0], 1.0), near.held, target):
+                return False
+            solve_upper(curve, target)
+            for k in range(r):
+                if not math.isfinite(target[k]):
+                    target[k] = point[k]
+        length = 0.0
+        gain = 0.0
+        for k in range(r):
+            length = max(length, abs(target[k] - point[k]))
+            gain -= slope[k] * (target[k] - point[k])
+        before = size_of(bounds, offset, null, point, exponent, scale)
+        share = 1.0
+        for _half in range(HALVINGS):
+            for k in range(r):
+                trial[k] = point[k] + share * (target[k] - point[k])
+            after = size_of(bounds, offset, null, trial, exponent, scale)
+            least_gain = 1e-4 * share * exponent * gain / (scale * scale)
+            if after <= before - least_gain + 1e-15 * before:
+                break
+            share *= 0.5
+        for k in range(r):
+            point[k] = trial[k]
+        still = length <= STILL * largest or exponent * gain <= 1e-16 * scale * scale * before
+        if exponent == p and still:
+            return True
+        if length <= CLOSE * largest:
+            exponent = min(2.0 * exponent, p)
+    return False

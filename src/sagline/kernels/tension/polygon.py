@@ -1,0 +1,224 @@
+"""The polygon of feasible tensions in the null space of two redundant cables; docs/model.md, section 5.
+
+Cable i allows low_i <= t0_i + N_i . lambda <= high_i: a bound. A polygon is kept as its corners, counter-clockwise,
+each with the label of the side that leaves it: 2i for the lower limit of cable i, 2i + 1 for its upper limit, and from
+2m on for the sides of the box that stands in for infinity.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.core.arrays import Array, Indices
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, box_radius, inward, largest_bound, side_of
+from sagline.kernels.jit import formula, glue, kernel
+
+FLAT = 1e-12  # a null-space row shorter than this does not move the cable's tension
+SPARE_CORNERS = 6  # beyond two a cable: the box and the corner in the making
+
+
+@glue
+def cut(corners: Array, labels: Indices, count: int, x: float, y: float, side: float, label: int, slack: float) -> int:
+    """Keep the part of the polygon where (x, y) . corner >= side; returns the number of corners left.
+
+    Works in place. A half-plane cuts a convex polygon at most twice, where it enters and where it leaves.
+    """
+    leaving = -1  # last corner inside before the first outside
+    entering = -1  # first corner inside after the last outside
+    kept = 0
+    before = x * corners[count - 1, 0] + y * corners[count - 1, 1] - side >= -slack
+    for k in range(count):
+        here = x * corners[k, 0] + y * corners[k, 1] - side >= -slack
+        kept += 1 if here else 0
+        if before and not here:
+            leaving = k - 1 if k > 0 else count - 1
+        if here and not before:
+            entering = k
+        before = here
+    if kept == count or kept == 0:
+        return kept
+    # the new side runs from where the polygon leaves the half-plane to where it enters it
+    ax, ay = crossing(corners, leaving, leaving + 1 if leaving + 1 < count else 0, x, y, side)
+    bx, by = crossing(corners, entering, entering - 1 if entering > 0 else count - 1, x, y, side)
+    last_label = labels[entering - 1 if entering > 0 else count - 1]
+    place = make_room(corners, labels, count, leaving, entering, kept)
+    corners[place, 0], corners[place, 1], labels[place] = ax, ay, label
+    corners[place + 1, 0], corners[place + 1, 1], labels[place + 1] = bx, by, last_label
+    return kept + 2
+
+
+@formula
+def crossing(corners: Array, inside: int, outside: int, x: float, y: float, side: float) -> tuple[float, float]:
+    """Intersection of the line (x, y) . corner = side with the edge between two corners, one on each side of it."""
+    px, py = corners[inside, 0], corners[inside, 1]
+    qx, qy = corners[outside, 0], corners[outside, 1]
+    depth = x * px + y * py - side
+    share = min(max(depth / (depth - (x * qx + y * qy - side)), 0.0), 1.0)
+    return px + share * (qx - px), py + share * (qy - py)
+
+
+@kernel
+def make_room(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
+    """Remove the corners outside and make room for the two ends of a new side; returns the place of the first."""
+    if leaving >= entering:  # the corners inside lie between the two: move them to the front
+        for k in range(kept):
+            corners[k, 0], corners[k, 1] = corners[entering + k, 0], corners[entering + k, 1]
+            labels[k] = labels[entering + k]
+        return kept
+    gap = entering - leaving - 1  # the corners outside lie between the two: close or open the gap
+    if gap == 1:
+        for k in range(count, entering, -1):
+            corners[k, 0], corners[k, 1], labels[k] = corners[k - 1, 0], corners[k - 1, 1], labels[k - 1]
+    else:
+        for k in range(entering, count):
+            corners[k - gap + 2, 0], corners[k - gap + 2, 1] = corners[k, 0], corners[k, 1]
+            labels[k - gap + 2] = labels[k]
+    return leaving + 1
+
+
+@glue
+def widest_pair(null: Array) -> tuple[int, int, float]:
+    """Two cables whose rows span a large parallelogram, and its signed area.
+
+    One has the longest row; the other crosses it most.
+    """
+    m = null.shape[1]
+    first = second = 0
+    longest = 0.0
+    for i in range(m):
+        square = null[0, i] * null[0, i] + null[1, i] * null[1, i]
+        if square > longest:
+            longest, first = square, i
+    area = 0.0
+    for i in range(m):
+        cross = null[0, first] * null[1, i] - null[1, first] * null[0, i]
+        if abs(cross) > abs(area):
+            area, second = cross, i
+    return first, second, area
+
+
+@glue
+def start_polygon(bounds: Array, null: Array, radius: float, corners: Array, labels: Indices) -> tuple[int, int]:
+    """Fill the four corners that two crossing bounds have in common; an infinite limit is as far out as a box.
+
+    Returns the two bounds.
+    """
+    m = null.shape[1]
+    a, b, area = widest_pair(null)
+    for k in range(4):
+        # counter-clockwise where the area is positive: low a, low b, high a, high b each leave one corner
+        u = 2 * a + (0 if k == 0 or k == 3 else 1)
+        v = 2 * b + (0 if k < 2 else 1)
+        here = inward(u) * side_of(bounds, u) if bounds[HIGH, a] < math.inf or u == 2 * a else radius
+        there = inward(v) * side_of(bounds, v) if bounds[HIGH, b] < math.inf or v == 2 * b else radius
+        place = k if area > 0.0 else 3 - k
+        corners[place, 0] = (here * null[1, b] - there * null[1, a]) / area
+        corners[place, 1] = (there * null[0, a] - here * null[0, b]) / area
+    for k in range(4):
+        # counter-clockwise, the sides follow each other as low b, high a, high b, low a; clockwise turned round
+        if area > 0.0:
+            label = 2 * b if k == 0 else 2 * a + 1 if k == 1 else 2 * b + 1 if k == 2 else 2 * a
+        else:
+            label = 2 * b + 1 if k == 0 else 2 * a + 1 if k == 1 else 2 * b if k == 2 else 2 * a
+        labels[k] = label if bounds[HIGH, label // 2] < math.inf or label % 2 == 0 else 2 * m + k
+    return a, b
+
+
+@kernel
+def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
+    """Fill the corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon; returns how many, 0 if empty.
+
+    bounds: minimum-norm tensions and limits (3, m); null: orthonormal basis, one vector a row, (2, m).
+    """
+    m = null.shape[1]
+    largest = largest_bound(bounds)
+    slack = TOLERANCE * largest
+    a, b = start_polygon(bounds, null, box_radius(largest, bounds), corners, labels)
+    count = 4
+    for i in range(m):
+        x, y = null[0, i], null[1, i]
+        least = most = x * corners[0, 0] + y * corners[0, 1]
+        for k in range(1, count):
+            here = x * corners[k, 0] + y * corners[k, 1]
+            least, most = min(least, here), max(most, here)
+        below, above = bounds[LOW, i] - bounds[START, i], bounds[HIGH, i] - bounds[START, i]
+        if least > above + slack or most < below - slack or below > above + slack:
+            return 0
+        if abs(x) + abs(y) < FLAT or i == a or i == b:  # those two were kept from the start, up to rounding far out
+            continue
+        for upper in range(2):
+            if least < below - slack if upper == 0 else most > above + slack:
+                sign = inward(upper)
+                label = 2 * i + upper
+                count = cut(corners, labels, count, sign * x, sign * y, side_of(bounds, label), label, slack)
+                if count == 0:
+                    return 0
+    return count
+
+
+@kernel
+def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
+    """Fill the corners of a polygon whose sides are known; False where limits have moved so far that they are others.
+
+    The corners are those of the feasible polygon if its sides still follow each other in this order and no limit cuts
+    one of them off.
+    """
+    m = null.shape[1]
+    slack = TOLERANCE * largest_bound(bounds)
+    for k in range(count):
+        if labels[k] >= 2 * m:
+            return False
+    for k in range(count):
+        u, v = labels[k - 1 if k > 0 else count - 1], labels[k]
+        ux, uy = inward(u) * null[0, u // 2], inward(u) * null[1, u // 2]
+        vx, vy = inward(v) * null[0, v // 2], inward(v) * null[1, v // 2]
+        cross = ux * vy - uy * vx
+        if not cross > FLAT:
+            return False
+        here, there = side_of(bounds, u), side_of(bounds, v)
+        corners[k, 0] = (here * vy - there * uy) / cross
+        corners[k, 1] = (there * ux - here * vx) / cross
+    for k in range(count):
+        following = k + 1 if k + 1 < count else 0
+        label = labels[k]
+        x, y = inward(label) * null[0, label // 2], inward(label) * null[1, label // 2]
+        # inside lies to the left of the way along a side, so the way is the inward normal turned to the right
+        way = y * (corners[following, 0] - corners[k, 0]) - x * (corners[following, 1] - corners[k, 1])
+        if not way > 0.0:
+            return False
+    for i in range(m):
+        below, above = bounds[LOW, i] - bounds[START, i], bounds[HIGH, i] - bounds[START, i]
+        for k in range(count):
+            here = null[0, i] * corners[k, 0] + null[1, i] * corners[k, 1]
+            if here < below - slack or here > above + slack:
+                return False
+    return True
+
+
+@formula
+def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> tuple[float, float]:
+    """The point of the side from a to b that is nearest to a given one."""
+    ex = bx - ax
+    ey = by - ay
+    square = ex * ex + ey * ey
+    share = 0.0
+    if square > 0.0:
+        share = min(max(((x - ax) * ex + (y - ay) * ey) / square, 0.0), 1.0)
+    return ax + share * ex, ay + share * ey
+
+
+@kernel
+def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tuple[float, float]:
+    """Projection of a point outside a convex polygon onto it."""
+    best = math.inf
+    best_x = x
+    best_y = y
+    for k in range(count):
+        following = k + 1 if k + 1 < count else 0
+        px, py = nearest_on_side(corners[k, 0], corners[k, 1], corners[following, 0], corners[following, 1], x, y)
+        distance = (px - x) * (px - x) + (py - y) * (py - y)
+        if distance < best:
+            best = distance
+            best_x = px
+            best_y = py
+    return best_x, best_y

@@ -1,0 +1,51 @@
+"""Where pulls turn, against the sign of their differences on fine grids."""
+
+import numpy as np
+import pytest
+
+from sagline.kernels.cable.sag_forces import LEAST_TENSION, MOST_TENSION, Curves
+from tests.kernels.cable.curves import pulls_of, random_curves, with_turns
+
+GRID = 3000
+
+
+def turns_on_a_grid(curves: Curves, i: int) -> tuple[list[float], list[float]]:
+    """Tensions on a fine grid at which the pull has a least and a largest value between its neighbors."""
+    tensions = np.geomspace(curves.cables.low[i], curves.cables.high[i], GRID)
+    pulls = pulls_of(curves, i, tensions)
+    step = np.diff(pulls)
+    step[np.abs(step) < 1e-13 * curves.cables.half_weight[i]] = 0.0
+    falls_then_rises = np.flatnonzero((step[:-1] < 0) & (step[1:] > 0)) + 1
+    rises_then_falls = np.flatnonzero((step[:-1] > 0) & (step[1:] < 0)) + 1
+    return list(tensions[falls_then_rises]), list(tensions[rises_then_falls])
+
+
+def check(curves: Curves) -> tuple[int, int]:
+    """Compare the turns of all cables with those on a grid; how many of each kind there were."""
+    found = [0, 0]
+    for i in range(curves.cables.low.size):
+        width = np.log(curves.cables.high[i] / curves.cables.low[i]) / GRID
+        for kind, row in enumerate((LEAST_TENSION, MOST_TENSION)):
+            grid = turns_on_a_grid(curves, i)[kind]
+            turn = curves.turns[row, i]
+            assert len(grid) <= 1
+            if grid:
+                found[kind] += 1
+                assert np.log(turn / grid[0]) == pytest.approx(0.0, abs=2 * width + 1e-3)
+            elif np.isfinite(turn):  # flatter than a grid can see: it must be next to an end, or a shallow pair
+                assert curves.cables.sine[i] < 0
+                assert curves.cables.low[i] <= turn <= curves.cables.high[i]
+    return found[0], found[1]
+
+
+def test_pulls_turn_where_a_fine_grid_of_them_does() -> None:
+    rng = np.random.default_rng(11)
+    counts = np.array([check(with_turns(random_curves(rng, 8))) for _ in range(30)]).sum(axis=0)
+    assert (counts > 10).all()
+
+
+@pytest.mark.soak
+def test_twenty_thousand_cables_turn_where_they_should() -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(2500):
+        check(with_turns(random_curves(rng, 8)))

@@ -1,0 +1,30 @@
+"""Weightless cables and what is asked of them, written down as kernels take it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.core.arrays import Array
+from sagline.kernels.cable.sag_forces import TURN_ROWS, Curves
+from sagline.kernels.cable.terms import Model
+from sagline.kernels.codes import STRAIGHT
+from sagline.kernels.tension.least_change import Change, Demand
+from tests.kernels.cable.plain import plain_cables
+
+
+def weightless(low: Array, high: Array) -> Curves:
+    """Curves of cables without weight between limits (m,)."""
+    m = len(low)
+    given = {"density": np.zeros(m), "half_weight": np.zeros(m), "stiffness": np.full(m, 1e6)}
+    cables = plain_cables(m, 1.0, **given, low=low.copy(), high=high.copy())
+    return Curves(Model(STRAIGHT, 0.0, 0.0, 9.81), cables, np.full((TURN_ROWS, m), np.nan), np.zeros(m, dtype=np.int8))
+
+
+def demand_of(matrix: Array, right: Array, soft: int) -> Demand:
+    """What is asked of weightless cables with a structure matrix (n, m), of which the first rows are forces."""
+    return Demand(matrix.copy(), np.zeros_like(matrix), right.copy(), soft, float(np.abs(right).max()))
+
+
+def change_from(tau: Array, n: int) -> Change:
+    """A search that begins at tensions (m,); the rest must be written before it is read."""
+    return Change(tau.copy(), np.full(len(tau), np.nan), np.full(n, np.nan), np.full(n, np.nan))
