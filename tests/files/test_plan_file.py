@@ -17,7 +17,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import FileError, SaglineWarning, dump_robot
-from sagline.files import format, plan_file
+from sagline.files import format, netcdf
 from sagline.files.netcdf import Seal
 from sagline.files.robot_file import parse_robot
 from tests.files.plans import OUTSIDE, SUSPENDED, a_plan, assert_same
@@ -49,7 +49,7 @@ def data(content: bytes) -> xr.Dataset:
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     """Read a data set as from a file without a digest, of before files carried one."""
-    monkeypatch.setattr(plan_file, "parse_robot", cache(parse_robot))
+    monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Plan:
         monkeypatch.setattr(format, "read_dataset", lambda *_: (data, Seal.MISSING))

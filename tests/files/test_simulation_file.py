@@ -14,7 +14,7 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline import EnergyBalance, Occurrence
-from sagline.files import format, simulation_file
+from sagline.files import format, netcdf
 from sagline.files.netcdf import Seal, seal
 from sagline.files.robot_file import parse_robot
 from sagline.files.simulation_file import EVENTS, LARGEST, NODES, SAMPLES, TIME
@@ -127,7 +127,7 @@ Reader = Callable[[xr.Dataset], sl.Simulation]
 @pytest.fixture
 def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     """Read a data set as from a file that somebody edited and sealed anew."""
-    monkeypatch.setattr(simulation_file, "parse_robot", cache(parse_robot))
+    monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Simulation:
         monkeypatch.setattr(format, "read_dataset", lambda *_: (data, Seal.WHOLE))

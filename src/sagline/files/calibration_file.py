@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -21,7 +22,17 @@ from sagline.core.errors import InvalidValueError
 from sagline.files.format import Format
 from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import STEP, Known, Quantity, check_indices, check_labels, check_variable
+from sagline.files.variables import (
+    NONE,
+    SOMEWHERE,
+    STEP,
+    Quantity,
+    check_indices,
+    check_variables,
+    record_variables,
+    values_of,
+    variables_of,
+)
 from sagline.kernels.calibration.kinds import KIND_ROWS
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -33,46 +44,38 @@ READ: Final = ("lengths", "counts")  # by Parameters.counted: what was read of t
 P: Final = ("parameter",)
 N: Final = ("pose",)
 PARAMETERS: Final = (
-    Quantity("parameter_name", "names", P, "", "kind of each number", values=str),
-    Quantity("parameter_label", "labels", P, "", "what each number is called", values=str),
-    Quantity("parameter_unit", "units", P, "", "unit of each number, 1 for none", values=str),
-    Quantity("parameter_cable", "cables", P, "", "cable of each number, -1 for one of all", values=int),
-    Quantity("parameter_place", "where", ("kind_row", "cable"), "", "number of each row of kinds, -1", values=int),
-    Quantity("prior", "prior", P, "", "what was known beforehand, in the units of the numbers"),
-    Quantity("prior_deviation", "prior_deviation", P, "", "its standard deviation", infinite=True),
-    Quantity("prior_stated", "stated", P, "", "whether tolerances or the caller said so", values=bool),
-    Quantity("logarithmic", "logarithmic", P, "", "whether the logarithm was looked for", values=bool),
+    Quantity("parameter_name", P, "", "kind of each number", "names", values=str),
+    Quantity("parameter_label", P, "", "what each number is called", "labels", values=str),
+    Quantity("parameter_unit", P, "", "unit of each number, 1 for none", "units", values=str),
+    Quantity("parameter_cable", P, "", "cable of each number, -1 for one of all", "cables", values=int),
+    Quantity("parameter_place", ("kind_row", "cable"), "", "number of each row of kinds, -1", "where", values=int),
+    Quantity("prior", P, "", "what was known beforehand, in the units of the numbers"),
+    Quantity("prior_deviation", P, "", "its standard deviation", infinite=True),
+    Quantity("prior_stated", P, "", "whether tolerances or the caller said so", "stated", values=bool),
+    Quantity("logarithmic", P, "", "whether the logarithm was looked for", values=bool),
 )
 FOUND: Final = (
-    Quantity("length_offset", "length_offset", ("cable",), "m", "to be added to lengths that the machine believes"),
-    Quantity("status", "status", (), "", "how the calibration ended", codes=CalibrationStatus),
-    Quantity("value", "values", P, "", "what was found, in the units of the numbers"),
-    Quantity(
-        "covariance",
-        "covariance",
-        (*P, "other_parameter"),
-        "",
-        "covariance of the values",
-        known=Known.SOMEWHERE,
-        infinite=True,
-    ),
-    Quantity("chi_squared", "chi_squared", (), "1", "sum of squares of residuals in deviations", low=0.0),
-    Quantity("degrees_of_freedom", "degrees_of_freedom", (), "", "what chi_squared is compared with", values=int),
-    Quantity("iterations", "iterations", (), "", "iterations of the least squares", values=int),
-    Quantity("row", "rows", N, "", "rows of the log that were used", values=int),
-    Quantity("position", "poses.position", (*N, "axis"), "m", "where the platform stood"),
-    Quantity("quaternion", "poses.quaternion", (*N, "quaternion_part"), "1", "rotation from platform to world"),
-    Quantity("unstrained_length", "unstrained_length", (*N, "cable"), "m", "true lengths of the cables", low=0.0),
+    Quantity("length_offset", ("cable",), "m", "to be added to lengths that the machine believes"),
+    Quantity("status", (), "", "how the calibration ended", codes=CalibrationStatus),
+    Quantity("value", P, "", "what was found, in the units of the numbers", "values"),
+    Quantity("covariance", (*P, "other_parameter"), "", "covariance of the values", known=SOMEWHERE, infinite=True),
+    Quantity("chi_squared", (), "1", "sum of squares of residuals in deviations", low=0.0),
+    Quantity("degrees_of_freedom", (), "", "what chi_squared is compared with", values=int),
+    Quantity("iterations", (), "", "iterations of the least squares", values=int),
+    Quantity("row", N, "", "rows of the log that were used", "rows", values=int),
+    Quantity("position", (*N, "axis"), "m", "where the platform stood", "poses.position"),
+    Quantity("quaternion", (*N, "quaternion_part"), "1", "rotation from platform to world", "poses.quaternion"),
+    Quantity("unstrained_length", (*N, "cable"), "m", "true lengths of the cables", low=0.0),
     Quantity(
         "residual",
-        "residuals",
         (*N, "reading"),
         "",
         "readings less predictions: lengths [m], load cells [N], position [m], rotation [rad]",
-        known=Known.SOMEWHERE,
+        "residuals",
+        SOMEWHERE,
     ),
-    Quantity("chi_squared_of_pose", "chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
-    Quantity("weight", "weights", N, "1", "less than 1 for a pose that does not fit the rest", low=0.0),
+    Quantity("chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
+    Quantity("weight", N, "1", "less than 1 for a pose that does not fit the rest", "weights", low=0.0),
 )
 SENSORS: Final = {  # name in the file -> attribute, unit; each of one number, or one a cable or axis
     "length_deviation": ("cable", "m"),
@@ -81,25 +84,25 @@ SENSORS: Final = {  # name in the file -> attribute, unit; each of one number, o
     "rotation_deviation": ("axis", "rad"),
 }
 PLACED: Final = (
-    Quantity("measuring_position", "frame.position", ("axis",), "m", "where the measuring system stands"),
-    Quantity("measuring_quaternion", "frame.quaternion", ("quaternion_part",), "1", "its rotation to the world"),
-    Quantity("target", "target", ("axis",), "m", "the measured point of the platform"),
+    Quantity("measuring_position", ("axis",), "m", "where the measuring system stands", "frame.position"),
+    Quantity("measuring_quaternion", ("quaternion_part",), "1", "its rotation to the world", "frame.quaternion"),
+    Quantity("target", ("axis",), "m", "the measured point of the platform"),
 )
 LEFT_OUT: Final = (
-    Quantity("left_out_row", "", ("omission",), "", "rows of the log that were left out", values=int),
-    Quantity("left_out_reason", "", ("omission",), "", "why", codes=Omission),
+    Quantity("left_out_row", ("omission",), "", "rows of the log that were left out", values=int),
+    Quantity("left_out_reason", ("omission",), "", "why", codes=Omission),
 )
 OUTLIERS: Final = (
-    Quantity("outlier_row", "row", ("outlier",), "", "row of the log", values=int),
-    Quantity("outlier_cable", "cable", ("outlier",), "", "its cable, -1 for the whole pose", values=int),
-    Quantity("outlier_quantity", "quantity", ("outlier",), "", "what does not fit", values=str),
-    Quantity("outlier_size", "size", ("outlier",), "", "by how much [m, N or rad]"),
-    Quantity("outlier_deviations", "deviations", ("outlier",), "1", "the same in standard deviations"),
+    Quantity("outlier_row", ("outlier",), "", "row of the log", "row", values=int),
+    Quantity("outlier_cable", ("outlier",), "", "its cable, -1 for the whole pose", "cable", values=int),
+    Quantity("outlier_quantity", ("outlier",), "", "what does not fit", "quantity", values=str),
+    Quantity("outlier_size", ("outlier",), "", "by how much [m, N or rad]", "size"),
+    Quantity("outlier_deviations", ("outlier",), "1", "the same in standard deviations", "deviations"),
 )
 CROSS_VALIDATION: Final = (
-    Quantity("folds", "folds", (), "", "parts of the poses that were predicted from the others", values=int),
+    Quantity("folds", (), "", "parts of the poses that were predicted from the others", values=int),
     *(
-        Quantity(f"left_out_{name}", name, (), unit, f"root mean square {what}", known=Known.SOMEWHERE, low=0.0)
+        Quantity(f"left_out_{name}", (), unit, f"root mean square {what}", name, SOMEWHERE, 0.0)
         for name, unit, what in (
             ("tension", "N", "of load cells at poses left out"),
             ("position", "m", "of positions at poses left out"),
@@ -111,16 +114,12 @@ CROSS_VALIDATION: Final = (
 
 
 def directions(group: str) -> tuple[Quantity, ...]:
-    """Variables of the directions that data leave open, or hardly tell.
-
-    Args:
-        group: "gauge" or "cannot_tell_apart".
-    """
+    """Quantities of the directions in parameter space that are unobservable or weakly observable."""
     return (
-        Quantity(f"{group}_name", "name", (group,), "", "what each is", values=str),
-        Quantity(f"{group}_vector", "vector", (group, *P), "", "combination of the numbers, in their units"),
-        Quantity(f"{group}_known", "known", (group,), "1", "share of its prior deviation that is left", low=0.0),
-        Quantity(f"{group}_step", "step", (group,), "", "what to do about it", values=str),
+        Quantity(f"{group}_name", (group,), "", "what each is", "name", values=str),
+        Quantity(f"{group}_vector", (group, *P), "", "combination of the numbers, in their units", "vector"),
+        Quantity(f"{group}_known", (group,), "1", "share of its prior deviation that is left", "known", low=0.0),
+        Quantity(f"{group}_step", (group,), "", "what to do about it", "step", values=str),
     )
 
 
@@ -132,57 +131,29 @@ OUTLYING = ("length", "load cell", "position", "rotation")
 
 
 def check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
-    """Refuse a data set that is no calibration, whatever its file looked like.
-
-    Args:
-        data: The data set.
-        robot: The robot that was found.
-        before: The robot as it was.
-        sensors: Variables of the sensors' deviations.
-
-    Raises:
-        KeyError: If a variable or attribute is missing.
-        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
-    """
+    """Refuse a data set that is no calibration, given its two robots and the quantities of its sensors."""
     m = robot.cable_count
     if before.cable_count != m:
         raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)
-    check_labels(data)
-    quantities = [*FOUND, *PARAMETERS, *PLACED, *sensors, *OUTLIERS, *LEFT_OUT, *_all(DIRECTIONS)]
+    directions = [one for columns in DIRECTIONS.values() for one in columns]
+    quantities = [*FOUND, *PARAMETERS, *PLACED, *sensors, *OUTLIERS, *LEFT_OUT, *directions]
     if "folds" in data.variables:
         quantities += CROSS_VALIDATION
     sizes = {str(name): size for name, size in data.sizes.items()}
     fixed = {"cable": m, "reading": 2 * m + 6, "kind_row": KIND_ROWS, "other_parameter": sizes.get("parameter", 0)}
-    for quantity in quantities:
-        check_variable(quantity, data.variables[quantity.name], (), sizes | fixed, np.array(True))
-    for name, low, high in (
-        ("parameter_cable", -1, m),
-        ("parameter_place", -1, sizes["parameter"]),
-        ("outlier_cable", -1, m),
-        ("row", 0, sys.maxsize),
-        ("outlier_row", 0, sys.maxsize),
-        ("left_out_row", 0, sys.maxsize),
-    ):
-        check_indices(name, data.variables[name].values, low, high)
+    check_variables(data, quantities, sizes | fixed)
+    ranges = {"parameter_cable": (-1, m), "parameter_place": (-1, sizes["parameter"]), "outlier_cable": (-1, m)}
+    check_indices(data, ranges | dict.fromkeys(("row", "outlier_row", "left_out_row"), (0, sys.maxsize)))
     for name, words in (("parameter_name", KINDS), ("parameter_unit", UNITS), ("outlier_quantity", OUTLYING)):
         for word in data.variables[name].values:
             choice(str(word), name, words)
     choice(str(data.attrs["read"]), "read", READ)
     for name in ("log", "date"):
         text(data.attrs[name], name)
-    reasons = [choice(word, "left_out", _NAMES) for word in text(data.attrs["left_out"], "left_out").split()]
+    names = [reason.name.lower() for reason in Omission]
+    reasons = [choice(word, "left_out", names) for word in text(data.attrs["left_out"], "left_out").split()]
     for code in np.unique(data.variables["left_out_reason"].values).tolist():
         choice(Omission(code).name.lower(), "left_out_reason", reasons)
-
-
-_NAMES = {reason.name.lower(): reason for reason in Omission}
-
-
-def _all(groups: dict[str, tuple[Quantity, ...]]) -> list[Quantity]:
-    return [one for columns in groups.values() for one in columns]
-
-
-_NONE: Final = -1  # cable of an outlier that is a whole pose
 
 
 def load_calibration(file: os.PathLike[str] | str) -> Calibration:
@@ -219,45 +190,26 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
 
 def pack(found: Calibration) -> Dataset:
     """Data set of a calibration."""
-    quantities = [(one, one.of(found)) for one in FOUND]
-    quantities += [(one, one.of(found.parameters)) for one in PARAMETERS]
-    quantities += [(one, one.of(found.sensors)) for one in PLACED]
-    quantities += [(_sensor(name, np.ndim(value)), value) for name, value in _deviations(found.sensors)]
-    quantities += [(one, _column(one, found.outliers)) for one in OUTLIERS]
+    variables = variables_of(found, FOUND) | variables_of(found.parameters, PARAMETERS)
+    dimensions, units, attributes = variables["parameter_unit"]
+    variables["parameter_unit"] = dimensions, np.where(units == "", "1", units).astype(object), attributes
+    deviations = {name: getattr(found.sensors, name) for name in SENSORS}
+    sensors = [_sensor(name, np.ndim(value)) for name, value in deviations.items() if value is not None]
+    variables |= variables_of(found.sensors, (*PLACED, *sensors)) | record_variables(found.outliers, OUTLIERS)
     for group, columns in DIRECTIONS.items():
-        quantities += [(one, _column(one, getattr(found, group), len(found.values))) for one in columns]
-    if found.cross_validation is not None:
-        quantities += [(one, one.of(found.cross_validation)) for one in CROSS_VALIDATION]
-    omitted = [(row, reason.value) for reason, rows in found.left_out.items() for row in rows]
-    quantities += list(zip(LEFT_OUT, np.array(omitted, dtype=np.int64).reshape(-1, 2).T, strict=True))
-    variables = {one.name: (one.parts, _stored(one, value), one.attributes) for one, value in quantities}
+        variables |= record_variables(getattr(found, group), columns, len(found.values))
+    variables |= variables_of(found.cross_validation, CROSS_VALIDATION)
+    omitted = np.array([(row, reason) for reason, rows in found.left_out.items() for row in rows], dtype=np.int64)
+    for one, values in zip(LEFT_OUT, omitted.reshape(-1, 2).T, strict=True):
+        variables[one.name] = one.parts, values.astype(one.type), one.attributes
     return labeled_dataset(variables, _attributes(found))
 
 
-def _stored(quantity: Quantity, values: Any) -> Any:
-    """Values of the type that the file has them in; what has no unit is said to be of 1."""
-    array = np.asarray(values, dtype=quantity.type)
-    return np.where(array == "", "1", array).astype(object) if quantity.name == "parameter_unit" else array
-
-
-def _column(quantity: Quantity, parts: Sequence[Any], each: int = 0) -> Any:
-    """One attribute of several outliers or directions, of which each may have so many numbers."""
-    values = [quantity.of(part) for part in parts]
-    if quantity.name.endswith("_vector"):
-        return np.reshape(values, (len(values), each))
-    return [_NONE if value is None else value for value in values]
-
-
-def _deviations(sensors: Sensors) -> Iterable[tuple[str, Any]]:
-    """Those of what measures."""
-    return ((name, value) for name in SENSORS if (value := getattr(sensors, name)) is not None)
-
-
 def _sensor(name: str, axes: int) -> Quantity:
-    """The variable of a sensor's deviation, of one number or of one a cable or axis."""
+    """Deviation of a sensor: one number, or one of each cable or axis."""
     part, unit = SENSORS[name]
     long_name = f"standard deviation of a {name.removesuffix('_deviation')} that is read"
-    return Quantity(name, name, (part,) if axes else (), unit, long_name, low=0.0)
+    return Quantity(name, (part,) if axes else (), unit, long_name, low=0.0)
 
 
 def _attributes(found: Calibration) -> dict[str, Any]:
@@ -280,9 +232,7 @@ def unpack(path: Path, data: Dataset) -> Calibration:
     measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # which is always there
     sensors = [_sensor(name, data.variables[name].ndim) for name in dict.fromkeys(measured)]
     check_calibration(data, robot, before, sensors)
-
-    def values(name: str) -> Any:
-        return locked(np.asarray(data[name].values, order="C"))
+    values = partial(values_of, data)
 
     def number(quantity: Quantity) -> Any:
         return data[quantity.name].values.item()
@@ -320,7 +270,7 @@ def unpack(path: Path, data: Dataset) -> Calibration:
 
 
 def _outlier(row: int, cable: int, quantity: str, size: float, deviations: float) -> Outlier:
-    return Outlier(row, None if cable == _NONE else cable, quantity, size, deviations)
+    return Outlier(row, None if cable == NONE else cable, quantity, size, deviations)
 
 
 def _directions(names: Any, vectors: Any, known: Any, steps: Any) -> tuple[Direction, ...]:

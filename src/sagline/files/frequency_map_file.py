@@ -7,38 +7,32 @@ from typing import TYPE_CHECKING, Final
 from sagline.dynamics.frequency_map import FrequencyMap
 from sagline.dynamics.vibration_status import VibrationStatus
 from sagline.files.format import Format
-from sagline.files.netcdf import labeled_dataset
+from sagline.files.netcdf import attributes_with_units, labeled_dataset
 from sagline.files.robot_file import dump_robot
-from sagline.files.variables import Known, Quantity
+from sagline.files.variables import SOMEWHERE, Quantity, variables_of
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-ROWS: Final = "pose"
 QUANTITIES: Final = (
-    Quantity("position", "pose.position", ("axis",), "m", "position of the platform origin in the world"),
-    Quantity("quaternion", "pose.quaternion", ("quaternion_part",), "1", "rotation from platform to world"),
-    Quantity("status", "status", (), "", "whether the state has linear vibrations", codes=VibrationStatus),
-    Quantity("frequency", "frequency", (), "Hz", "lowest frequency with cable mass", known=Known.SOMEWHERE),
-    Quantity("massless_frequency", "massless_frequency", (), "Hz", "lowest frequency, massless cables"),
-    Quantity("platform_share", "platform_share", (), "1", "platform's share of the lowest mode with cable mass"),
-    Quantity("peak", "peak", (), "m/N", "strongest answer to a force, with cable mass"),
-    Quantity("peak_frequency", "peak_frequency", (), "Hz", "where that is"),
+    Quantity("position", ("axis",), "m", "position of the platform origin in the world", "pose.position"),
+    Quantity("quaternion", ("quaternion_part",), "1", "rotation from platform to world", "pose.quaternion"),
+    Quantity("status", (), "", "whether the state has linear vibrations", codes=VibrationStatus),
+    Quantity("frequency", (), "Hz", "lowest frequency with cable mass", known=SOMEWHERE),
+    Quantity("massless_frequency", (), "Hz", "lowest frequency, massless cables"),
+    Quantity("platform_share", (), "1", "platform's share of the lowest mode with cable mass"),
+    Quantity("peak", (), "m/N", "strongest answer to a force, with cable mass"),
+    Quantity("peak_frequency", (), "Hz", "where that is"),
 )
 
 
 def pack(found: FrequencyMap) -> Dataset:
     """Data set of a frequency map."""
-    variables = {one.name: ((ROWS, *one.parts), one.of(found), one.attributes) for one in QUANTITIES}
+    variables = variables_of(found, QUANTITIES, ("pose",))
     attributes = {
         **FORMAT.attributes(f"Frequencies of {found.robot.name} over poses"),
-        "up_to": found.up_to,
-        "up_to_units": "Hz",
-        "loss_time": found.damping.loss_time,
-        "loss_time_units": "s",
-        "air_damping": found.damping.air_damping,
-        "air_damping_units": "N s/m2",
-        "modal_damping": found.damping.modal_damping,
+        **attributes_with_units(found, {"up_to": "Hz"}),
+        **attributes_with_units(found.damping, {"loss_time": "s", "air_damping": "N s/m2", "modal_damping": None}),
         "robot": dump_robot(found.robot),
     }
     return labeled_dataset(variables, attributes)

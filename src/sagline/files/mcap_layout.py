@@ -15,7 +15,7 @@ from sagline.control.execution import Execution
 from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array
-from sagline.files.variables import Known, Quantity
+from sagline.files.variables import SOMEWHERE, Quantity
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -30,17 +30,17 @@ GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part"
 
 
 def _real(name: str, place: str, parts: tuple[str, ...], unit: str, what: str) -> Quantity:
-    return Quantity(name, place, parts, unit, what, known=Known.SOMEWHERE, infinite=True)
+    return Quantity(name, parts, unit, what, place, SOMEWHERE, infinite=True)
 
 
 def _whole(name: str, place: str, parts: tuple[str, ...], what: str) -> Quantity:
-    return Quantity(name, place, parts, "", what, values=int)
+    return Quantity(name, parts, "", what, place, values=int)
 
 
 TIME: Final = _real("time", "time", (), "s", "time on the clock of the link")
 CYCLES: Final = (
-    Quantity("answered", "answered", (), "", "whether there was a sample", values=bool),
-    Quantity("state", "state", (), "", "state of the controller at the end of the cycle", codes=State),
+    Quantity("answered", (), "", "whether there was a sample", values=bool),
+    Quantity("state", (), "", "state of the controller at the end of the cycle", codes=State),
     _real("late", "late", (), "s", "by how much the cycle began too late"),
     _real("clock", "clock", (), "s", "where on the plan the cycle was, from its start; none beside it"),
     _real("position", "position", AXIS, "m", "position of the platform origin, estimated from the encoders"),

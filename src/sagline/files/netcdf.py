@@ -15,8 +15,10 @@ import numpy as np
 
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.reading import kind_of
+from sagline.files.robot_file import parse_robot
 from sagline.files.variables import PARTS
 from sagline.files.writing import written_whole
+from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -325,6 +327,14 @@ def _cause(path: Path, content: Content) -> tuple[str, str]:
     return f"is {kind}, no {content.made}", content.give
 
 
+def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
+    """Attributes of an object that are numbers, each followed by its unit unless that is None."""
+    found: dict[str, Any] = {}
+    for name, unit in units.items():
+        found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
+    return found
+
+
 def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
     """A model, method or the like as attributes: its name, and each of its options that is set.
 
@@ -379,3 +389,12 @@ def choice_of(
 
 def _plain(value: Any) -> Any:
     return value.item() if isinstance(value, np.generic) else value
+
+
+def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:
+    """Robot of a data set; FileError if it is none, or has another number of cables."""
+    robot = parse_robot(str(data.attrs["robot"]), f"{path}, {item}")
+    if data.sizes["cable"] != robot.cable_count:
+        reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
+        raise FileError(path, reason, "Write it again.", item="cable")
+    return robot

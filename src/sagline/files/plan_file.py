@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from dataclasses import fields
+from functools import partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,12 +13,11 @@ import numpy as np
 
 from sagline.cables.model import CableState, CableStatus
 from sagline.cables.models import MODELS
-from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.format import Format
-from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset, numbered
-from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import STEP, Known, Quantity, check_labels, check_variable
+from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset, numbered, robot_of
+from sagline.files.robot_file import dump_robot
+from sagline.files.variables import SOLVED, SOMEWHERE, STEP, Quantity, check_variables, values_of, variables_of
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
@@ -30,197 +30,118 @@ from sagline.tension.methods import METHODS
 if TYPE_CHECKING:
     from xarray import Dataset
 
+CABLE: Final = ("cable",)
 QUANTITIES = (
+    Quantity("unstrained_length", CABLE, "m", "unstrained length L to wind", known=SOLVED, low=0.0),
+    Quantity("chord_tension", CABLE, "N", "tension along the chord, T_x / cos phi", known=SOLVED, low=0.0),
     Quantity(
-        "unstrained_length",
-        "unstrained_length",
-        ("cable",),
-        "m",
-        "unstrained length L to wind",
-        known=Known.SOLVED,
-        low=0.0,
-    ),
-    Quantity(
-        "chord_tension",
-        "chord_tension",
-        ("cable",),
-        "N",
-        "tension along the chord, T_x / cos phi",
-        known=Known.SOLVED,
-        low=0.0,
-    ),
-    Quantity(
-        "horizontal_tension",
-        "state.cables.horizontal_tension",
-        ("cable",),
-        "N",
-        "horizontal tension T_x",
-        known=Known.SOLVED,
-        low=0.0,
+        "horizontal_tension", CABLE, "N", "horizontal tension T_x", "state.cables.horizontal_tension", SOLVED, 0.0
     ),
     Quantity(
         "vertical_force",
-        "state.cables.vertical_force",
-        ("cable",),
+        CABLE,
         "N",
         "vertical force T_z on the cable at its platform end, up positive",
-        known=Known.SOLVED,
+        "state.cables.vertical_force",
+        SOLVED,
     ),
+    Quantity("span", CABLE, "m", "horizontal distance from frame end to platform end", "state.cables.span", low=0.0),
+    Quantity("rise", CABLE, "m", "height of the platform end above the frame end", "state.cables.rise"),
+    Quantity("cable_status", CABLE, "", "how each cable's calculation ended", "state.cables.status", codes=CableStatus),
+    Quantity("pose_status", (), "", "how each pose's calculation ended", "status", codes=PoseStatus),
     Quantity(
-        "span", "state.cables.span", ("cable",), "m", "horizontal distance from frame end to platform end", low=0.0
-    ),
-    Quantity("rise", "state.cables.rise", ("cable",), "m", "height of the platform end above the frame end"),
-    Quantity("cable_status", "state.cables.status", ("cable",), "", "how each cable's calculation ended", CableStatus),
-    Quantity("pose_status", "status", (), "", "how each pose's calculation ended", PoseStatus),
-    Quantity(
-        "shortfall",
         "shortfall",
         (),
         "N",
         "smallest change of the force that would make the pose feasible",
-        known=Known.SOMEWHERE,
+        known=SOMEWHERE,
         low=0.0,
         infinite=True,
     ),
     Quantity(
         "wrench_residual",
-        "wrench_residual",
         ("residual_part",),
         "N, N m",
         "norms of the unbalanced force and moment in the free motions",
-        known=Known.SOLVED,
+        known=SOLVED,
         low=0.0,
     ),
-    Quantity(
-        "blocking",
-        "blocking",
-        ("cable",),
-        "",
-        "whether the cable's limits stand against the needed wrench",
-        values=bool,
-    ),
+    Quantity("blocking", CABLE, "", "whether the cable's limits stand against the needed wrench", values=bool),
     Quantity(
         "wrench",
-        "state.wrench",
         ("wrench_part",),
         "N, N m",
         "external and inertial wrench about the center of mass in world axes, without gravity",
+        "state.wrench",
     ),
-    Quantity("position", "state.pose.position", ("axis",), "m", "position of the platform origin in the world"),
+    Quantity("position", ("axis",), "m", "position of the platform origin in the world", "state.pose.position"),
     Quantity(
-        "quaternion",
-        "state.pose.quaternion",
-        ("quaternion_part",),
-        "1",
-        "rotation from platform to world, scalar last",
+        "quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last", "state.pose.quaternion"
     ),
 )
 
 # of a plan whose cables have something behind them
 MACHINE = (
-    Quantity(
-        "free_length",
-        "free_length",
-        ("cable",),
-        "m",
-        "unstrained length of the hanging cable",
-        known=Known.SOLVED,
-        low=0.0,
-    ),
+    Quantity("free_length", CABLE, "m", "unstrained length of the hanging cable", known=SOLVED, low=0.0),
     Quantity(
         "free_chord_tension",
-        "state.cables.chord_tension",
-        ("cable",),
+        CABLE,
         "N",
         "tension along the chord of the hanging cable, from where it leaves its pulley",
-        known=Known.SOLVED,
-        low=0.0,
+        "state.cables.chord_tension",
+        SOLVED,
+        0.0,
+    ),
+    Quantity("wrap_angle", CABLE, "rad", "angle over which the cable lies on its pulley", known=SOLVED, low=0.0),
+    Quantity(
+        "wrapped_length", CABLE, "m", "unstrained length on the pulley", "state.contact.wrapped_length", SOLVED, 0.0
     ),
     Quantity(
-        "wrap_angle",
-        "wrap_angle",
-        ("cable",),
-        "rad",
-        "angle over which the cable lies on its pulley",
-        known=Known.SOLVED,
-        low=0.0,
-    ),
-    Quantity(
-        "wrapped_length",
-        "state.contact.wrapped_length",
-        ("cable",),
-        "m",
-        "unstrained length on the pulley",
-        known=Known.SOLVED,
-        low=0.0,
-    ),
-    Quantity(
-        "dead_length",
-        "state.contact.dead_length",
-        ("cable",),
-        "m",
-        "unstrained length between pulley and drum",
-        known=Known.SOLVED,
-        low=0.0,
+        "dead_length", CABLE, "m", "unstrained length between pulley and drum", "state.contact.dead_length", SOLVED, 0.0
     ),
     Quantity(
         "chord_sine",
-        "state.contact.chord_sine",
-        ("cable",),
+        CABLE,
         "1",
         "sine of the slope of the chord that touches the pulley",
-        known=Known.SOLVED,
+        "state.contact.chord_sine",
+        SOLVED,
     ),
 )
 
 # of one whose friction counts
 WINDING = Quantity(
     "winding",
-    "state.contact.winding",
-    ("cable",),
+    CABLE,
     "1",
     "direction of friction: 1 winding in, -1 paying out, 0 standing",
+    "state.contact.winding",
     low=-1.0,
 )
 
-# of a plan that has them: one of a file written before they were kept has none. A proof more is a line here.
+# of a plan that has them; one of a file written before they were kept has none
 PROOF = (
     Quantity(
-        "farkas",
         "farkas",
         ("wrench_part",),
         "1, 1/m",
         "vector y that proves a pose infeasible: along it the cables give less than is needed, at any tensions",
-        known=Known.SOMEWHERE,
+        known=SOMEWHERE,
     ),
+    Quantity("needed", ("wrench_part",), "N, N m", "wrench J tau that the chord tensions must supply", known=SOMEWHERE),
     Quantity(
-        "needed",
-        "needed",
-        ("wrench_part",),
-        "N, N m",
-        "wrench J tau that the chord tensions must supply",
-        known=Known.SOMEWHERE,
-    ),
-    Quantity(
-        "bracket",
         "bracket",
         ("bracket_part",),
         "N",
         "what is proved and what suffices of the smallest change of the force that would make the pose feasible",
-        known=Known.SOMEWHERE,
+        known=SOMEWHERE,
         low=0.0,
         infinite=True,
     ),
     Quantity(
-        "relief",
-        "relief",
-        ("axis",),
-        "N",
-        "smallest force that, added to the wrench, makes the pose feasible",
-        known=Known.SOMEWHERE,
+        "relief", ("axis",), "N", "smallest force that, added to the wrench, makes the pose feasible", known=SOMEWHERE
     ),
     Quantity(
-        "at_border",
         "at_border",
         (),
         "",
@@ -230,56 +151,33 @@ PROOF = (
 )
 
 # of a path only
-TIME = Quantity("time", "path.time", (), "s", "time from the start of the path")
+TIME = Quantity("time", (), "s", "time from the start of the path", "path.time")
 MOTION = (
-    Quantity("twist", "path.twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity"),
+    Quantity("twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity", "path.twist"),
     Quantity(
         "twist_rate",
-        "path.twist_rate",
         ("twist_part",),
         "m/s^2, rad/s^2",
         "acceleration of the platform origin, angular acceleration",
+        "path.twist_rate",
     ),
 )
 # of a path whose jerk is known
-JERK = Quantity("jerk", "path.jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate")
-
-
-def present(data: Dataset) -> tuple[Quantity, ...]:
-    """The quantities that a data set has, or should have.
-
-    Args:
-        data: The data set.
-
-    Returns:
-        All that a plan has, the proofs that are there, and those of a path if there is one.
-    """
-    motion = (TIME, *MOTION) if TIME.name in data.variables else ()
-    machine = MACHINE if MACHINE[0].name in data.variables else ()
-    beside = (some for some in (WINDING, *PROOF, JERK) if some.name in data.variables)
-    return (*QUANTITIES, *machine, *motion, *beside)
+JERK = Quantity("jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate", "path.jerk")
 
 
 def check_plan(data: Dataset, cables: int) -> None:
-    """Refuse a data set that is no plan, whatever its file looked like.
-
-    Args:
-        data: The data set.
-        cables: How many cables the robot has.
-
-    Raises:
-        KeyError: If a variable is missing.
-        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
-    """
+    """Refuse a data set that is no plan of a robot with this number of cables."""
     status = data.variables["pose_status"]
     rows = tuple(str(name) for name in status.dims)
     if rows not in ((), ("pose",)):
         raise InvalidValueError("pose_status: dimensions", rows, "none, or pose", STEP)
-    sizes = {"cable": cables, "pose": status.size}
-    check_labels(data)
+    machine = MACHINE if MACHINE[0].name in data.variables else ()
+    motion = (TIME, *MOTION) if TIME.name in data.variables else ()
+    optional = (one for one in (WINDING, *PROOF, JERK) if one.name in data.variables)
+    quantities = sorted((*QUANTITIES, *machine, *motion, *optional), key=lambda one: one.codes is None)  # codes first
     solved = np.asarray(status.values == PoseStatus.SOLVED)
-    for quantity in sorted(present(data), key=lambda quantity: quantity.codes is None):  # what a status means, first
-        check_variable(quantity, data.variables[quantity.name], rows, sizes, solved)
+    check_variables(data, quantities, {"cable": cables, "pose": status.size}, rows, solved)
 
 
 RESTS = "rests"  # of a path whose rests are known
@@ -340,32 +238,16 @@ def _warn_of_damage(path: FilePath) -> None:
 
 
 def plan_dataset(plan: Plan) -> Dataset:
-    """A plan as a data set, with the robot among its attributes.
-
-    Args:
-        plan: The plan, of one robot.
-
-    Raises:
-        InvalidValueError: If it is of several robots, or of a model or way of sharing that is none of sagline's.
-    """
+    """Data set of a plan of one robot, with the robot among its attributes."""
     rows = ("pose",) * len(plan.state.pose.shape)
-
-    def variable(quantity: Quantity) -> tuple[tuple[str, ...], Any, dict[str, Any]]:
-        return (*rows, *quantity.parts), quantity.of(plan), quantity.attributes
-
-    proof = tuple(quantity for quantity in PROOF if quantity.of(plan) is not None)
-    motion = () if plan.path is None else MOTION if plan.path.jerk is None else (*MOTION, JERK)
-    contact = plan.state.contact
-    machine = () if contact is None else MACHINE if contact.winding is None else (*MACHINE, WINDING)
-    quantities = QUANTITIES + machine + proof + motion
-    coordinates: dict[str, Any] = {"cable": numbered("cable", plan.state.one_robot.cable_count)}
-    if plan.path is not None:
-        coordinates["time"] = variable(TIME)
-    variables: dict[str, Any] = {quantity.name: variable(quantity) for quantity in quantities}
+    cables = plan.state.one_robot.cable_count
+    machine = () if plan.state.contact is None else MACHINE
+    variables = variables_of(plan, (*QUANTITIES, *machine, WINDING, *PROOF, *MOTION, JERK), rows)
+    coordinates = {"cable": numbered("cable", cables), **variables_of(plan, (TIME,), rows)}
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "when the platform stands"})
     data = labeled_dataset(variables, _attributes(plan), coordinates)
-    check_plan(data, plan.state.one_robot.cable_count)
+    check_plan(data, cables)
     return data
 
 
@@ -378,27 +260,11 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     }
 
 
-def plan_of(path: FilePath, data: Dataset, where: str = "robot") -> Plan:
-    """The plan of a data set.
-
-    Args:
-        path: The file it is from, for messages.
-        data: What `plan_dataset` gave.
-        where: Name of the robot in messages.
-
-    Raises:
-        FileError: If it is none of a plan.
-        InvalidValueError: If one of its values is none.
-    """
-    robot = parse_robot(str(data.attrs["robot"]), f"{path}, {where}")
-
-    def values(name: str) -> Any:
-        return locked(np.asarray(data[name].values, order="C"))
-
-    if data.sizes["cable"] != robot.cable_count:
-        reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
-        raise FileError(path, reason, "Write it again.", item="cable")
+def plan_of(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
+    """Plan of a data set that `plan_dataset` made; file and name of the robot are for messages."""
+    robot = robot_of(path, data, item)
     check_plan(data, robot.cable_count)
+    values = partial(values_of, data)
     behind = MACHINE[0].name in data.variables
     if behind != anything_behind(robot):
         said, has = ("is", "none of its") if behind else ("is not", "some of its")
@@ -416,8 +282,7 @@ def plan_of(path: FilePath, data: Dataset, where: str = "robot") -> Plan:
         contact = Contact(**{field.name: values(field.name) for field in fields(Contact) if field.name in data})
     motion = None
     if TIME.name in data.variables:
-        jerk = values(JERK.name) if JERK.name in data.variables else None
-        rests = values(RESTS) if RESTS in data.variables else None
+        jerk, rests = (values(name) if name in data.variables else None for name in (JERK.name, RESTS))
         motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk, rests)
     return Plan(
         state=Equilibrium(robot, pose, values("wrench"), cables, contact),

@@ -3,84 +3,76 @@
 from __future__ import annotations
 
 import os
+from functools import partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from sagline.core.arguments import choice, instance
-from sagline.core.arrays import Array, locked, number
-from sagline.core.errors import FileError, InvalidValueError
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
 from sagline.dynamics.damping import Damping
-from sagline.dynamics.drives import SecondOrder, Winches
+from sagline.dynamics.drives import SecondOrder
 from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
 from sagline.files.format import Format
-from sagline.files.netcdf import labeled_dataset, numbered
-from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import STEP, Known, Quantity, check_labels, check_variable
+from sagline.files.netcdf import attributes_with_units, labeled_dataset, numbered, robot_of
+from sagline.files.robot_file import dump_robot
+from sagline.files.variables import (
+    NONE,
+    SOMEWHERE,
+    STEP,
+    Quantity,
+    check_variables,
+    record_variables,
+    values_of,
+    variables_of,
+)
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
     from xarray import Dataset
 
-TIME: Final = Quantity("time", "time", (), "s", "time")
+TIME: Final = Quantity("time", (), "s", "time")
 # of every sample; a cable that broke has no length any more, and no nodes
 SAMPLES: Final = (
-    Quantity("position", "pose.position", ("axis",), "m", "position of the platform origin in the world"),
+    Quantity("position", ("axis",), "m", "position of the platform origin in the world", "pose.position"),
     Quantity(
-        "quaternion", "pose.quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last"
+        "quaternion", ("quaternion_part",), "1", "rotation from platform to world, scalar last", "pose.quaternion"
     ),
-    Quantity("twist", "twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity"),
-    Quantity("tensions", "tensions", ("cable",), "N", "tension at the frame end", low=0.0),
-    Quantity(
-        "length",
-        "length",
-        ("cable",),
-        "m",
-        "unstrained length off the drum; none once broken",
-        known=Known.SOMEWHERE,
-        low=0.0,
-    ),
-    Quantity("kinetic_energy", "energy.kinetic", (), "J", "kinetic energy", low=0.0),
-    Quantity("potential_energy", "energy.potential", (), "J", "energy of weight and strain"),
-    Quantity("energy_supplied", "energy.supplied", (), "J", "work done on the robot since the start"),
-    Quantity("energy_lost", "energy.lost", (), "J", "work of damping and friction since the start"),
-    Quantity("energy_removed", "energy.removed", (), "J", "energy that left with broken cables and dropped loads"),
-    Quantity("energy_error", "energy.error", (), "J", "what the integrator has invented since the start"),
+    Quantity("twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity"),
+    Quantity("tensions", ("cable",), "N", "tension at the frame end", low=0.0),
+    Quantity("length", ("cable",), "m", "unstrained length off the drum; none once broken", known=SOMEWHERE, low=0.0),
+    Quantity("kinetic_energy", (), "J", "kinetic energy", "energy.kinetic", low=0.0),
+    Quantity("potential_energy", (), "J", "energy of weight and strain", "energy.potential"),
+    Quantity("energy_supplied", (), "J", "work done on the robot since the start", "energy.supplied"),
+    Quantity("energy_lost", (), "J", "work of damping and friction since the start", "energy.lost"),
+    Quantity("energy_removed", (), "J", "energy that left with broken cables and dropped loads", "energy.removed"),
+    Quantity("energy_error", (), "J", "what the integrator has invented since the start", "energy.error"),
 )
 # of every cable, where it is known
-LARGEST: Final = Quantity(
-    "largest_tension", "largest_tension", ("cable",), "N", "largest tension at the frame end at any step", low=0.0
-)
+LARGEST: Final = Quantity("largest_tension", ("cable",), "N", "largest tension at the frame end at any step", low=0.0)
 # of cables with mass
 NODES: Final = Quantity(
-    "node_position",
-    "nodes",
-    ("cable", "node", "axis"),
-    "m",
-    "position of the cables at their nodes",
-    known=Known.SOMEWHERE,
+    "node_position", ("cable", "node", "axis"), "m", "position of the cables at their nodes", "nodes", SOMEWHERE
 )
-# one a row of what happened; a place is that of one occurrence
+# of each event, as attributes of an `Occurrence`
+EVENT: Final = ("event",)
 EVENTS: Final = (
-    Quantity("event_time", "time", (), "s", "when it happened"),
-    Quantity("event_kind", "kind", (), "", "what happened", values=str),
-    Quantity("event_cable", "cable", (), "", "which cable or winch, counted from 0; -1 for the platform", values=int),
+    Quantity("event_time", EVENT, "s", "when it happened", "time"),
+    Quantity("event_kind", EVENT, "", "what happened", "kind", values=str),
     Quantity(
-        "event_tension_before", "tension_before", (), "N", "largest tension before it", known=Known.SOMEWHERE, low=0.0
+        "event_cable", EVENT, "", "which cable or winch, counted from 0; -1 for the platform", "cable", values=int
     ),
-    Quantity(
-        "event_tension_after", "tension_after", (), "N", "largest tension after it", known=Known.SOMEWHERE, low=0.0
-    ),
+    Quantity("event_tension_before", EVENT, "N", "largest tension before it", "tension_before", SOMEWHERE, 0.0),
+    Quantity("event_tension_after", EVENT, "N", "largest tension after it", "tension_after", SOMEWHERE, 0.0),
 )
-NO_CABLE: Final = -1
 CABLE_MASS: Final = ("none", "lumped", "modal")
 INTEGRATORS: Final = ("splitting", "runge-kutta", "exact")
 WINDINGS: Final = ("constant", "remembered")
 LAGGING: Final = "second-order"
 WINCHES: Final = ("ideal", "robot", LAGGING)
 # attributes that are numbers, and their units
-STEP_UNIT: Final = {"step": "s"}
 LAG: Final = {"bandwidth": "Hz", "damping_ratio": "1"}
 LOSSES: Final = {"loss_time": "s", "air_damping": "N s/m^2", "modal_damping": "1"}
 # what happens to a cable or winch, to the platform, and to either
@@ -90,58 +82,38 @@ OF_EITHER: Final = ("brake",)
 
 
 ROWS: Final = "time"
-EVENT_ROWS: Final = "event"
 ROUNDING: Final = 1e-12  # of the largest energy
 
 
 def check_simulation(data: Dataset, cables: int) -> None:
-    """Refuse a data set that is no simulation, whatever its file looked like.
-
-    Args:
-        data: The data set.
-        cables: How many its robot has.
-
-    Raises:
-        KeyError: If a variable is missing.
-        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
-    """
+    """Refuse a data set that is no simulation of a robot with this number of cables."""
     _check_settings(data.attrs)
-    check_labels(data)
-    sizes = {"cable": cables, ROWS: data.variables[TIME.name].size, "node": data.sizes.get("node", 0)}
-    everywhere = np.ones(sizes[ROWS], dtype=bool)
-    nodes = (NODES,) if NODES.name in data.variables else ()
-    for quantity in (TIME, *SAMPLES, *nodes):
-        check_variable(quantity, data.variables[quantity.name], (ROWS,), sizes, everywhere)
-    if LARGEST.name in data.variables:
-        check_variable(LARGEST, data.variables[LARGEST.name], (), sizes, np.array(True))
     time = data.variables[TIME.name].values
+    sizes = {"cable": cables, ROWS: time.size, **{name: data.sizes.get(name, 0) for name in ("node", "event")}}
+    nodes = (NODES,) if NODES.name in data.variables else ()
+    check_variables(data, (TIME, *SAMPLES, *nodes), sizes, (ROWS,))
+    if LARGEST.name in data.variables:
+        check_variables(data, (LARGEST,), sizes)
     _check_times(time)
     if bool(nodes) != (data.attrs["cable_mass"] != "none"):
         allowed = "given for cables with mass, and for no others"
         raise InvalidValueError(NODES.name, "given" if nodes else "not given", allowed, STEP)
     broken = np.full(cables, np.inf)
     if has_events(data):
-        sizes[EVENT_ROWS] = data.sizes[EVENT_ROWS]
-        every = np.ones(sizes[EVENT_ROWS], dtype=bool)
-        for quantity in EVENTS:
-            check_variable(quantity, data.variables[quantity.name], (EVENT_ROWS,), sizes, every)
+        check_variables(data, EVENTS, sizes)
         broken = _check_events(data, time, cables)
-    for quantity in (*(one for one in SAMPLES if one.name == "length"), *nodes):
-        _check_gaps(quantity.name, data.variables[quantity.name].values, time[:, None] > broken)
+    for name in ("length", *(one.name for one in nodes)):
+        _check_gaps(name, data.variables[name].values, time[:, None] > broken)
     _check_balance(data)
 
 
 def has_events(data: Dataset) -> bool:
-    """Whether anything happened in a data set.
-
-    Args:
-        data: The data set.
-    """
+    """Whether a data set has a variable of events."""
     return any(quantity.name in data.variables for quantity in EVENTS)
 
 
 def _check_settings(attributes: Any) -> None:
-    """How it was integrated; what damps and lags is looked at where it is made."""
+    """Refuse settings of the integration that do not exist or do not go together."""
     kinds = {"cable_mass": CABLE_MASS, "integrator": INTEGRATORS, "winches": WINCHES, "winding": WINDINGS}
     for name, allowed in kinds.items():
         choice(attributes[name], name, allowed)
@@ -149,8 +121,8 @@ def _check_settings(attributes: Any) -> None:
     for name in (*LOSSES, *(LAG if attributes["winches"] == LAGGING else ())):
         number(attributes[name], name, "", low=0.0)
     if (attributes["cable_mass"] == "modal") != (attributes["integrator"] == "exact"):
-        told = f"{attributes['integrator']} for cable_mass {attributes['cable_mass']}"
-        raise InvalidValueError("integrator", told, "exact for modal, and for no others", STEP)
+        found = f"{attributes['integrator']} for cable_mass {attributes['cable_mass']}"
+        raise InvalidValueError("integrator", found, "exact for modal, and for no others", STEP)
 
 
 def _check_times(time: Array) -> None:
@@ -169,12 +141,12 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
         if not before <= at <= time[-1]:
             allowed = f"{before:g} to {time[-1]:g} s, in order"
             raise InvalidValueError(f"event_time[{k}]", f"{at:g} s", allowed, STEP)
-        low = 0 if kind in OF_CABLES else NO_CABLE
-        high = NO_CABLE if kind in OF_PLATFORM else cables - 1
+        low = 0 if kind in OF_CABLES else NONE
+        high = NONE if kind in OF_PLATFORM else cables - 1
         if not low <= cable <= high:
             allowed = f"{low} to {high} for {kind!r}" if low < high else f"{low} for {kind!r}"
             raise InvalidValueError(f"event_cable[{k}]", cable, allowed, STEP)
-        if cable != NO_CABLE and broken[cable] < np.inf:
+        if cable != NONE and broken[cable] < np.inf:
             allowed = f"a cable that is there: {cable} broke at {broken[cable]:g} s"
             raise InvalidValueError(f"event_cable[{k}]", f"{cable} at {at:g} s", allowed, STEP)
         if kind == "break":
@@ -184,7 +156,7 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
 
 
 def _check_gaps(name: str, values: Array, gone: Any) -> None:
-    """There is a length, and there are nodes, exactly of the cables that have not broken."""
+    """Refuse values of broken cables, and missing ones of others; `gone` has the shape (samples, cables)."""
     missing = np.isnan(values)
     gone = gone.reshape(gone.shape + (1,) * (values.ndim - 2))
     for index in np.argwhere(missing != gone)[:1].tolist():
@@ -194,7 +166,7 @@ def _check_gaps(name: str, values: Array, gone: Any) -> None:
 
 
 def _check_balance(data: Dataset) -> None:
-    """The error is what the other energies leave."""
+    """Refuse an energy error that is not the sum of the other energies."""
     names = ("kinetic_energy", "potential_energy", "energy_supplied", "energy_lost", "energy_removed", "energy_error")
     kinetic, potential, supplied, lost, removed, error = (data.variables[name].values for name in names)
     total = kinetic + potential - supplied + lost + removed
@@ -222,75 +194,37 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
 
 def pack(simulation: Simulation) -> Dataset:
     """Data set of a simulation, with the dimensions time, cable, node (cables with mass) and event."""
-    quantities = SAMPLES if simulation.nodes is None else (*SAMPLES, NODES)
-    variables: dict[str, Any] = {
-        quantity.name: ((ROWS, *quantity.parts), quantity.of(simulation), quantity.attributes)
-        for quantity in quantities
-    }
-    if simulation.largest_tension is not None:
-        variables[LARGEST.name] = (LARGEST.parts, LARGEST.of(simulation), LARGEST.attributes)
-    for quantity in EVENTS if simulation.events else ():
-        values = [_written(quantity.of(event)) for event in simulation.events]
-        variables[quantity.name] = (EVENT_ROWS, np.array(values, dtype=quantity.type), quantity.attributes)
-    coordinates = {
-        "cable": numbered("cable", simulation.robot.cable_count),
-        TIME.name: (ROWS, TIME.of(simulation), TIME.attributes),
-    }
+    variables = variables_of(simulation, (*SAMPLES, NODES), (ROWS,)) | variables_of(simulation, (LARGEST,))
+    if simulation.events:
+        variables |= record_variables(simulation.events, EVENTS)
+    cables = simulation.robot.cable_count
+    coordinates = {"cable": numbered("cable", cables), **variables_of(simulation, (TIME,), (ROWS,))}
     data = labeled_dataset(variables, _attributes(simulation), coordinates)
-    check_simulation(data, simulation.robot.cable_count)
+    check_simulation(data, cables)
     return data
 
 
-def _written(value: Any) -> Any:
-    return NO_CABLE if value is None else value
-
-
 def _attributes(simulation: Simulation) -> dict[str, Any]:
+    winches = simulation.winches
+    lagging = isinstance(winches, SecondOrder)
     return {
         **FORMAT.attributes(f"Motion of {simulation.robot.name} in time"),
         "cable_mass": simulation.cable_mass,
         "integrator": simulation.integrator,
-        **_numbers(simulation, STEP_UNIT),
-        **_of_winches(simulation.winches),
+        **attributes_with_units(simulation, {"step": "s"}),
+        **({"winches": LAGGING, **attributes_with_units(winches, LAG)} if lagging else {"winches": winches}),
         "winding": simulation.winding,
-        **_numbers(instance(simulation.damping, Damping, "damping"), LOSSES),
+        **attributes_with_units(instance(simulation.damping, Damping, "damping"), LOSSES),
         "robot": dump_robot(simulation.robot),
     }
 
 
-def _numbers(source: Any, units: dict[str, str]) -> dict[str, Any]:
-    """Attributes that are numbers, each followed by its unit."""
-    found: dict[str, Any] = {}
-    for name, unit in units.items():
-        found |= {name: float(getattr(source, name)), f"{name}_units": unit}
-    return found
-
-
-def _of_winches(winches: Winches) -> dict[str, Any]:
-    if isinstance(winches, SecondOrder):
-        return {"winches": LAGGING, **_numbers(winches, LAG)}
-    return {"winches": winches}
-
-
-def _winches(attributes: Any) -> Winches:
-    if attributes["winches"] == LAGGING:
-        return SecondOrder(**{name: float(attributes[name]) for name in LAG})
-    kind: Winches = attributes["winches"]
-    return kind
-
-
 def unpack(path: FilePath, data: Dataset) -> Simulation:
-    """The simulation of a data set; its path is for messages."""
-    robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
-    if data.sizes["cable"] != robot.cable_count:
-        reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
-        raise FileError(path, reason, "Write it again.", item="cable")
+    """Simulation of a data set; its path is for messages."""
+    robot = robot_of(path, data)
     check_simulation(data, robot.cable_count)
-
-    def values(quantity: Quantity) -> Any:
-        return locked(np.asarray(data[quantity.name].values, order="C"))
-
-    found = {quantity.place: values(quantity) for quantity in (TIME, *SAMPLES)}
+    values, winches = partial(values_of, data), data.attrs["winches"]
+    found = {quantity.place: values(quantity.name) for quantity in (TIME, *SAMPLES)}
     energy = {place.removeprefix("energy."): found.pop(place) for place in list(found) if place.startswith("energy.")}
     events = _occurrences(data) if has_events(data) else ()
     return Simulation(
@@ -301,18 +235,18 @@ def unpack(path: FilePath, data: Dataset) -> Simulation:
         events=events,
         cable_mass=data.attrs["cable_mass"],
         step=float(data.attrs["step"]),
-        nodes=values(NODES) if NODES.name in data.variables else None,
+        nodes=values(NODES.name) if NODES.name in data.variables else None,
         integrator=data.attrs["integrator"],
-        winches=_winches(data.attrs),
+        winches=SecondOrder(**{name: float(data.attrs[name]) for name in LAG}) if winches == LAGGING else winches,
         winding=data.attrs["winding"],
         damping=Damping(**{name: float(data.attrs[name]) for name in LOSSES}),
-        largest_tension=values(LARGEST) if LARGEST.name in data.variables else None,
+        largest_tension=values(LARGEST.name) if LARGEST.name in data.variables else None,
     )
 
 
 def _occurrences(data: Dataset) -> tuple[Occurrence, ...]:
     columns = {quantity.place: data.variables[quantity.name].values.tolist() for quantity in EVENTS}
-    columns["cable"] = [None if cable == NO_CABLE else cable for cable in columns["cable"]]
+    columns["cable"] = [None if cable == NONE else cable for cable in columns["cable"]]
     return tuple(Occurrence(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
 
 

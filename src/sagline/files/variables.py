@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum, IntEnum
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from sagline.core.arrays import Flags
+from sagline.core.arrays import Flags, locked
 from sagline.core.errors import InvalidValueError, printable
 
 if TYPE_CHECKING:
     from xarray import Dataset, Variable
 
+NONE: Final = -1  # of an index or a code: there is none
 # labels along the dimensions beside rows and cable
 PARTS = {
     "axis": ("x", "y", "z"),
@@ -35,52 +35,55 @@ class Known(Enum):
     SOMEWHERE = "at any poses"
 
 
+EVERYWHERE, SOLVED, SOMEWHERE = Known
+
+
 class Quantity(NamedTuple):
-    """One variable of the file, and what its values may be.
+    """One variable of a file, and the range of its values.
 
     Attributes:
-        name: Its name in the file.
-        place: Where a result has it, as a dotted attribute.
-        parts: Its dimensions after that of the rows: poses, or samples in time.
+        name: Name in the file.
+        parts: Dimensions after those of the rows: poses, or samples in time.
         unit: Unit as the file states it; "" for a plain number.
-        long_name: What it is, in a reader's words.
-        codes: The status it holds codes of, if any.
-        known: Where it has values.
-        low: Its lowest value.
+        long_name: Description, in a reader's words.
+        source: Dotted attribute of the result that holds the values; "" for that of the same name.
+        known: Poses at which it has values.
+        low: Lowest value.
         infinite: Whether it may be infinite.
-        values: What its values are where they are no codes: float, int, bool for yes or no, or str.
+        codes: Status type of the codes it holds, if any.
+        values: Type of the values where they are no codes: float, int, bool or str.
     """
 
     name: str
-    place: str
     parts: tuple[str, ...]
     unit: str
     long_name: str
-    codes: type[IntEnum] | None = None
-    known: Known = Known.EVERYWHERE
+    source: str = ""
+    known: Known = EVERYWHERE
     low: float = -np.inf
     infinite: bool = False
+    codes: type[IntEnum] | None = None
     values: type[float | int | bool | str] = float
 
     @property
+    def place(self) -> str:
+        """Dotted attribute of the result that holds the values."""
+        return self.source or self.name
+
+    @property
     def type(self) -> np.dtype[Any]:
-        """The type of its values."""
+        """Type of the values in the file."""
         return np.dtype(np.int8 if self.codes is not None else object if self.values is str else self.values)
 
     def of(self, result: Any) -> Any:
-        """The values of a result.
-
-        Args:
-            result: The result.
-
-        Returns:
-            Array, or None where it does not have it, such as a proof that a plan lacks.
-        """
-        return attrgetter(self.place)(result)
+        """Values of a result; None where it has none, such as a proof that a plan lacks."""
+        for name in self.place.split("."):
+            result = None if result is None else getattr(result, name)
+        return result
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """Attributes of the variable; status codes are explained as the CF conventions want it."""
+        """Attributes of the variable; status codes are explained as in the CF conventions."""
         found: dict[str, Any] = {"long_name": self.long_name}
         if self.unit:
             found["units"] = self.unit
@@ -94,61 +97,74 @@ STEP = "Write the file again; it was edited, or damaged."
 NEWER = "Read it with a newer sagline."
 
 
-def check_labels(data: Dataset) -> None:
-    """Refuse a data set whose dimensions are labeled as none of ours is.
+def variables_of(result: Any, quantities: Iterable[Quantity], rows: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Dimensions, values and attributes of each quantity that a result has, by name."""
+    found: dict[str, Any] = {}
+    for one in quantities:
+        if (values := one.of(result)) is not None:
+            array = values if isinstance(values, np.ndarray) else np.asarray(values, dtype=one.type)
+            found[one.name] = ((*rows, *one.parts), array, one.attributes)
+    return found
+
+
+def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], width: int = 0) -> dict[str, Any]:
+    """Variables with one row a record, of two dimensions with this width; None is stored as `NONE`."""
+    found: dict[str, Any] = {}
+    for one in quantities:
+        values = [NONE if (value := one.of(record)) is None else value for record in records]
+        shape = (len(records), width)[: len(one.parts)]
+        found[one.name] = (one.parts, np.array(values, dtype=one.type).reshape(shape), one.attributes)
+    return found
+
+
+def values_of(data: Dataset, name: str) -> Any:
+    """Values of a variable, in C order and write-locked."""
+    return locked(np.asarray(data[name].values, order="C"))
+
+
+def check_variables(
+    data: Dataset,
+    quantities: Iterable[Quantity],
+    sizes: Mapping[str, int],
+    rows: Iterable[str] = (),
+    solved: Flags | None = None,
+) -> None:
+    """Refuse a data set whose labels or variables are not as declared.
 
     Args:
         data: The data set.
+        quantities: Declared quantities, in the order of the checks.
+        sizes: Number of entries along each dimension that has no labels.
+        rows: Dimensions before those of the declaration.
+        solved: Rows at which there is a solution; None: all.
 
     Raises:
-        InvalidValueError: If there is such a one; the message has its labels.
+        KeyError: If a variable is missing.
+        InvalidValueError: If one is not as declared; the message names its first wrong value.
     """
     for name, labels in PARTS.items():
         if name in data.variables and list(data.variables[name].values) != list(labels):
             raise InvalidValueError(name, list(data.variables[name].values), ", ".join(labels), STEP)
-
-
-def check_variable(
-    quantity: Quantity, variable: Variable, rows: Iterable[str], sizes: Mapping[str, int], solved: Flags
-) -> None:
-    """Refuse a variable that is not what the layout says.
-
-    Args:
-        quantity: What it should be.
-        variable: What it is.
-        rows: Its dimensions before those of the layout.
-        sizes: How many entries each dimension has that has no labels.
-        solved: At which rows there is an answer.
-
-    Raises:
-        InvalidValueError: If it is something else; the message names its first wrong value.
-    """
     every = {**{name: len(labels) for name, labels in PARTS.items()}, **sizes}
-    _check_form(quantity, variable, {name: every[name] for name in (*rows, *quantity.parts)})
-    if quantity.codes is not None:
-        _check_codes(quantity, variable)
-    elif quantity.values is float:
-        _check_numbers(quantity, np.asarray(variable.values), solved)
-    elif quantity.values is str:
-        _check_texts(quantity, variable)
+    for quantity in quantities:
+        variable = data.variables[quantity.name]
+        _check_form(quantity, variable, {name: every[name] for name in (*rows, *quantity.parts)})
+        if quantity.codes is not None:
+            _check_codes(quantity, variable)
+        elif quantity.values is float:
+            _check_numbers(quantity, np.asarray(variable.values), np.array(True) if solved is None else solved)
+        elif quantity.values is str:
+            _check_texts(quantity, variable)
 
 
-def check_indices(name: str, values: np.ndarray[Any, Any], low: int, high: int) -> None:
-    """Refuse indices out of range.
-
-    Args:
-        name: What they are, for the message.
-        values: The indices.
-        low: The least allowed.
-        high: One more than the largest allowed.
-
-    Raises:
-        InvalidValueError: If one is out of range; the message has the first.
-    """
-    wrong = (values < low) | (values >= high)
-    if wrong.any():
-        allowed = f"{low} to {high - 1}" if high < sys.maxsize else f">= {low}"
-        raise InvalidValueError(name, int(values[wrong][0]), allowed, STEP)
+def check_indices(data: Dataset, ranges: Mapping[str, tuple[int, int]]) -> None:
+    """Refuse indices out of range: from the first number of a range to one before the second."""
+    for name, (low, high) in ranges.items():
+        values = data.variables[name].values
+        wrong = (values < low) | (values >= high)
+        if wrong.any():
+            allowed = f"{low} to {high - 1}" if high < sys.maxsize else f">= {low}"
+            raise InvalidValueError(name, int(values[wrong][0]), allowed, STEP)
 
 
 def _check_form(quantity: Quantity, variable: Variable, wanted: Mapping[str, int]) -> None:
@@ -168,7 +184,7 @@ def _shape(sizes: Mapping[str, int]) -> str:
 
 
 def _check_codes(quantity: Quantity, variable: Variable) -> None:
-    """A code means what it meant to the writer."""
+    """Refuse codes that are unknown, or had another meaning for the writer."""
     assert quantity.codes is not None
     ours = {code.value: code.name.lower() for code in quantity.codes}
     values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()
@@ -176,7 +192,9 @@ def _check_codes(quantity: Quantity, variable: Variable) -> None:
     for value in np.unique(variable.values).tolist():
         if value not in ours or theirs.get(value) != ours[value]:
             said = theirs.get(value, "without a meaning")
-            raise InvalidValueError(quantity.name, f"{value} ({said})", _codes(ours), NEWER)
+            raise InvalidValueError(
+                quantity.name, f"{value} ({said})", ", ".join(f"{code} ({word})" for code, word in ours.items()), NEWER
+            )
 
 
 def _check_texts(quantity: Quantity, variable: Variable) -> None:
@@ -185,19 +203,15 @@ def _check_texts(quantity: Quantity, variable: Variable) -> None:
             raise InvalidValueError(f"{quantity.name}{list(index)}", repr(value), "a word that prints", STEP)
 
 
-def _codes(meanings: Mapping[int, str]) -> str:
-    return ", ".join(f"{value} ({meaning})" for value, meaning in meanings.items())
-
-
 def _check_numbers(quantity: Quantity, values: np.ndarray[Any, Any], solved: Flags) -> None:
     there = np.broadcast_to(solved.reshape(solved.shape + (1,) * (values.ndim - solved.ndim)), values.shape)
     missing = np.isnan(values)
     wrong = values < quantity.low
     if not quantity.infinite:
         wrong |= np.isinf(values)
-    if quantity.known is Known.EVERYWHERE:
+    if quantity.known is EVERYWHERE:
         wrong |= missing
-    elif quantity.known is Known.SOLVED:
+    elif quantity.known is SOLVED:
         wrong |= missing == there
     if not wrong.any():
         return

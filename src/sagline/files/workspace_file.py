@@ -18,7 +18,7 @@ from sagline.core.arrays import locked, number
 from sagline.files.format import Format
 from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import Quantity, check_indices, check_labels, check_variable
+from sagline.files.variables import Quantity, check_indices, check_variables, values_of, variables_of
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.pose import Pose
@@ -51,29 +51,29 @@ NODES: Final = ("x", "y", "z")  # of the grid
 FINE: Final = ("fine_x", "fine_y", "fine_z")  # of the grid that tells components apart
 
 QUANTITIES: Final = (
-    *(Quantity(name, name, (name,), "m", f"{name} of the nodes of the grid") for name in NODES),
-    Quantity("level", "level", NODES, "1", "least value of the criteria over their scales, >= 0 inside", infinite=True),
-    Quantity("vertex_position", "surface.vertices", ("vertex", "axis"), "m", "vertices of the surface"),
-    Quantity("face", "surface.faces", ("side", "corner"), "", "vertices of each triangle, outward", values=int),
-    Quantity("limiting", "limiting", ("vertex",), "", "criterion that decides there, -1 for the box", values=int),
-    Quantity("limiting_cable", "limiting_cable", ("vertex",), "", "cable that decides, -1 for none", values=int),
-    Quantity("margin", "margin", ("vertex",), "N", "margin of the loads there", infinite=True),
-    Quantity("component_volume", "components.volume", ("component",), "", "of each component, in units of volume"),
-    Quantity("vertex_component", "components.vertices", ("vertex",), "", "component of each vertex", values=int),
-    *(Quantity(fine, f"components.{fine[-1]}", (fine,), "m", f"{fine[-1]} of finer nodes") for fine in FINE),
-    Quantity("component_nodes", "components.nodes", FINE, "", "component of each node, -1 outside", values=int),
-    Quantity("rotation", "orientations.quaternion", ("turn", "quaternion_part"), "1", "rotations of the platform"),
-    Quantity("wrench_center", "wrenches.center", ("wrench_part",), "N, N m", "a wrench of the set"),
-    Quantity("wrench_segment", "wrenches.segments", ("segment", "wrench_part"), "N, N m", "half of each segment"),
-    Quantity("wrench_ellipsoid", "wrenches.ellipsoids", ("ellipsoid", "wrench_part", "column"), "N, N m", "semi-axes"),
-    Quantity("corner_wrench", "wrenches.corners", ("polytope_corner", "wrench_part"), "N, N m", "corners of polytopes"),
-    Quantity("polytope_size", "wrenches.sizes", ("polytope",), "", "corners of each polytope", values=int),
+    *(Quantity(name, (name,), "m", f"{name} of the nodes of the grid") for name in NODES),
+    Quantity("level", NODES, "1", "least value of the criteria over their scales, >= 0 inside", infinite=True),
+    Quantity("vertex_position", ("vertex", "axis"), "m", "vertices of the surface", "surface.vertices"),
+    Quantity("face", ("side", "corner"), "", "vertices of each triangle, outward", "surface.faces", values=int),
+    Quantity("limiting", ("vertex",), "", "criterion that decides there, -1 for the box", values=int),
+    Quantity("limiting_cable", ("vertex",), "", "cable that decides, -1 for none", values=int),
+    Quantity("margin", ("vertex",), "N", "margin of the loads there", infinite=True),
+    Quantity("component_volume", ("component",), "", "of each component, in units of volume", "components.volume"),
+    Quantity("vertex_component", ("vertex",), "", "component of each vertex", "components.vertices", values=int),
+    *(Quantity(fine, (fine,), "m", f"{fine[-1]} of finer nodes", f"components.{fine[-1]}") for fine in FINE),
+    Quantity("component_nodes", FINE, "", "component of each node, -1 outside", "components.nodes", values=int),
+    Quantity("rotation", ("turn", "quaternion_part"), "1", "rotations of the platform", "orientations.quaternion"),
+    Quantity("wrench_center", ("wrench_part",), "N, N m", "a wrench of the set", "wrenches.center"),
+    Quantity("wrench_segment", ("segment", "wrench_part"), "N, N m", "half of each segment", "wrenches.segments"),
+    Quantity("wrench_ellipsoid", ("ellipsoid", "wrench_part", "column"), "N, N m", "semi-axes", "wrenches.ellipsoids"),
+    Quantity("corner_wrench", ("polytope_corner", "wrench_part"), "N, N m", "corners of polytopes", "wrenches.corners"),
+    Quantity("polytope_size", ("polytope",), "", "corners of each polytope", "wrenches.sizes", values=int),
     Quantity(
         "largest_acceleration",
-        "wrenches.accelerations",
         ("acceleration_part",),
         "m/s2, rad/s2",
         "largest accelerations",
+        "wrenches.accelerations",
     ),
 )
 TYPES: Final[dict[str, Any]] = {"limiting": np.int8, "vertex_component": np.int32, "component_nodes": np.int32}
@@ -83,50 +83,29 @@ UNITS = ("m³", "m²")
 
 
 def check_workspace(data: Dataset, cables: int) -> None:
-    """Refuse a data set that is no workspace, whatever its file looked like.
-
-    Args:
-        data: The data set.
-        cables: How many its robot has.
-
-    Raises:
-        KeyError: If a variable or attribute is missing.
-        InvalidValueError: If one is not what the layout says; the message names its first wrong value.
-    """
+    """Refuse a data set that is no workspace of a robot with this number of cables."""
     choice(data.attrs["volume_units"], "volume_units", UNITS)
     choice(data.attrs["need"], "need", ("all", "any"))
     for name in ("volume", "volume_error", "box_tilt"):
         number(data.attrs[name], name, "", low=0.0)
-    check_labels(data)
     sizes = {str(name): size for name, size in data.sizes.items()} | {"corner": 3, "column": 6, "acceleration_part": 2}
-    for quantity in QUANTITIES:
-        check_variable(quantity, data.variables[quantity.name], (), sizes, np.array(True))
+    check_variables(data, QUANTITIES, sizes)
     criteria = sum(f"criterion_{k}" in data.attrs for k in range(len(data.attrs)))
-    for name, low, high in (
-        ("face", 0, sizes["vertex"]),
-        ("limiting", -1, criteria),
-        ("limiting_cable", -1, cables),
-        ("vertex_component", 0, sizes["component"]),
-        ("component_nodes", -1, sizes["component"]),
-    ):
-        check_indices(name, data.variables[name].values, low, high)
+    ranges = {
+        "face": (0, sizes["vertex"]),
+        "limiting": (-1, criteria),
+        "limiting_cable": (-1, cables),
+        "vertex_component": (0, sizes["component"]),
+        "component_nodes": (-1, sizes["component"]),
+    }
+    check_indices(data, ranges)
 
 
 KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Capsule, Sphere, Mesh)}
 
 
 def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Criteria as attributes, and the obstacles among them as variables.
-
-    Args:
-        criteria: The criteria.
-
-    Returns:
-        Attributes and variables.
-
-    Raises:
-        InvalidValueError: If one of them, or of its obstacles, is none of sagline's.
-    """
+    """Attributes of criteria, and variables of the obstacles among them; InvalidValueError for foreign kinds."""
     attributes: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for k, one in enumerate(criteria):
@@ -146,18 +125,7 @@ def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], 
 
 
 def criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
-    """What `criteria_attributes` wrote.
-
-    Args:
-        path: The file, for messages.
-        data: The data set.
-
-    Returns:
-        The criteria, in their order.
-
-    Raises:
-        FileError: If one is of a kind that this sagline does not know.
-    """
+    """Criteria that `criteria_attributes` wrote, in their order; the path is for messages."""
     found: list[Criterion] = []
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
@@ -171,7 +139,7 @@ def criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
 
 
 def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """One of them: texts and numbers as attributes, arrays as variables with dimensions of their own."""
+    """Obstacle: texts and numbers as attributes, arrays as variables with dimensions of their own."""
     attributes: dict[str, Any] = {key: type(obstacle).__name__}
     variables: dict[str, Any] = {}
     for field in fields(obstacle):
@@ -217,27 +185,20 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
 
 def pack(space: Workspace) -> Dataset:
     """Data set of a workspace."""
-    variables: dict[str, Any] = {one.name: (one.parts, _wide(one, one.of(space)), one.attributes) for one in QUANTITIES}
+    variables = variables_of(space, QUANTITIES)
+    for one in QUANTITIES:
+        if one.values is int:  # indices of any size are stored in 64 bits
+            variables[one.name] = one.parts, one.of(space).astype(np.int64), one.attributes
     attributes, obstacles = criteria_attributes(space.criteria)
     return labeled_dataset(variables | obstacles, _attributes(space) | attributes)
 
 
-def _wide(quantity: Quantity, values: Any) -> Any:
-    """Indices of any size as those of 64 bits."""
-    return np.asarray(values).astype(np.int64) if quantity.values is int else values
-
-
 def _attributes(space: Workspace) -> dict[str, Any]:
+    box = space.box
     attributes = {
         **FORMAT.attributes(f"Workspace of {space.robot.name}"),
-        "volume": space.volume,
-        "volume_error": space.volume_error,
-        "volume_units": space.unit,
-        "box_low": space.box.low,
-        "box_high": space.box.high,
-        "box_units": "m",
-        "box_tilt": space.box.tilt,
-        "box_tilt_units": "rad",
+        **{"volume": space.volume, "volume_error": space.volume_error, "volume_units": space.unit},
+        **{"box_low": box.low, "box_high": box.high, "box_units": "m", "box_tilt": box.tilt, "box_tilt_units": "rad"},
         "need": space.orientations.need,
         "open_faces": ", ".join(space.open_faces),
         **choice_attributes("model", space.model, MODELS),
@@ -248,28 +209,21 @@ def _attributes(space: Workspace) -> dict[str, Any]:
         attributes |= {"moment_arm": space.moment_arm, "moment_arm_units": "m"}
     if space.nearest is not None:
         near = space.nearest
-        attributes["nearest"] = json.dumps(
-            {
-                "position": near.pose.position.tolist(),
-                "quaternion": near.pose.quaternion.tolist(),
-                "level": near.level,
-                "margin": near.margin,
-                "criterion": near.criterion,
-                "cables": list(near.cables),
-                "reason": near.reason,
-            }
-        )
+        position, quaternion = near.pose.position.tolist(), near.pose.quaternion.tolist()
+        names = ("level", "margin", "criterion", "cables", "reason")
+        said = {"position": position, "quaternion": quaternion, **{name: getattr(near, name) for name in names}}
+        attributes["nearest"] = json.dumps(said)
     return attributes
 
 
 def unpack(path: FilePath, data: Dataset) -> Workspace:
-    """The workspace of a data set; its path is for messages."""
+    """Workspace of a data set; its path is for messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     check_workspace(data, robot.cable_count)
 
     def values(name: str) -> Any:
-        found = np.asarray(data[name].values, order="C")
-        return locked(found.astype(TYPES[name]) if name in TYPES else found)
+        found = values_of(data, name)
+        return locked(found.astype(TYPES[name])) if name in TYPES else found
 
     attributes = data.attrs
     loads, components = (
