@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.files.writing import write_text, written_together
+from sagline.files.writing import atomic_files, write_text
 from sagline.plot.sheet import sheet
 from tests.abuse.commands import COMMANDS, Written, ended, prepare, tree
 from tests.files.plans import a_plan
@@ -31,7 +31,7 @@ def room(size: int) -> Iterator[None]:
 
 
 def together(folder: Path) -> None:
-    with written_together(folder, ["page.html", "page.json"]) as (page, data):
+    with atomic_files(folder, ["page.html", "page.json"]) as (page, data):
         page.write_bytes(b"x" * 300_000)
         data.write_bytes(b"y" * 3_000)
 

@@ -11,12 +11,12 @@ from syrupy.assertion import SnapshotAssertion
 
 from sagline import FileError
 from sagline.files.writing import (
+    atomic_file,
+    atomic_files,
     check_folder,
+    create_folder,
     finished_files,
-    made_folder,
     write_text,
-    written_together,
-    written_whole,
 )
 from tests.files.wording import wording
 from tests.refusal import refused
@@ -24,7 +24,7 @@ from tests.refusal import refused
 
 def test_a_file_appears_when_it_is_complete(tmp_path: Path) -> None:
     file = tmp_path / "run.nc"
-    with written_whole(file) as partial:
+    with atomic_file(file) as partial:
         partial.write_bytes(b"half")
         assert not file.exists()
     assert file.read_bytes() == b"half"
@@ -37,7 +37,7 @@ def test_trouble_keeps_what_was_there(tmp_path: Path, trouble: BaseException | t
     file.write_bytes(b"before")
 
     def write() -> None:
-        with written_whole(file) as partial:
+        with atomic_file(file) as partial:
             partial.write_bytes(b"half")
             raise trouble
 
@@ -53,7 +53,7 @@ def test_a_full_disk_is_named(tmp_path: Path, snapshot: SnapshotAssertion) -> No
     try:
         with (
             refused(kind=FileError, file=tmp_path / "run.nc") as caught,
-            written_whole(tmp_path / "run.nc") as partial,
+            atomic_file(tmp_path / "run.nc") as partial,
         ):
             partial.write_bytes(bytes(5000))
     finally:
@@ -66,7 +66,7 @@ def test_places_that_cannot_be_written(tmp_path: Path, snapshot: SnapshotAsserti
     (tmp_path / "file").touch()
     entered: list[Path] = []
     for place in (tmp_path, tmp_path / "missing" / "run.nc", tmp_path / "file" / "run.nc"):
-        with refused(kind=FileError, file=place) as caught, written_whole(place):
+        with refused(kind=FileError, file=place) as caught, atomic_file(place):
             entered.append(place)
         assert (caught.value.reason, caught.value.next_step.replace(str(tmp_path), "FOLDER")) == snapshot
     assert entered == []
@@ -76,11 +76,11 @@ def test_a_folder_is_checked_without_being_made(tmp_path: Path, snapshot: Snapsh
     (tmp_path / "file").touch()
     check_folder(tmp_path / "new" / "deep")
     assert not (tmp_path / "new").exists()
-    for make in (check_folder, made_folder):
+    for make in (check_folder, create_folder):
         with refused(kind=FileError, file=tmp_path / "file" / "deep") as caught:
             make(tmp_path / "file" / "deep")
         assert wording(caught.value, tmp_path) == snapshot
-    assert made_folder(tmp_path / "new" / "deep").is_dir()
+    assert create_folder(tmp_path / "new" / "deep").is_dir()
 
 
 def test_a_folder_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,7 +159,7 @@ def test_names_that_no_file_can_have(tmp_path: Path, name: str) -> None:
     for use, place in (
         (lambda place: write_text(place, "text"), tmp_path / name),
         (check_folder, tmp_path / name),
-        (made_folder, tmp_path / name),
+        (create_folder, tmp_path / name),
         (check_folder, tmp_path / name / "deep"),
     ):
         with refused(kind=FileError, file=place):
@@ -192,7 +192,7 @@ def test_files_that_belong_together(tmp_path: Path, trouble: BaseException | typ
     (tmp_path / "page.html").write_text("before")
 
     def write() -> None:
-        with written_together(tmp_path, ["page.html", "page.json"]) as (page, data):
+        with atomic_files(tmp_path, ["page.html", "page.json"]) as (page, data):
             page.write_text("after")
             if trouble is not None:
                 raise trouble
@@ -209,7 +209,7 @@ def test_files_that_belong_together(tmp_path: Path, trouble: BaseException | typ
 
 def test_the_file_that_failed_is_named(tmp_path: Path) -> None:
     def write() -> None:
-        with written_together(tmp_path, ["page.html", "page.json"]) as (_, data):
+        with atomic_files(tmp_path, ["page.html", "page.json"]) as (_, data):
             data.unlink()
             data.mkdir()
             data.open("rb+")
@@ -222,7 +222,7 @@ def test_the_file_that_failed_is_named(tmp_path: Path) -> None:
 def test_what_was_finished_can_be_named(tmp_path: Path) -> None:
     def write() -> None:
         write_text(tmp_path / "a.txt", "a")
-        with written_together(tmp_path, ["b", "c"]):
+        with atomic_files(tmp_path, ["b", "c"]):
             pass
         write_text(tmp_path / "missing" / "d.txt", "d")
 

@@ -12,8 +12,8 @@ from sagline.files.writing import LOCK, staging, write_text
 WRITER = """
 import sys, time
 from pathlib import Path
-from sagline.files.writing import written_whole
-with written_whole(Path(sys.argv[1])) as partial:
+from sagline.files.writing import atomic_file
+with atomic_file(Path(sys.argv[1])) as partial:
     partial.write_text("half")
     print("writing", flush=True)
     time.sleep(60.0)

@@ -14,7 +14,7 @@ from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
 from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument
 from sagline.cli.terminal import note, show, show_json, show_pieces, working
 from sagline.core.errors import FileError, InvalidValueError, printable
-from sagline.files.writing import check_files, made_folder, write_text
+from sagline.files.writing import check_files, create_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.cables.model import CableModel
@@ -218,7 +218,7 @@ def _plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_jso
         sensors = Sensors(**given) if given else None
         chosen = calibration_poses(robot, count, unknowns, sensors, seed=seed, progress=line.progress)
         for file in asked.files:
-            made_folder(file.parent)
+            create_folder(file.parent)
             chosen.save(file)
     if as_json:
         show_json({**_record_of_poses(chosen), "files": list(asked.files)})
@@ -248,7 +248,7 @@ def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
 
     files = []
     for file in asked.files:
-        made_folder(file.parent)
+        create_folder(file.parent)
         if file.suffix.lower() == WHOLE:
             found.save(file)
         elif found.status is not CalibrationStatus.NOT_CONVERGED:
@@ -260,7 +260,7 @@ def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
         from sagline import plot
 
         line.stage("drawing")
-        made_folder(asked.plot.parent)
+        create_folder(asked.plot.parent)
         plot.save(plot.calibration(found), asked.plot)
         files.append(asked.plot)
     return files

@@ -12,7 +12,7 @@ import typer
 
 from sagline.cli.terminal import show
 from sagline.core.errors import FileError
-from sagline.files.writing import check_folder, made_folder, written_whole
+from sagline.files.writing import atomic_file, check_folder, create_folder
 
 KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 
@@ -36,9 +36,9 @@ def examples(
     taken = [file.name for file in sources if (folder / file.name).exists()]
     if taken and not force:
         raise FileError(folder / taken[0], "exists", "Choose another folder with --out, or replace it with --force.")
-    made_folder(folder)
+    create_folder(folder)
     for file in sources:
-        with written_whole(folder / file.name) as partial:
+        with atomic_file(folder / file.name) as partial:
             shutil.copyfile(file, partial)
     show(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}", whole=True)
     show(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml", whole=True)

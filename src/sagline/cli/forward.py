@@ -13,7 +13,7 @@ from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.options import JsonOption, Model, ModelOption, OutOption, PayloadOption, RobotArgument, WrenchOption
 from sagline.cli.tables import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.files.writing import check_files, made_folder, write_text
+from sagline.files.writing import check_files, create_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.files.measurements import Lengths
@@ -67,7 +67,7 @@ def forward(
         first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=load)
         start = first.pose if np.isfinite(first.pose.position).all() else None
         found = solve(robot, lengths.unstrained_length, start, model.build(), load, progress=line.progress)
-    made_folder(folder)
+    create_folder(folder)
     rows = _rows(lengths, found)
     write_text(target, csv_text(rows))
     lost = [k for k, status in enumerate(found.status) if status not in (ForwardStatus.SOLVED, ForwardStatus.FITTED)]

@@ -15,7 +15,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.frequency_map import frequency_map
-from sagline.files.writing import check_files, file_stem, made_folder
+from sagline.files.writing import check_files, create_folder, file_stem
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def vibrate_all_over(
     what = f"{robot.name}: modes at {len(poses):,} poses"
     with working(what, INVERSE, VIBRATION, MODES) as line:
         found = frequency_map(robot, poses, up_to=limit, damping=damping, progress=line.progress)
-        made_folder(folder)
+        create_folder(folder)
         files = [folder / f"{name}.nc"]
         found.save(files[0])
         if figures:

@@ -29,7 +29,7 @@ from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.writing import check_files, made_folder
+from sagline.files.writing import check_files, create_folder
 
 if TYPE_CHECKING:
     from sagline.cli.line import Line
@@ -133,7 +133,7 @@ def simulate(
         line.stage(f"{robot.name}: {end:g} s in time, {_cables(cable_mass.value)}")
         kind: Any = cable_mass.value
         simulation = integrated(start, duration=end, step=size, cable_mass=kind, events=events, damping=damping)
-        made_folder(file.parent)
+        create_folder(file.parent)
         simulation.save(file)
         files = [file]
         if figures:

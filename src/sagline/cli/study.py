@@ -19,7 +19,7 @@ from sagline.cli.terminal import note, show, show_json
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
-from sagline.files.writing import file_stem, made_folder
+from sagline.files.writing import create_folder, file_stem
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
@@ -233,7 +233,7 @@ def _range(values: Array) -> tuple[float, float]:
 
 def write_plans(runs: Sequence[Run], folder: FilePath) -> list[FilePath]:
     """Save the plan of each run; returns the files."""
-    made_folder(folder)
+    create_folder(folder)
     files = [folder / f"{run.name}.nc" for run in runs]
     for run, file in zip(runs, files, strict=True):
         run.plan.save(file)

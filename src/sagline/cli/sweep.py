@@ -15,7 +15,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import counted
-from sagline.files.writing import check_folder, made_folder
+from sagline.files.writing import check_folder, create_folder
 
 if TYPE_CHECKING:
     from sagline.sweep.request import Request
@@ -84,7 +84,7 @@ def sweep(
     request = load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
     check_folder(folder)
-    made_folder(folder.absolute().parent)
+    create_folder(folder.absolute().parent)
     if (folder / "done").exists():  # another's is refused here, where nobody is told that it could be gone on with
         opened_for(folder, request)
     again = _again(file, folder, workers, scheduler)

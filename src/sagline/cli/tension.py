@@ -27,7 +27,7 @@ from sagline.cli.tables import Grid, show_table
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.writing import check_files, made_folder
+from sagline.files.writing import check_files, create_folder
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
@@ -93,7 +93,7 @@ def tension(
         return OUTSIDE
     files: list[Path] = []
     if shape is not None:
-        made_folder(folder)
+        create_folder(folder)
         from sagline import plot
 
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}

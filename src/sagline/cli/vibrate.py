@@ -25,7 +25,7 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
-from sagline.files.writing import check_files, made_folder, write_text
+from sagline.files.writing import check_files, create_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.dynamics.mode_list import ListedMode
@@ -114,7 +114,7 @@ def vibrate(
             return OUTSIDE
         modes = listed_modes(found)
         _check_film(film, modes)
-        made_folder(folder)
+        create_folder(folder)
         files = [folder / f"{table}.csv"]
         write_text(files[0], csv_text(_rows(modes)))
         if figures and found.status is VibrationStatus.SOLVED and found.frequency.size:

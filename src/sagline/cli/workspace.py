@@ -17,7 +17,7 @@ from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
-from sagline.files.writing import check_files, made_folder
+from sagline.files.writing import check_files, create_folder
 
 if TYPE_CHECKING:
     from sagline.interference.pairs import Obstacle
@@ -188,7 +188,7 @@ def workspace(
         if claim is not None:
             told = line.stage(f"{robot.name}: proof")
             proof = prove(robot, claim, loads, budget=seconds, model=cable, progress=told)
-        made_folder(folder)
+        create_folder(folder)
         files = [folder / space_file]
         space.save(files[0])
         if space.nearest is None:

@@ -34,15 +34,7 @@ _DIGITS: Final = 4  # of an error: more is not known of one
 
 
 def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
-    """Write poses, tensions and lengths, and the errors to expect, to a YAML file, whole or not at all.
-
-    Args:
-        plan: The poses.
-        file: The file, "poses.yaml" for instance; one that exists is replaced.
-
-    Raises:
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
+    """Write poses, tensions and lengths, and the errors to expect, to a YAML file, whole or not at all."""
     rows = {
         "position": plan.poses.position,
         "quaternion": plan.poses.quaternion,

@@ -25,7 +25,7 @@ from sagline.control.link import (
 from sagline.core.arguments import file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.writing import written_together
+from sagline.files.writing import atomic_files
 from sagline.plc.blocks import BLOCKS, LAYOUT, Block, Field
 from sagline.robot.robot import Robot
 from sagline.twin.plc_program import FOLLOWING, TINY
@@ -74,7 +74,7 @@ def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
     instance(robot, Robot, "robot")
     path = _checked_name(file, ".scl", "an SCL source", "plc")
     text = source_text(robot)
-    with written_together(path.parent, [path.name]) as partials:
+    with atomic_files(path.parent, [path.name]) as partials:
         partials[0].write_text(text, encoding="utf-8", newline="\r\n")
     return path
 
@@ -183,7 +183,7 @@ def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bo
         header: header_text(robot, real),
         path.with_suffix(".scl"): _filled("c/sagline.scl", {}),
     }
-    with written_together(path.parent, [place.name for place in texts]) as partials:
+    with atomic_files(path.parent, [place.name for place in texts]) as partials:
         for partial, text in zip(partials, texts.values(), strict=True):
             partial.write_text(text, encoding="utf-8", newline="\n")
     source, beside, scl = texts

@@ -25,7 +25,7 @@ from sagline.files.packed import unpack_dataset
 from sagline.files.plan_file import plan_dataset, plan_of
 from sagline.files.robot_file import dump_robot
 from sagline.files.variables import PARTS, Quantity
-from sagline.files.writing import written_whole
+from sagline.files.writing import atomic_file
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 
@@ -63,19 +63,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
 
 
 def execution_of_log(log: Log, plan: int | None = None) -> Execution:
-    """The execution that is in a log.
-
-    Args:
-        log: What was read.
-        plan: As for `load_execution`.
-
-    Returns:
-        The execution.
-
-    Raises:
-        FileError: If nothing is in it, or not what is said to be.
-        InvalidValueError: If it has no such plan.
-    """
+    """The execution that is in a log."""
     count = len(log.plans)
     chosen = None if plan is None else integer(plan)
     if plan is not None and (chosen is None or not -count <= chosen < count):
@@ -118,16 +106,7 @@ def _execution(log: Log, robot: Robot, blocks: list[dict[str, NDArray[Any]]], nu
 
 
 def plan_of_log(log: Log, number: int) -> Plan:
-    """A plan of a log.
-
-    Args:
-        log: What was read.
-        number: Which, from 0.
-
-    Raises:
-        ValueError: If its bytes are none of a plan.
-        InvalidValueError: If its values are none.
-    """
+    """A plan of a log."""
     data = unpack_dataset(log.plans[number])
     return plan_of(log.path, data, f"robot of plan {number}")
 
@@ -154,14 +133,7 @@ def _check_shapes(columns: dict[str, NDArray[Any]], robot: Robot) -> None:
 
 
 def to_dataset(execution: Execution) -> Dataset:
-    """An execution as a data set: every quantity over time, with its unit.
-
-    Args:
-        execution: The execution.
-
-    Returns:
-        The data set; the robot is one of its attributes.
-    """
+    """Data set of an execution: every quantity over time, with its unit."""
     done = instance(execution, Execution, "execution")
     variables: dict[str, Any] = {
         quantity.name: ((ROWS, *quantity.parts), quantity.of(done), quantity.attributes) for quantity in CYCLES
@@ -184,15 +156,7 @@ def to_dataset(execution: Execution) -> Dataset:
 
 
 def save(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a log or to NetCDF, as its name says.
-
-    Args:
-        execution: The execution.
-        file: The file: "run.mcap" or "run.nc".
-
-    Raises:
-        FileError: If the name is of neither, the file cannot be written, or a package is missing.
-    """
+    """Write an execution to a log or to NetCDF, as its name says."""
     path = file_path(file)
     ways = {".mcap": save_execution, ".nc": save_dataset}
     if path.suffix.lower() not in ways:
@@ -201,19 +165,10 @@ def save(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a log in MCAP, whole or not at all, with plan and robot inside and every number as it is.
-
-    Args:
-        execution: The execution.
-        file: The file, "run.mcap" for instance; a regular file that exists is replaced, anything else is refused.
-
-    Raises:
-        FileError: If the file cannot be written, or a package is missing; what was there before is untouched.
-        InvalidValueError: If the execution is none.
-    """
+    """Write an execution to a log in MCAP atomically, with plan and robot inside and every number as it is."""
     done, target = instance(execution, Execution, "execution"), file_path(file)
     check_packages()
-    with written_whole(target) as partial_file, FileIO(partial_file, "wb") as stream:
+    with atomic_file(target) as partial_file, FileIO(partial_file, "wb") as stream:
         mcap = McapFile(stream, done.robot, done.period)
         number = NONE if done.plan is None else mcap.begin(done.plan)
         columns = columns_of(done)
@@ -228,15 +183,7 @@ def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a NetCDF file, whole or not at all; its plan is the group `plan`.
-
-    Args:
-        execution: The execution.
-        file: The file, "run.nc" for instance; a regular file that exists is replaced, anything else is refused.
-
-    Raises:
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
+    """Write an execution to a NetCDF file, whole or not at all; its plan is the group `plan`."""
     plan = instance(execution, Execution, "execution").plan
     groups = {} if plan is None else {PLAN_GROUP: plan_dataset(plan)}
     write_dataset(to_dataset(execution), file_path(file), groups)

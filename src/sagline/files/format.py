@@ -35,31 +35,11 @@ class Format(Content, Generic[T]):
     sealed_from: int = 1
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
-        """Write a result to a file, whole or not at all, with a digest at its end.
-
-        Args:
-            result: The result.
-            file: The file; a regular file that exists is replaced, anything else is refused.
-
-        Raises:
-            InvalidValueError: If the result is of another type, or cannot be read back.
-            FileError: If the file cannot be written; the former file is unchanged.
-        """
+        """Write a result to a file, whole or not at all, with a digest at its end."""
         write_dataset(self.pack(instance(result, self.kind, self.name)), file_path(file))
 
     def load(self, file: os.PathLike[str] | str, unsealed: Callable[[Path], None] | None = None) -> T:
-        """Read a file that `save` wrote.
-
-        Args:
-            file: The file.
-            unsealed: Called with the path of a file whose version has no digest.
-
-        Returns:
-            The result.
-
-        Raises:
-            FileError: If the file is missing, damaged, of another kind or of a newer version, or a value is not valid.
-        """
+        """Read a file that `save` wrote."""
         path = file_path(file)
         data, found = read_dataset(path, self)
         if self.format_of(path, data.attrs) >= self.sealed_from:

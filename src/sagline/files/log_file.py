@@ -36,7 +36,7 @@ _NEAR: Final = 0.7  # how like one of the keys a word is that was meant to be on
 
 
 class _Sensors(Entry):
-    """What the comments above the columns may say."""
+    """Keys of the comments above the columns."""
 
     length_deviation: Any = None
     tension_deviation: Any = None
@@ -47,18 +47,7 @@ class _Sensors(Entry):
 
 
 def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
-    """The sensors that the comments above the columns of a log tell of.
-
-    Args:
-        text: Of the file.
-        path: The file, for messages.
-
-    Returns:
-        The sensors, and the text with blank lines in place of the comments.
-
-    Raises:
-        FileError: If a comment says what no sensor is.
-    """
+    """The sensors that the comments above the columns of a log tell of."""
     lines = text.split("\n")
     count = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
@@ -96,14 +85,7 @@ def _sensors(entry: _Sensors) -> Sensors:
 
 
 def comments_of_sensors(sensors: Sensors) -> Iterator[str]:
-    """Comments from which `sensors_of_comments` has the same sensors.
-
-    Args:
-        sensors: The sensors.
-
-    Yields:
-        Lines.
-    """
+    """Comments from which `sensors_of_comments` has the same sensors."""
     for name, unit in DEVIATIONS.items():
         value: Array | None = getattr(sensors, name)
         if value is not None:
@@ -125,18 +107,7 @@ _NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:
 
 
 def log_fields(path: Path, text: str) -> dict[str, Any]:
-    """The fields of a log, but for its sensors, from the text of a table.
-
-    Args:
-        path: The file, for messages.
-        text: What is in it.
-
-    Returns:
-        Name and value of each field.
-
-    Raises:
-        FileError: If a column or a number is wrong; the message names the line.
-    """
+    """The fields of a log, but for its sensors, from the text of a table."""
     return _fields(*_read(path, text))
 
 
@@ -240,9 +211,6 @@ def _commanded(table: Table) -> Pose | None:
 def log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
     """The columns from which `log_fields` has the same fields.
 
-    Args:
-        log: The log.
-
     Yields:
         Names with units, and the numbers, shape (N,).
     """
@@ -334,28 +302,12 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
 
 
 def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
-    """Write a log to a CSV file, whole or not at all; `load_log` reads the same numbers, to the last bit.
-
-    Args:
-        log: The log.
-        file: The file, "winches.csv" for instance; a regular file that exists is replaced, anything else is refused.
-
-    Raises:
-        InvalidValueError: If it is no log.
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
+    """Write a log to a CSV file, whole or not at all; `load_log` reads the same numbers, to the last bit."""
     write_text(file_path(file), dump_log(log))
 
 
 def dump_log(log: WinchLog) -> str:
-    """A log as CSV text, in SI units, with the sensors in comments.
-
-    Args:
-        log: The log.
-
-    Raises:
-        InvalidValueError: If it is no log.
-    """
+    """A log as CSV text, in SI units, with the sensors in comments."""
     columns = dict(log_columns(instance(log, WinchLog, "log")))
     lines = [*comments_of_sensors(log.sensors), ",".join(columns)]
     rows = np.column_stack(list(columns.values())).tolist()

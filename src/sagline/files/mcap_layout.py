@@ -90,14 +90,7 @@ EVENTS: Final = {  # of what happened
 
 
 def columns_of(execution: Execution) -> dict[str, NDArray[Any]]:
-    """What there is of every cycle.
-
-    Args:
-        execution: N cycles.
-
-    Returns:
-        Arrays whose first axis is N, by the name of the quantity.
-    """
+    """Columns of N cycles, by the name of the quantity; their first axis is N."""
     return {quantity.name: quantity.of(execution) for quantity in EVERY}
 
 
@@ -185,14 +178,7 @@ def head_of(robot: str, period: float) -> bytes:
 
 
 def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
-    """Messages of cycles, for people.
-
-    Args:
-        columns: What there is of N cycles.
-
-    Yields:
-        N messages.
-    """
+    """Messages of cycles, for people."""
     away = PER_METER * (columns["set_length"] - columns["length"] - columns["zero"])
     there = {**columns, "length_error": away, "correction": PER_METER * columns["correction"]}
     kept = {name: _listed(np.round(there[name], shown.digits)) for name, shown in SHOWN.items()}
@@ -209,11 +195,7 @@ def event_text(event: Event) -> bytes:
 
 
 def event_of(text: bytes) -> Event:
-    """The event of a message.
-
-    Raises:
-        ValueError: If it is none.
-    """
+    """The event of a message."""
     try:
         said = json.loads(text)
         kind, state = EventKind(said["kind"]), State[said["state"]]
@@ -248,7 +230,7 @@ _STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17
 
 
 def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
-    """Where the platform is, as Foxglove has it.
+    """Pose of the platform as a message of Foxglove.
 
     Args:
         stamp: When [ns].
@@ -275,7 +257,7 @@ class Scene:
         self._body = _corners(robot.platform_anchors)
 
     def at(self, stamp: int, position: Array, quaternion: Array, tension: Array) -> SceneUpdate:
-        """All of it: who looks in later sees all too.
+        """The whole scene at a time, so that it is complete from any message on.
 
         Args:
             stamp: When [ns].

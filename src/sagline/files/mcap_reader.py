@@ -36,7 +36,7 @@ _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)
 
 
 class Ending(NamedTuple):
-    """How a plan ended.
+    """End of a plan.
 
     Attributes:
         status: Name of its `ExecutionStatus`.
@@ -48,7 +48,7 @@ class Ending(NamedTuple):
 
 
 class Truth(NamedTuple):
-    """Where the platform really was, once.
+    """True pose of the platform at one time.
 
     Attributes:
         stamp: When, on the log's own clock [ns].
@@ -65,7 +65,7 @@ class Truth(NamedTuple):
 
 @dataclass(slots=True)
 class Log:
-    """What has been read of a log so far.
+    """Content of a log as far as it has been read.
 
     Attributes:
         path: The file.
@@ -100,28 +100,14 @@ class LogReader:
     """
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
-        """Name the file; `more` reads it.
-
-        Args:
-            file: The file.
-
-        Raises:
-            FileError: If a package is missing.
-        """
+        """Name the file; `more` reads it."""
         self.log = Log(file_path(file))
         check_packages()
         self._offset = self._digest = 0
         self._topics: dict[int, str] = {}
 
     def more(self) -> bool:
-        """Read what has been added since.
-
-        Returns:
-            Whether there was anything.
-
-        Raises:
-            FileError: If the file is missing, no MCAP file, no log of ours, of a newer format, or damaged.
-        """
+        """Read what has been added since."""
         before, data = self._offset, self._bytes()
         if not before:
             self._check_kind(data)
@@ -258,18 +244,7 @@ class LogReader:
 
 
 def read_log(file: os.PathLike[str] | str) -> Log:
-    """A log as far as it goes.
-
-    Args:
-        file: The file.
-
-    Returns:
-        What is in it: all, or what stands before where it was cut off.
-
-    Raises:
-        FileError: If the file is missing, no MCAP file, no log of ours, cut off before it says of what robot it is, of
-            a newer format, or damaged.
-    """
+    """A log as far as it goes."""
     reader = LogReader(file)
     reader.more()
     log = reader.log
@@ -281,14 +256,7 @@ def read_log(file: os.PathLike[str] | str) -> Log:
 
 
 def begun(file: os.PathLike[str] | str) -> bool:
-    """Whether there is anything to read of a log that somebody is to write.
-
-    Args:
-        file: The file.
-
-    Returns:
-        False while it is missing, or not even its first bytes are whole; of what is no log, reading says so.
-    """
+    """Whether a log that another process writes can be read yet: False while it is missing or its first bytes are."""
     try:
         path = file_path(file)
         if kind_of(path.stat().st_mode):

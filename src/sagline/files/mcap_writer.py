@@ -1,4 +1,9 @@
-"""Logs in MCAP as they are written, of a controller while it runs."""
+"""Logs in MCAP as they are written, by chunk: complete chunks survive the end of the process.
+
+All numbers stand in `/record`, one message a chunk with the numbers of its cycles packed; attachments hold the robot
+and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and `/scene` as Foxglove
+draws them.
+"""
 
 from __future__ import annotations
 
@@ -62,18 +67,14 @@ _UNLIMITED: Final = 1 << 40  # bytes: no chunk ends by its size
 
 
 class _Unbuffered:
-    """A file that has what was written to it: the library's writer would keep some of it."""
+    """Unbuffered output: the library's own writer would buffer."""
 
     def __init__(self, file: RawIOBase) -> None:
         self._file = file
         self._size = 0
 
     def write(self, data: bytes) -> int:
-        """Write all of it.
-
-        Raises:
-            OSError: If the disk takes no more.
-        """
+        """Write all of it."""
         rest = memoryview(data)
         while rest:
             rest = rest[self._file.write(rest) or 0 :]
@@ -81,11 +82,11 @@ class _Unbuffered:
         return len(data)
 
     def tell(self) -> int:
-        """How much there is."""
+        """Number of bytes written."""
         return self._size
 
     def flush(self) -> None:
-        """Nothing is kept back."""
+        """Do nothing: nothing is buffered."""
 
 
 class McapFile:
@@ -99,9 +100,6 @@ class McapFile:
             robot: The robot.
             period: Of a cycle [s].
             epoch: What is added to times for the log's own [ns].
-
-        Raises:
-            OSError: If the disk takes no more.
         """
         import xarray  # noqa: F401 — whatever is loaded is loaded here, before anything moves
         from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
@@ -171,7 +169,7 @@ class McapFile:
         self._message(TRUTH, self.stamp(time), truth_text(time, position, quaternion))
 
     def close_chunk(self) -> None:
-        """Have everything so far in the file."""
+        """Write the chunk so far to the file."""
         self._writer.flush()
 
     def finish(self) -> None:
@@ -196,18 +194,14 @@ class McapFile:
     def _known(
         columns: Mapping[str, NDArray[Any]], stamps: list[int], share: int
     ) -> list[tuple[int, dict[str, Array]]]:
-        """Every so manieth cycle with an estimate: its stamp, pose and tensions."""
+        """Stamp, pose and tensions of each n-th cycle that has an estimate of the pose."""
         names = ("position", "quaternion", "tension")
         known = np.flatnonzero(np.isfinite(columns["position"]).all(axis=1))
         return [(stamps[k], {name: columns[name][k] for name in names}) for k in known[::share].tolist()]
 
 
 def check_packages() -> None:
-    """Find out that the packages of the logs are there.
-
-    Raises:
-        FileError: If one is not; it says how to have it.
-    """
+    """Check that the packages of the logs are installed."""
     for name in PACKAGES:
         if find_spec(name) is None:
             raise FileError.not_installed(name, "Logs need it", "log")
@@ -247,9 +241,6 @@ class Recorder:
             epoch: What is added to times of the link's clock for those of the log [ns]; None: what makes the first of
                 them the time of day.
             stream: Where to write in place of the file, unbuffered.
-
-        Raises:
-            FileError: If the file cannot be written, or a package is missing.
         """
         self.file = check_file(file_path(file))
         check_packages()
@@ -271,7 +262,7 @@ class Recorder:
 
     @property
     def stopped(self) -> str:
-        """Why nothing more is taken; "" while something is."""
+        """Reason why recording has stopped; "" while it goes on."""
         return self._why
 
     def begins(self, plan: Plan) -> None:
@@ -279,7 +270,7 @@ class Recorder:
         self._put(partial(self._begin, plan))
 
     def ends(self, status: Status, reason: str) -> None:
-        """Take how it ended, after its last cycle."""
+        """Take the end of the plan, after its last cycle."""
         self._put(partial(self._end, status.name, reason))
 
     def cycle(self, cycle: Recorded) -> None:
@@ -295,7 +286,7 @@ class Recorder:
             self._put(partial(self._mcap.event, event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
-        """Take where the platform really is, as only a twin knows.
+        """Take the true pose of the platform, known to a twin only.
 
         Args:
             time: On the twin's clock [s].
@@ -334,14 +325,14 @@ class Recorder:
             self._why = f"{self.file}: {ROOM} entries wait to be written, and no more fit; the disk is too slow"
 
     def _date(self, time_of_link: float) -> None:
-        """Have the log's times be times of day."""
+        """Date the log: from here on its times are times of day."""
         if self._epoch is None:
             self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * NANO)
             for event in self._early:
                 self._put(partial(self._mcap.event, event))
 
     def _run(self) -> None:
-        """All that the thread does."""
+        """Run the thread."""
         try:
             with self._stream:
                 self._write()

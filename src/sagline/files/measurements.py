@@ -50,13 +50,6 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
         file: The file.
         cable_count: Number of cables m of the robot.
         size: Largest extent of the robot [m]; lengths a hundred times longer must have another unit.
-
-    Returns:
-        Times, if there are any, and lengths in SI.
-
-    Raises:
-        FileError: If it cannot be read, a column is missing or unknown, a length is not positive or in
-            millimeters without saying so, or the times do not increase; the message names the line.
     """
     table, names = _read(file, "L", "m", cable_count)
     for name in names:
@@ -68,16 +61,8 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
 def load_counts(file: os.PathLike[str] | str, cable_count: int) -> Counts:
     """Read a CSV file with a column for each encoder, C0, C1, ..., and perhaps the time.
 
-    Args:
-        file: The file.
-        cable_count: Number of cables m of the robot.
-
     Returns:
         Times [s], if there are any, and counts.
-
-    Raises:
-        FileError: If it cannot be read, a column is missing or unknown, or the times do not increase; the message
-            names the line.
     """
     return Counts(*_samples(*_read(file, "C", "", cable_count)))
 

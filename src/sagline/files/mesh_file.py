@@ -16,7 +16,7 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.errors import FileError, InvalidValueError, SaglineError
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_bytes
-from sagline.files.writing import check_file, written_whole
+from sagline.files.writing import atomic_file, check_file
 from sagline.interference.mesh import MOST, Mesh, extent_text
 from sagline.workspaces.surface import Surface
 
@@ -71,18 +71,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
 
 
 def meters(unit: str, item: str) -> float:
-    """How many meters a unit is.
-
-    Args:
-        unit: Its name.
-        item: The name a message uses.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If it is no unit of length.
-    """
+    """Length of a unit [m]; InvalidValueError if it is no unit of length."""
     try:
         factor = in_si(f"1 {label(unit, item)}", "m", item)
     except InvalidValueError:
@@ -93,7 +82,7 @@ def meters(unit: str, item: str) -> float:
 
 
 def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
-    """Corners, each of them once, and triangles of some area, as the file has them."""
+    """Distinct vertices and non-degenerate triangles of a file."""
     try:
         import trimesh
     except ImportError:
@@ -120,9 +109,6 @@ def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
 def first_crossing(mesh: Mesh) -> Array | None:
     """A point where a surface meets itself other than along its edges and at its corners.
 
-    Args:
-        mesh: The surface.
-
     Returns:
         The point [m]; None if there is none.
     """
@@ -143,7 +129,7 @@ def first_crossing(mesh: Mesh) -> Array | None:
 
 
 def _apart(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
-    """Which pairs of triangles have no corner in common."""
+    """Flags of pairs of triangles without a common corner."""
     one, other = faces[pairs[:, 0]], faces[pairs[:, 1]]
     return np.asarray(~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2)))
 
@@ -160,11 +146,6 @@ def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) ->
         file: The file; its ending says what it becomes: .stl, .glb (y up, as that format wants it), .ply, .vtk or
             .vtu (meshio or PyVista writes these). One that exists is replaced.
         colors: Red, green, blue of each vertex, 0 to 255, shape (V, 3); GLB and PLY have them.
-
-    Raises:
-        FileError: If the ending is another, a package is missing, or the file cannot be written; what was there
-            before is untouched.
-        InvalidValueError: If there is nothing to write, or the colors are not of that shape.
     """
     target = file_path(file)
     ending = target.suffix.lower()
@@ -176,7 +157,7 @@ def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) ->
     check_file(target)
     content = None if ending in _VTK else _by_trimesh(surface, ending[1:], tints)
     package = _vtk_package(target) if content is None else ""
-    with written_whole(target) as partial:
+    with atomic_file(target) as partial:
         if content is not None:
             partial.write_bytes(content)
         elif package == "meshio":

@@ -1,4 +1,11 @@
-"""MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders."""
+"""MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders.
+
+The cylinders do not swivel. A cable whose platform end moves by small u in its vertical plane, across the chord, and v
+out of it, lengthens by u^2/(2 l) + v^2 cos phi/(2 s): l is its free length, s the distance of the end from the swivel
+axis. On a fixed cylinder it unrolls to a straight line, and lengthens by v^2/(2 a), a the length from its first point
+to its end. So the tendon starts where a = s/cos phi, R tan(psi/2) before it leaves the cylinder: force and stiffness
+are those of a pulley that swivels.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +46,7 @@ _LONGEST = 1e3  # radii: of a tendon before its cylinder
 
 
 class Lead(NamedTuple):
-    """How tendons begin.
+    """First points of the tendons.
 
     Attributes:
         start: Where, in the world [m], shape (m, 3).
@@ -54,18 +61,7 @@ class Lead(NamedTuple):
 
 
 def lead_of(robot: Robot, pose: Pose) -> Lead:
-    """How the tendons begin: at the frame anchors, or at the pulleys there.
-
-    Args:
-        robot: The robot.
-        pose: Where the platform starts.
-
-    Returns:
-        Lead.
-
-    Raises:
-        CableGeometryError: If a platform end is inside its pulley.
-    """
+    """First points of the tendons, at the frame anchors or at their pulleys."""
     radius, entry = pulleys_of(robot)
     wrap = touching_angle(robot, pose)
     if np.isnan(wrap).any():
@@ -88,14 +84,7 @@ def free_chords(robot: Robot, pose: Pose) -> Array:
 
 
 def add_pulleys(world: Element, robot: Robot, pose: Pose, lead: Lead) -> None:
-    """Add the pulleys, each a body of its own that stands still.
-
-    Args:
-        world: What they are added to.
-        robot: The robot.
-        pose: Where the platform starts.
-        lead: How the tendons begin.
-    """
+    """Add the pulleys, each a body of its own that stands still."""
     radius = pulleys_of(robot).radius
     toward, centers = outward(robot, pose), wheel_centers(robot, pose)
     for i in np.flatnonzero(radius > 0.0):
@@ -131,7 +120,7 @@ _SHORTEST = 1e-6  # of a cable [m]
 
 
 class _Dynamics(NamedTuple):
-    """How the model is stepped and damped.
+    """Time step and damping of the model.
 
     Attributes:
         step: Time step [s].
@@ -251,7 +240,7 @@ def _checked(robot: Robot, lengths: ArrayLike) -> Array:
 
 
 def _add_view(root: Element, robot: Robot) -> float:
-    """What MuJoCo's camera shall see: the frame. Returns the size of the robot [m]."""
+    """Add center and extent of the frame for MuJoCo's camera; returns the size of the robot [m]."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     size = float(np.linalg.norm(high - low)) + float(np.linalg.norm(np.ptp(robot.platform_anchors, axis=0)))
     SubElement(root, "statistic", center=numbers_text(0.5 * (low + high)), extent=numbers_text((size,)))

@@ -1,4 +1,8 @@
-"""NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only."""
+"""NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only.
+
+HDF5 states its own length and ignores what follows, so the digest stands behind it. It is checked before anything else
+is read: a library that reads a damaged file may ask for any amount of memory and time.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,7 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.reading import kind_of
 from sagline.files.robot_file import parse_robot
 from sagline.files.variables import PARTS
-from sagline.files.writing import written_whole
+from sagline.files.writing import atomic_file
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -29,7 +33,7 @@ _BLOCK = 1 << 20  # bytes read at once
 
 
 class Seal(Enum):
-    """What the end of a file says about the rest."""
+    """State of the digest at the end of a file."""
 
     WHOLE = "the file is as it was written"
     BROKEN = "something in it has changed since it was written"
@@ -37,30 +41,13 @@ class Seal(Enum):
 
 
 def seal(file: Path) -> None:
-    """Put the digest of a file at its end.
-
-    Args:
-        file: The file.
-
-    Raises:
-        OSError: If it cannot be read or written.
-    """
+    """Put the digest of a file at its end."""
     with file.open("rb+") as handle:
         handle.write(_line(handle, file.stat().st_size))
 
 
 def seal_of(file: Path) -> Seal:
-    """What the end of a file says about the rest.
-
-    Args:
-        file: The file.
-
-    Returns:
-        Whether its digest is there, and right.
-
-    Raises:
-        OSError: If it cannot be read.
-    """
+    """State of the digest at the end of a file."""
     with file.open("rb") as handle:
         before = max(0, file.stat().st_size - _LENGTH)
         handle.seek(before)
@@ -72,7 +59,7 @@ def seal_of(file: Path) -> Seal:
 
 
 def _line(handle: BinaryIO, size: int) -> bytes:
-    """The last line of a file whose content is read from here; the place behind it is where to write the line."""
+    """Digest line over the next bytes of a file; the position is behind them afterwards."""
     found = sha256()
     while size > 0 and (block := handle.read(min(_BLOCK, size))):
         found.update(block)
@@ -111,18 +98,7 @@ class Content:
     version: int
 
     def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
-        """The format of a file.
-
-        Args:
-            path: The file.
-            attributes: Of its data set.
-
-        Returns:
-            The format, from 1 on.
-
-        Raises:
-            FileError: If it is of something else, or of a format that this sagline does not read.
-        """
+        """Version of the format of a file; FileError if it is of other content or of a newer version."""
         found = attributes.get(self.key)
         if found is None:
             raise FileError(path, *self._instead(attributes))
@@ -140,31 +116,19 @@ class Content:
         return int(found)
 
     def _instead(self, attributes: Mapping[str, Any]) -> tuple[str, str]:
-        """What a file is of instead, and what to do with it."""
+        """Other content of a file, and the next step."""
         for key, (what, step) in OTHERS.items():
             if key in attributes:
                 return f"is {what} of sagline, no {self.name}", step
         return f"is no {self.name} of sagline, it names no {self.key}", "Check that this is the file you mean."
 
     def check_sealed(self, path: Path, found: Seal) -> None:
-        """Refuse a file without a digest.
-
-        Args:
-            path: The file.
-            found: What its end says.
-
-        Raises:
-            FileError: If it has none.
-        """
+        """Refuse a file without a digest."""
         if found is Seal.MISSING:
             raise FileError(path, "is not as it was written: its digest is missing", self.again, item="digest")
 
     def attributes(self, title: str) -> dict[str, Any]:
-        """What every file of it says of itself.
-
-        Args:
-            title: Of this file.
-        """
+        """Attributes of every file of this content."""
         return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
 
 
@@ -182,16 +146,7 @@ HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take besid
 def labeled_dataset(
     variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
 ) -> Dataset:
-    """Make a data set whose dimensions carry labels, without indexes: whoever reads the file builds those needed.
-
-    Args:
-        variables: Dimensions, values and attributes of each variable, by name.
-        attributes: Attributes of the data set.
-        coordinates: Coordinates besides the labels of `PARTS`.
-
-    Returns:
-        The data set.
-    """
+    """Make a data set whose dimensions carry labels, without indexes: whoever reads the file builds those needed."""
     from xarray import Coordinates, Dataset
 
     parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
@@ -205,20 +160,11 @@ def numbered(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
 
 
 def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
-    """Write a data set, with a digest over all values and attributes at the end, behind what NetCDF reads.
-
-    Args:
-        data: The data set; one of its attributes is the robot.
-        file: The file; a regular file that exists is replaced, anything else is refused.
-        groups: Data sets that stand in groups of their own inside, each with its robot.
-
-    Raises:
-        FileError: If the file cannot be written; what was there before is untouched.
-    """
+    """Write a data set, with a digest over all values and attributes at the end, behind what NetCDF reads."""
     parts: list[tuple[str | None, Dataset]] = [(None, data), *(groups or {}).items()]
     texts = [value for _, part in parts for value in part.attrs.values() if isinstance(value, str)]
     size = sum(part.nbytes + HEADERS for _, part in parts) + sum(len(text.encode()) for text in texts)
-    with written_whole(file, size=size) as partial:
+    with atomic_file(file, size=size) as partial:
         try:
             for group, part in parts:
                 # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
@@ -232,32 +178,14 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
 
 
 def read_dataset(path: Path, content: Content) -> tuple[Dataset, Seal]:
-    """A whole file.
-
-    Args:
-        path: The file.
-        content: What it should be of, for the messages.
-
-    Returns:
-        What is in it, and whether it carries a digest: one that is wrong is refused before anything else is read.
-
-    Raises:
-        FileError: If it is missing, no file, not readable, damaged, or no NetCDF file.
-    """
+    """Data set of a file and the state of its digest; FileError if it is missing, damaged or no NetCDF file."""
     found = _seal(path, content)
     return _opened(path, content), found
 
 
 @contextmanager
 def file_errors(path: Path) -> Iterator[None]:
-    """Tell what is wrong with the values of a file with the file that has them.
-
-    Args:
-        path: The file.
-
-    Raises:
-        FileError: If a variable or an attribute is missing, or a value is none that will do.
-    """
+    """Turn errors about values of a file into a FileError that names the file."""
     try:
         yield
     except KeyError as error:
@@ -268,12 +196,7 @@ def file_errors(path: Path) -> Iterator[None]:
 
 
 def is_of(path: Path, content: Content) -> bool:
-    """Whether a file says that it is of this content; nothing else of it is looked at.
-
-    Args:
-        path: The file; of one that is none, or cannot be read, `read_dataset` says why.
-        content: What it may be of.
-    """
+    """Whether the attributes of a file name this content; nothing else is checked."""
     from h5py import File
 
     try:
@@ -286,7 +209,7 @@ def is_of(path: Path, content: Content) -> bool:
 
 
 def _seal(path: Path, content: Content) -> Seal:
-    """What a file's end says, before anything else in it is believed."""
+    """State of a file's digest, checked before anything else in it is read."""
     try:
         if kind := kind_of(path.stat().st_mode):  # opening a pipe would wait for its writer
             raise FileError(path, f"is {kind.text}", kind.next_step)
@@ -318,7 +241,7 @@ def _opened(path: Path, content: Content) -> Dataset:
 
 
 def _cause(path: Path, content: Content) -> tuple[str, str]:
-    """Why a file is none of ours, and what to do; what the libraries say of it is for those who know its format."""
+    """Reason why a file cannot be read, and the next step; the libraries' own messages are too technical."""
     with path.open("rb") as file:
         begin = file.read(len(_BEGIN))
     if begin == _BEGIN:
@@ -336,19 +259,7 @@ def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[
 
 
 def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
-    """A model, method or the like as attributes: its name, and each of its options that is set.
-
-    Args:
-        key: What the attributes begin with.
-        choice: What was chosen.
-        choices: What can be read back, by name.
-
-    Returns:
-        Attributes.
-
-    Raises:
-        InvalidValueError: If it is none of these.
-    """
+    """A model, method or the like as attributes: its name, and each of its options that is set."""
     if choices.get(type(choice).__name__) is not type(choice):
         raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
     options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
@@ -358,21 +269,7 @@ def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -
 def choice_of(
     path: Path, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
 ) -> Choice:
-    """What `choice_attributes` wrote.
-
-    Args:
-        path: The file, for messages.
-        attributes: Of the file.
-        key: What the attributes begin with.
-        choices: What it may be, by name.
-        **known: Options that are elsewhere in the file.
-
-    Returns:
-        What was chosen.
-
-    Raises:
-        FileError: If it is none of these, or an option is of another kind.
-    """
+    """Object whose attributes `choice_attributes` wrote; FileError if its kind or an option is unknown."""
     name = attributes[key]
     if name not in choices:
         refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")

@@ -28,19 +28,7 @@ _LEAST_STEP = 1e-12  # s; over less, differences of positions tell no velocity
 
 
 def path_from_table(path: FilePath, text: str) -> Path:
-    """The path of a CSV text.
-
-    Args:
-        path: The file, for messages.
-        text: What is in it.
-
-    Returns:
-        The path, its velocities and accelerations those of a spline.
-
-    Raises:
-        FileError: If a column, row or number is wrong; it names the line.
-        InvalidValueError: If the samples are no path for a reason that is no single line's.
-    """
+    """The path of a CSV text."""
     table = Table.read(path, text, UNITS)
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)

@@ -22,17 +22,7 @@ WRENCH_STEP: Final = (
 
 
 def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
-    """Plain decimal numbers.
-
-    Args:
-        parts: Their texts.
-        item: What they are, for the message.
-        unit: Their unit, for the message.
-        largest: Largest absolute value.
-
-    Raises:
-        InvalidValueError: If one is no such number, or too large.
-    """
+    """Plain decimal numbers."""
     found = []
     for part in parts:
         number = plain_number(part)
@@ -43,31 +33,13 @@ def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[
 
 
 def pose_of(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose:
-    """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees.
-
-    Args:
-        text: The text.
-        item: What it is, for the message.
-        step: What a message tells to do.
-
-    Raises:
-        InvalidValueError: If it is none.
-    """
+    """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees."""
     place = _three_or_six(text, item, "m or degrees", FARTHEST, step)
     return Pose.from_euler(place[:3], *np.radians(place[3:]))
 
 
 def wrench_of(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
-    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none.
-
-    Args:
-        text: The text.
-        item: What it is, for the message.
-        step: What a message tells to do.
-
-    Raises:
-        InvalidValueError: If it is none.
-    """
+    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none."""
     return None if text is None else np.array(_three_or_six(text, item, "N or N m", STRONGEST, step))
 
 
@@ -90,7 +62,7 @@ class _Euler(Entry):
 
 
 class PoseEntry(Entry):
-    """What a file says of a pose."""
+    """Pose in a file."""
 
     position: Any
     euler: _Euler | None = None
@@ -98,18 +70,7 @@ class PoseEntry(Entry):
 
 
 def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
-    """The pose that a file means.
-
-    Args:
-        entry: What it says.
-        item: What messages call it.
-
-    Returns:
-        A single pose.
-
-    Raises:
-        InvalidValueError: If it is none, or farther away than any machine.
-    """
+    """The pose that a file means."""
     position = numbers_of(entry.position, 3, "m", f"{item}.position")
     if (far := float(np.abs(position).max())) > FARTHEST:
         raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
@@ -133,17 +94,8 @@ def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
 def numbers_of(value: Any, count: int, unit: str, item: str) -> Array:
     """So many numbers in SI.
 
-    Args:
-        value: What a file says.
-        count: How many they must be.
-        unit: Their unit in SI.
-        item: What messages call them.
-
     Returns:
         Array of shape (count,).
-
-    Raises:
-        InvalidValueError: If they are something else.
     """
     numbers = checked(in_si(value, unit, item), item, unit)
     if numbers.shape != (count,):

@@ -35,9 +35,6 @@ def plain_number(text: str) -> float | None:
 
     What else is a number to YAML, Python or C is none here: 1:30, 0x10, 1_000, digits of other alphabets.
 
-    Args:
-        text: The text; blanks around the number do not matter.
-
     Returns:
         The number, infinite only where the text says so (1e999 is the largest float64); None where it is none.
 
@@ -60,20 +57,7 @@ def within_reach(number: float) -> bool:
 
 
 def in_si(value: object, unit: str, item: str) -> Nested:
-    """A quantity, or nested lists of quantities, as numbers in an SI unit.
-
-    Args:
-        value: Number (in the SI unit), text such as "22 mm^2", or lists of them.
-        unit: The SI unit the result is in, "m^2" for instance; "" for none.
-        item: The name a message uses.
-
-    Returns:
-        A number, or lists of numbers nested like the value. Infinities pass, ranges are the caller's to check.
-
-    Raises:
-        InvalidValueError: If something is no quantity, is not a number (NaN), is out of reach (see
-            `within_reach`), or has another unit.
-    """
+    """A quantity, or nested lists of quantities, as numbers in an SI unit."""
     if isinstance(value, list | tuple):
         return [in_si(element, unit, f"{item}[{i}]") for i, element in enumerate(value)]
     number = _from_text(value, unit) if isinstance(value, str) else _from_number(value)
@@ -104,13 +88,13 @@ def _from_text(text: str, unit: str) -> float | None:
 
 
 def _capped(number: float) -> float:
-    """Infinity is a word; a number with too many digits is none of it."""
+    """Number within the range of float64: only words are infinite, not too many digits."""
     return max(-float_info.max, min(number, float_info.max))
 
 
 @lru_cache(maxsize=1000)
 def _factor(given: str, wanted: str) -> float | None:
-    """How many of the wanted unit one of the given is; None if it is no such unit."""
+    """Factor from a unit to the wanted one; None if it does not convert."""
     from pint.errors import PintError
 
     units = _registry()

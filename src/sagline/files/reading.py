@@ -12,7 +12,7 @@ from sagline.core.errors import FileError
 
 
 class Kind(NamedTuple):
-    """What is no regular file.
+    """Kind of a directory entry that is no regular file.
 
     Attributes:
         text: What it is.
@@ -34,10 +34,7 @@ _KINDS = {
 
 
 def kind_of(mode: int) -> Kind | None:
-    """What something is that is no regular file.
-
-    Args:
-        mode: As `os.stat` gives it.
+    """Kind of a directory entry from its mode; None for a regular file.
 
     Returns:
         What it is; None for a regular file.
@@ -50,7 +47,7 @@ _OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-1
 
 
 def exists(path: Path) -> bool:
-    """Whether there is something of that name; there is nothing of a name that no file can have."""
+    """Whether a path exists; False for a name that no file can have."""
     try:
         path.stat()
     except (OSError, ValueError):
@@ -59,17 +56,11 @@ def exists(path: Path) -> bool:
 
 
 def read_bytes(path: Path, limit: float) -> bytes:
-    """A whole regular file; nothing else is opened, so that none waits for a writer or never ends.
+    """Bytes of a regular file of up to so many MB; pipes and devices are not opened, as they may never end.
 
     Args:
         path: The file.
         limit: Largest size that is read [MB].
-
-    Returns:
-        What is in it.
-
-    Raises:
-        FileError: If it is missing, no regular file, unreadable, or larger than the limit.
     """
     most = int(limit * MEGABYTE)
     try:
@@ -87,17 +78,11 @@ def read_bytes(path: Path, limit: float) -> bytes:
 
 
 def read_text(path: Path, limit: float) -> str:
-    """A whole text file in UTF-8, with or without a byte order mark.
+    """Text of a file in UTF-8 of up to so many MB, without a byte order mark.
 
     Args:
         path: The file.
         limit: Largest size that is read [MB].
-
-    Returns:
-        The text, without a byte order mark.
-
-    Raises:
-        FileError: If it is missing, no regular file, unreadable, too large, or not text in UTF-8.
     """
     data = read_bytes(path, limit)
     if other := _OTHER_TEXT.get(data[:2]):
@@ -114,15 +99,6 @@ def read_text(path: Path, limit: float) -> str:
 
 
 def error_at_line(path: Path | str, reason: str, next_step: str) -> FileError:
-    """An error whose item is the line that its reason names, if it names one.
-
-    Args:
-        path: The file.
-        reason: Description of the problem, with the line ("line 3").
-        next_step: Action that solves it.
-
-    Returns:
-        The error, to be raised.
-    """
+    """An error whose item is the line that its reason names, if it names one."""
     line = re.search(r"\bline \d+", reason)
     return FileError(path, reason, next_step, item=line and line[0])

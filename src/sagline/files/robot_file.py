@@ -72,18 +72,7 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
 
 
 def parse_robot(text: str, origin: Path | str) -> Robot:
-    """A robot from the text of a robot file.
-
-    Args:
-        text: The YAML text.
-        origin: The file or whatever else the text came from, for the messages.
-
-    Returns:
-        The robot, checked.
-
-    Raises:
-        FileError: If the text is no robot file; the message names the line, or the key and the value.
-    """
+    """A robot from the text of a robot file."""
     entry = robot_entry(text, origin)
     try:
         return entry.robot()
@@ -92,18 +81,7 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
 
 
 def robot_entry(text: str, origin: Path | str) -> RobotEntry:
-    """What a robot file says, every key known and of its type; values are not checked.
-
-    Args:
-        text: The YAML text.
-        origin: The file or whatever else the text came from, for the messages.
-
-    Returns:
-        The entry.
-
-    Raises:
-        FileError: If the text is no robot file; the message names the line or the key.
-    """
+    """Entry of a robot file with known keys of the right type; values are not checked."""
     return validated(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
 
 
@@ -166,7 +144,7 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
 
 
 def _winches(winches: Winch) -> dict[str, Any]:
-    """What a file must say of winches: what a winch of nothing but pulleys does not have anyway."""
+    """Keys of winches that differ from those of a winch with pulleys only."""
     plain = Winch().per_cable(len(winches.pulley_radius)).known()
     data = {
         key: field.tolist()
@@ -188,7 +166,7 @@ def _is_name(text: str, path: Path) -> bool:
 
 
 def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
-    """What stands around a robot, from the `scene` of its file.
+    """Obstacles around a robot, from the `scene` of its file.
 
     A scene is a list; positions are in the world, a quantity is a number in SI or a text with its unit:
 

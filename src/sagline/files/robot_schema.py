@@ -37,7 +37,7 @@ _EITHER: Final = "one of box, capsule, sphere, mesh"
 
 
 class Place(Entry):
-    """One thing that stands around.
+    """Obstacle around the robot.
 
     Attributes:
         name: What it is called.
@@ -64,11 +64,7 @@ class Place(Entry):
     turned: Any = 0.0
 
     def kind(self, item: str) -> str:
-        """Which of the four it is, every other key fitting it.
-
-        Raises:
-            InvalidValueError: If it is none or several, or a key is missing or belongs to another.
-        """
+        """Kind of the obstacle; InvalidValueError if its keys do not go together."""
         label(self.name, f"{item}.name")
         given = self.model_fields_set - {"name"}
         found = [kind for kind in _KINDS if kind in given]
@@ -84,7 +80,7 @@ class Place(Entry):
         return kind
 
     def solid(self, item: str, kind: str) -> Box | Capsule | Sphere:
-        """The thing, where it is none from a file."""
+        """Box, capsule or sphere of the entry."""
         if kind == "box":
             size = exactly(in_si(self.box, "m", f"{item}.box"), f"{item}.box", "m", (3,), above=0.0)
             return Box(size, self._point(item, "center"), self.pose(item).matrix, self.name)
@@ -95,7 +91,7 @@ class Place(Entry):
         return Capsule(ends[0], ends[1], radius, self.name)
 
     def pose(self, item: str) -> Pose:
-        """Where its own frame is: the position of a mesh, and the turn about z."""
+        """Pose of the obstacle's frame: the position of a mesh, and the turn about z."""
         angle = number(in_si(self.turned, "rad", f"{item}.turned"), f"{item}.turned", "rad")
         return Pose.from_euler(self._point(item, "position"), angle, 0.0, 0.0)
 
@@ -110,11 +106,7 @@ class Place(Entry):
 
 
 def check_scene(places: list[Place]) -> None:
-    """Refuse what is wrong with a scene's values; meshes are not looked for.
-
-    Raises:
-        InvalidValueError: If a value has a wrong unit or shape, or is out of range.
-    """
+    """Check the values of a scene; mesh files are not opened."""
     for k, place in enumerate(places):
         item = f"scene[{k}]"
         kind = place.kind(item)
@@ -305,7 +297,7 @@ class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
 
 
 def _in_percent(value: object) -> bool:
-    """Whether a text, or the first of a list, is a share in percent."""
+    """Whether a text, or the first of a list, is in percent."""
     if isinstance(value, list):
         return bool(value) and _in_percent(value[0])
     return isinstance(value, str) and value.rstrip().endswith("%")
@@ -330,7 +322,7 @@ class _Calibration(_RobotPart):
     standard_error: _Deviations = Field(default_factory=_Deviations)
 
     def provenance(self, robot: Robot) -> Provenance:
-        """Where the robot's numbers come from."""
+        """Provenance of the robot's numbers."""
         return Provenance(self.log, self.date, self.standard_error.of(robot, _ERROR), self.note)
 
 
@@ -362,14 +354,7 @@ class RobotEntry(_RobotPart):
     scene: list[Place] = Field(default_factory=list)  # the file's, not the robot's: sagline.files.robot_file
 
     def robot(self) -> Robot:
-        """The robot the file describes.
-
-        Returns:
-            The robot, checked.
-
-        Raises:
-            InvalidValueError: If a value has a wrong unit, or is none the robot accepts.
-        """
+        """The robot the file describes."""
         keys = self.model_fields_set - {"scene", "tolerances", "calibration"}
         fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in keys}
         check_scene(self.scene)

@@ -30,15 +30,6 @@ def read_xml(path: Path) -> Element:
 
     A file that declares entities is refused, so that none can grow without bound or name another file; a document
     type is skipped, and what it points to is never opened.
-
-    Args:
-        path: The file.
-
-    Returns:
-        The root element.
-
-    Raises:
-        FileError: If the file is missing, unreadable, too large, no complete XML, or declares entities.
     """
     data = read_bytes(path, _LIMIT)
     builder, parser = TreeBuilder(), expat.ParserCreate()
@@ -67,9 +58,6 @@ def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
 
     Returns:
         The numbers, shape (count,).
-
-    Raises:
-        InvalidValueError: If the text is missing or says anything else; the message names the item.
     """
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
     values = [number for number in found if number is not None and within_reach(number)]
@@ -87,30 +75,12 @@ def number(text: str | None, item: str, unit: str) -> float:
         text: The text; None where the file has none.
         item: The name a message uses.
         unit: Its unit, for the message; "" for none.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If the text is missing or says anything else; the message names the item.
     """
     return float(numbers(text, 1, item, unit)[0])
 
 
 def only_child(parent: Element, tag: str, item: str) -> Element:
-    """The element of this tag inside another.
-
-    Args:
-        parent: The element to look in.
-        tag: The tag to look for.
-        item: What the parent is called in a message.
-
-    Returns:
-        The element.
-
-    Raises:
-        InvalidValueError: If there is none, or more than one.
-    """
+    """The element of this tag inside another."""
     found = parent.findall(tag)
     if len(found) != 1:
         raise InvalidValueError(
@@ -120,7 +90,7 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
 
 
 def _cause(error: Exception, data: bytes) -> tuple[str, str]:
-    """What is wrong with bytes that expat does not take, and what to do."""
+    """Reason why expat does not accept the bytes, and the next step."""
     if not data.strip():
         return "is empty", "Write it again; it may have been cut off."
     declared = _DECLARED.match(data)
@@ -178,13 +148,5 @@ class Imported:
 
 
 def imported(robot: Robot, lost: tuple[str, ...]) -> Imported:
-    """A robot whose notes tell what was lost, so that its file does too.
-
-    Args:
-        robot: The robot that was read.
-        lost: What the file gives and the robot does not hold, one sentence each.
-
-    Returns:
-        Both; the robot's notes begin with "Not taken over:" where something was lost.
-    """
+    """A robot whose notes tell what was lost, so that its file does too."""
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

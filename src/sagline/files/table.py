@@ -57,21 +57,7 @@ class Table:
         strangers: Mapping[str, str] = _NONE,
         gaps: Collection[str] = (),
     ) -> Table:
-        """Read a CSV text whose first row names its columns, `name` or `name [unit]`.
-
-        Args:
-            path: The file, for messages.
-            text: What is in it.
-            units: The columns it may have, and the SI unit of each.
-            strangers: Columns of another kind of table, and what to do with one of these.
-            gaps: Columns whose cells may be blank, or nan.
-
-        Returns:
-            The table, all its numbers finite; NaN in the gaps.
-
-        Raises:
-            FileError: If it is no such text; the message names the line.
-        """
+        """Read a CSV text whose first row names its columns, `name` or `name [unit]`."""
         reader = csv.reader(io.StringIO(text), strict=True)
         found: dict[str, float | None] = {}
         numbers, lines, header = array("d"), array("q"), 0
@@ -110,9 +96,6 @@ class Table:
             values: Its values, shape (rows,).
             unit: Their unit; "" for none.
             allowed: What would do.
-
-        Raises:
-            FileError: If a row is wrong; it names the line.
         """
         if wrong.any():
             k = int(np.argmax(wrong))
@@ -126,9 +109,6 @@ class Table:
             name: The column.
             size: Size of what the lengths belong to [m], shape () or (rows,).
             whole: What that is, for the message.
-
-        Raises:
-            FileError: If a length is more than a hundred times that size; it names the line.
         """
         if name in self.plain:
             far = self.columns[name] > _TOO_LONG * size
@@ -189,16 +169,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
 
 
 def line_error(path: FilePath, line: int, reason: str) -> FileError:
-    """An error that names the line.
-
-    Args:
-        path: The file.
-        line: The line, from 1.
-        reason: What is wrong with it, and what is allowed.
-
-    Returns:
-        The error, to be raised.
-    """
+    """An error that names the line."""
     found = FileError(path, f"line {line}: {reason}", f"Correct line {line}.", item=f"line {line}")
     found.value, _, found.allowed = reason.partition("; allowed: ")
     return found

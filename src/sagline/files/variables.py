@@ -28,7 +28,7 @@ PARTS = {
 
 
 class Known(Enum):
-    """Where a quantity has values; elsewhere it is NaN."""
+    """Poses at which a quantity has values; elsewhere it is NaN."""
 
     EVERYWHERE = "at every pose"
     SOLVED = "at the solved poses alone"
@@ -137,10 +137,6 @@ def check_variables(
         sizes: Number of entries along each dimension that has no labels.
         rows: Dimensions before those of the declaration.
         solved: Rows at which there is a solution; None: all.
-
-    Raises:
-        KeyError: If a variable is missing.
-        InvalidValueError: If one is not as declared; the message names its first wrong value.
     """
     for name, labels in PARTS.items():
         if name in data.variables and list(data.variables[name].values) != list(labels):

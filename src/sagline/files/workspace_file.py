@@ -265,9 +265,6 @@ def _nearest(text: str) -> Nearest:
 def field_of(space: Workspace) -> Dataset:
     """Level, margin, deciding criterion and cable at the nodes of a workspace's grid.
 
-    Args:
-        space: The workspace.
-
     Returns:
         Data set with dimensions x, y and z [m].
     """

@@ -1,4 +1,9 @@
-"""Atomic file writing."""
+"""Atomic file writing, names of files, and JSON text.
+
+A file is written beside its target and takes the target's name in one step, so that it is complete or absent. Folders,
+devices, pipes, sockets and links are refused as targets; links among the folders above are followed. A file that is
+replaced keeps its permissions; other names of the same file (hard links) keep the former content.
+"""
 
 from __future__ import annotations
 
@@ -34,13 +39,6 @@ def file_stem(name: str, *words: str) -> str:
     Letters and digits of all scripts, dots, hyphens and underscores stay, and spaces become hyphens. Where anything
     else was in the name, or it was too long, eight digits of its digest follow, so that two robots do not share files.
 
-    Args:
-        name: What the robot is called; any text.
-        *words: What else the file is about, "catenary" or "poses": letters, digits and hyphens.
-
-    Returns:
-        The name, its parts joined by hyphens.
-
     Examples:
         >>> from sagline.files.writing import file_stem
         >>> file_stem("hall camera", "catenary")
@@ -73,18 +71,9 @@ TRIES = 100
 
 @contextmanager
 def staging(folder: Path) -> Iterator[Path]:
-    """A folder of its own inside a folder, to write to; it is gone when the block ends.
+    """New temporary folder inside a folder, removed when the block ends.
 
     What processes that were killed have left there is removed first.
-
-    Args:
-        folder: Where; its file system is that of the files to be, so that a file can be moved in one step.
-
-    Yields:
-        The new folder.
-
-    Raises:
-        OSError: If it cannot be created.
     """
     for left in folder.glob(f"{PREFIX}*{SUFFIX}"):
         _remove_if_left(left)
@@ -97,26 +86,26 @@ def staging(folder: Path) -> Iterator[Path]:
 
 
 def _new_place(folder: Path) -> tuple[Path, int]:
-    """A new folder and the lock that says that it is in use; one that another process takes for left is given up."""
+    """New folder and its lock; another is made if a process has removed it as abandoned."""
     for _ in range(TRIES):
         place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
         try:
             lock = _opened(place)
         except FileNotFoundError:
             continue
-        if is_taken(lock, if_unknown=True) and os.fstat(lock).st_nlink:
+        if try_lock(lock, if_unknown=True) and os.fstat(lock).st_nlink:
             return place, lock
         os.close(lock)
     raise TimeoutError(f"other processes remove what is written in {folder}")
 
 
 def _remove_if_left(place: Path) -> None:
-    """Remove a folder that nobody is using any more; one that cannot be removed stays."""
+    """Remove a folder that no process uses; one that cannot be removed stays."""
     with suppress(OSError):
         if place.is_symlink():
             return
         lock = _opened(place)
-        if is_taken(lock, if_unknown=False):
+        if try_lock(lock, if_unknown=False):
             shutil.rmtree(place, ignore_errors=True)
         os.close(lock)
 
@@ -128,13 +117,8 @@ def _opened(place: Path) -> int:
     return os.open(place / LOCK, flags, 0o600)
 
 
-def is_taken(lock: int, *, if_unknown: bool) -> bool:
-    """Whether a lock could be taken: False where another process holds it.
-
-    Args:
-        lock: The open file.
-        if_unknown: The answer where the file system, or Windows, knows no locks.
-    """
+def try_lock(lock: int, *, if_unknown: bool) -> bool:
+    """Whether the lock of an open file could be taken; `if_unknown` where the system has no locks."""
     if sys.platform == "win32":
         return if_unknown
     import fcntl
@@ -152,43 +136,20 @@ _finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
 
 
 @contextmanager
-def written_whole(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
-    """A place to write to that becomes the file only when the block ends well.
+def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
+    """Temporary file that replaces a file when the block ends without an error.
 
     The block writes to a new file beside the real one. When it ends, that file is flushed to the disk and takes the
     real one's name in one step; when it fails or is interrupted, it is removed and whatever was there before stays.
-
-    Args:
-        file: The file to be.
-        size: Bytes it will have or more; that they fit is found out before the block begins.
-
-    Yields:
-        Path of the file to write; it exists and is empty.
-
-    Raises:
-        FileError: If the name is taken by something that is no regular file, the folder is missing or cannot be
-            written, or the disk is full.
     """
     target = check_file(file)
-    with written_together(target.parent, [target.name], size) as (partial,):
+    with atomic_files(target.parent, [target.name], size) as (partial,):
         yield partial
 
 
 @contextmanager
-def written_together(folder: os.PathLike[str] | str, names: Sequence[str], size: int = 0) -> Iterator[tuple[Path, ...]]:
-    """Places to write to that become files of one folder together, only when the block ends well.
-
-    Args:
-        folder: The folder; it exists.
-        names: Names of the files to be.
-        size: Bytes that they will have or more.
-
-    Yields:
-        Path of each file to write; they exist and are empty.
-
-    Raises:
-        FileError: As for `written_whole`; then none of them has been written.
-    """
+def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int = 0) -> Iterator[tuple[Path, ...]]:
+    """Temporary files that replace files of one folder together when the block ends without an error."""
     targets = [check_file(Path(folder) / name) for name in names]
     try:
         with staging(Path(folder)) as place:
@@ -210,33 +171,20 @@ def written_together(folder: os.PathLike[str] | str, names: Sequence[str], size:
 
 
 def write_text(file: os.PathLike[str] | str, text: str) -> None:
-    """Write a text in UTF-8, whole or not at all.
-
-    Args:
-        file: The file; one that exists is replaced.
-        text: What is to stand in it.
-
-    Raises:
-        FileError: If the file cannot be written, or the text holds half a character; what was there before is
-            untouched.
-    """
+    """Write a text in UTF-8 atomically."""
     try:
         content = text.encode()
     except UnicodeEncodeError as error:
         found = f"U+{ord(text[error.start]):04X} in {text[max(0, error.start - 20) : error.start]!r}…"
         step = "Correct the name or note it comes from."
         raise FileError(Path(file), f"cannot hold half a character ({found})", step) from None
-    with written_whole(file) as partial:
+    with atomic_file(file) as partial:
         partial.write_bytes(content)
 
 
 @contextmanager
 def finished_files() -> Iterator[list[Path]]:
-    """What gets finished while inside: what there is to name when something after it fails.
-
-    Yields:
-        The files written whole so far, in order; it grows.
-    """
+    """List of the files completed inside the block, in order."""
     files: list[Path] = []
     token = _finished.set(files)
     try:
@@ -246,17 +194,7 @@ def finished_files() -> Iterator[list[Path]]:
 
 
 def check_file(file: os.PathLike[str] | str) -> Path:
-    """Refuse a name that a file could not be written to, without touching it.
-
-    Args:
-        file: The file to be.
-
-    Returns:
-        Its path.
-
-    Raises:
-        FileError: If the name is taken by something other than a regular file that may be written, or is no name.
-    """
+    """Refuse a name that a file could not be written to, without touching it."""
     target = Path(file)
     try:
         mode = target.lstat().st_mode
@@ -275,29 +213,14 @@ def check_file(file: os.PathLike[str] | str) -> Path:
 
 
 def check_files(folder: os.PathLike[str] | str, names: Iterable[str]) -> None:
-    """Refuse files that could not be written to a folder, without touching anything.
-
-    Args:
-        folder: The folder; it need not exist.
-        names: Names of the files to be.
-
-    Raises:
-        FileError: If the folder cannot be written to, or a name is taken by something that is no file.
-    """
+    """Refuse files that could not be written to a folder, without touching anything."""
     check_folder(folder)
     for name in names:
         check_file(Path(folder) / name)
 
 
 def check_folder(folder: os.PathLike[str] | str) -> None:
-    """Refuse a folder that files could not be written to, without creating it.
-
-    Args:
-        folder: The folder; it need not exist.
-
-    Raises:
-        FileError: If it is no folder, or neither it nor the nearest folder above it can be written.
-    """
+    """Refuse a folder that files could not be written to, without creating it."""
     path = Path(folder).absolute()
     nearest = next(place for place in (path, *path.parents) if os.path.lexists(place))
     if not nearest.is_dir():
@@ -313,18 +236,8 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
             raise FileError(path, f"cannot be created ({_reason(error)})", "Name another folder.") from None
 
 
-def made_folder(folder: os.PathLike[str] | str) -> Path:
-    """The folder, created with everything above it where it is missing.
-
-    Args:
-        folder: The folder.
-
-    Returns:
-        Its path.
-
-    Raises:
-        FileError: If it cannot be created.
-    """
+def create_folder(folder: os.PathLike[str] | str) -> Path:
+    """The folder, created with everything above it where it is missing."""
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -334,7 +247,7 @@ def made_folder(folder: os.PathLike[str] | str) -> Path:
 
 
 def _find_room(file: Path, size: int) -> None:
-    """Find out that the disk holds so many bytes: HDF5 crashes on a full one."""
+    """Check that the disk has space for so many bytes: HDF5 crashes on a full one."""
     if size and hasattr(os, "posix_fallocate"):
         with file.open("wb") as handle:
             os.posix_fallocate(handle.fileno(), 0, size)
@@ -342,7 +255,7 @@ def _find_room(file: Path, size: int) -> None:
 
 
 def _complete(part: Path, target: Path) -> None:
-    """Give a file the permissions of the one it replaces, and have all of it on the disk."""
+    """Give a file the permissions of the one it replaces, and flush it to the disk."""
     if target.is_file():
         shutil.copymode(target, part)
     with part.open("rb+") as handle:
@@ -370,14 +283,7 @@ _OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes wha
 
 
 def plain(what: Any) -> Any:
-    """What JSON knows: arrays as lists, keys and paths as texts, None for numbers that are not finite.
-
-    Args:
-        what: Dictionaries, sequences, arrays, numbers, texts and paths, in one another.
-
-    Returns:
-        The same in dictionaries, lists, numbers, texts and None; anything else is left for `json` to refuse.
-    """
+    """Data as JSON has them: arrays as lists, keys and paths as texts, None for numbers that are not finite."""
     match what:
         case dict():
             return {str(key): plain(value) for key, value in what.items()}
@@ -394,16 +300,6 @@ def plain(what: Any) -> Any:
 
 
 def json_text(what: Any) -> str:
-    """One JSON document, for `plain` data and all that `plain` makes so; safe for a terminal, whatever texts hold.
-
-    Args:
-        what: As for `plain`.
-
-    Returns:
-        The document, without a line end.
-
-    Raises:
-        TypeError: If something in it has no form in JSON.
-    """
+    """One JSON document, for `plain` data and all that `plain` makes so; safe for a terminal, whatever texts hold."""
     text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
     return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

@@ -30,19 +30,7 @@ Schema = TypeVar("Schema", bound=Entry)
 
 
 def validated(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) -> Schema:
-    """The mapping as its schema has it.
-
-    Args:
-        data: What the file says.
-        schema: What it may say.
-        origin: The file, for the message.
-
-    Returns:
-        The entry, every key known and of its type.
-
-    Raises:
-        FileError: If a key is unknown, missing, or holds the wrong kind of value.
-    """
+    """Entry of a schema from a mapping; FileError for an unknown or missing key, or a value of the wrong type."""
     try:
         return schema.model_validate(data)
     except ValidationError as error:
@@ -102,16 +90,6 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
 
     Text stays text but for plain decimal numbers, true, false and null: no yes that becomes true, no 1:30 that becomes
     90, no dates, no tags. Aliases may be used as long as what they stand for is not too much.
-
-    Args:
-        text: The YAML text.
-        origin: The file or whatever else the text came from, for the message.
-
-    Returns:
-        The mapping.
-
-    Raises:
-        FileError: If it is empty, not YAML, cut off, not a mapping, or grows out of measure.
     """
     try:
         data = yaml.load(text, Loader=_PlainLoader)
@@ -130,12 +108,6 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
 def dump_mapping(data: Mapping[str, Any]) -> str:
     """A mapping as YAML text that `parse_mapping` reads as the same: a word it would take for a number is quoted.
 
-    Args:
-        data: Texts, numbers, truth values, None, and lists and mappings of them.
-
-    Returns:
-        The text; what other YAML readers would take for more than a word is quoted too.
-
     Examples:
         >>> from sagline.files.yaml_text import dump_mapping
         >>> print(dump_mapping({"name": "1e5", "mass": 1e5}), end="")
@@ -147,7 +119,7 @@ def dump_mapping(data: Mapping[str, Any]) -> str:
 
 
 def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
-    """What is wrong with a text that YAML does not take, and what to do: PyYAML's own words where they are plain."""
+    """Reason why a text is no YAML, and the next step: PyYAML's own words where they are plain."""
     mark, problem = error.problem_mark or error.context_mark, str(error.problem or error.context)
     index, place = (len(text), "") if mark is None else (mark.index, f"line {mark.line + 1}: ")
     if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
@@ -239,7 +211,7 @@ def _resolved(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """How many values and levels a node has with all its aliases written out; what is known of it is kept."""
+    """Numbers of values and levels of a node with all aliases written out; `known` caches them."""
     if id(node) in known:
         found = known[id(node)]
         if found is None:

@@ -27,7 +27,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import FileError
 from sagline.files.quantity import plain_number
 from sagline.files.reading import exists, read_text
-from sagline.files.writing import check_file, check_files, is_taken, json_text, made_folder, write_text
+from sagline.files.writing import check_file, check_files, create_folder, json_text, try_lock, write_text
 from sagline.optimization.request import Request
 
 REQUEST, EVALUATIONS = "design.json", "evaluations.csv"
@@ -91,7 +91,7 @@ def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     """
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
-    made_folder(place)
+    create_folder(place)
     heads = [*(f"{part.name} [{part.unit}]" if part.unit else part.name for part in request.candidates.parts)]
     heads += [f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in request.goals]
     digest = digest_of(request)
@@ -99,7 +99,7 @@ def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     _check_request(place, digest, request)
     handle = os.open(file, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
     try:
-        if not is_taken(handle, if_unknown=True):
+        if not try_lock(handle, if_unknown=True):
             raise FileError(place, "is in use: another process searches there", "Wait for it, or name another folder.")
         if not exists(place / REQUEST):
             told = {"request": digest, "robot": request.robot.name, "optimizer": request.optimizer}

@@ -16,7 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
 from sagline.core.results import Result
 from sagline.files.robot_file import dump_robot
-from sagline.files.writing import file_stem, made_folder, written_together
+from sagline.files.writing import atomic_files, create_folder, file_stem
 from sagline.optimization.candidates import Candidates
 from sagline.optimization.free import Part
 from sagline.optimization.goals import Goal
@@ -90,7 +90,7 @@ class Front(Result):
         Raises:
             FileError: If one cannot be written.
         """
-        place = made_folder(file_path(folder, "folder", folder=True))
+        place = create_folder(file_path(folder, "folder", folder=True))
         robots = self.robots if self.better else ()
         names = [FRONT, *(f"{file_stem(robot.name)}.yaml" for robot in robots)]
         heads = ["robot", *(f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in self.goals)]
@@ -101,7 +101,7 @@ class Front(Result):
         text = StringIO()
         csv.writer(text, lineterminator="\n").writerows([heads, *rows])
         texts = [text.getvalue(), *(dump_robot(robot) for robot in robots)]
-        with written_together(place, names) as parts:
+        with atomic_files(place, names) as parts:
             for part, content in zip(parts, texts, strict=True):
                 part.write_bytes(content.encode())
         return [place / name for name in names]

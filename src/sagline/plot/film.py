@@ -16,7 +16,7 @@ from sagline.core.arguments import file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
 from sagline.dynamics.vibration import Vibration
-from sagline.files.writing import written_whole
+from sagline.files.writing import atomic_file
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
 from sagline.viewer.swing import PERIOD, Swing
 
@@ -62,7 +62,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
         buffer, "GIF", save_all=True, append_images=(pictures * rounds)[1:], duration=round(1e3 * PERIOD / PICTURES),
         loop=0,
     )  # fmt: skip
-    with written_whole(path) as partial:
+    with atomic_file(path) as partial:
         partial.write_bytes(buffer.getbuffer())
 
 

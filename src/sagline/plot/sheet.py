@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from sagline.core.arguments import brief, file_path, optional
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.writing import written_whole
+from sagline.files.writing import atomic_file
 from sagline.plot.fonts import with_fonts
 from sagline.plot.names import break_labels
 from sagline.plot.style import PLAIN, Using, current
@@ -207,5 +207,5 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     content = drawn.getvalue()
     if kind == "svg" and isinstance(figure, Sheet) and figure.style.name:
         content = with_fonts(content.decode("utf-8")).encode("utf-8")
-    with written_whole(path) as partial:
+    with atomic_file(path) as partial:
         partial.write_bytes(content)

@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from sagline.files.writing import check_files, json_text, made_folder, plain, written_together
+from sagline.files.writing import atomic_files, check_files, create_folder, json_text, plain
 from sagline.report.blocks import Chapter
 from sagline.report.page import page
 from sagline.report.parts import selection
@@ -73,8 +73,8 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
     numbers = {c.key: {finding.key: plain(finding.numbers) for finding in c.findings} for c in chapters}
     made = f"Made by sagline {version('sagline')}: sagline article {' '.join(parts)}".rstrip() + "."
     contents = page(TITLE, LEAD, NOTATION, chapters, picture(chapters), made), json_text(numbers) + "\n"
-    place = made_folder(folder)
-    with written_together(place, NAMES) as files:
+    place = create_folder(folder)
+    with atomic_files(place, NAMES) as files:
         for file, content in zip(files, contents, strict=True):
             file.write_text(content, encoding="utf-8")
     return ArticleReport(place / NAMES[0], place / NAMES[1], tuple(chapters), numbers)

@@ -11,7 +11,7 @@ from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.control.recording import EventKind
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.files.writing import json_text, made_folder, plain, written_together
+from sagline.files.writing import atomic_files, create_folder, json_text, plain
 from sagline.plot.sheet import BLUE, COLORS, TICK, VERMILLION
 from sagline.report.blocks import Chapter, Finding, Panel, Table, Verdict
 from sagline.report.drawing import Drawings, axes, legend, thinned
@@ -46,8 +46,8 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
     made = f"Made by sagline {version('sagline')}: sagline experiment article."
     numbers = {finding.key: plain(finding.numbers) for finding in chapter.findings}
     contents = page(TITLE, lead, NOTATION, [chapter], None, made, summary=False), json_text(numbers) + "\n"
-    place = made_folder(folder)
-    with written_together(place, NAMES) as files:
+    place = create_folder(folder)
+    with atomic_files(place, NAMES) as files:
         for file, content in zip(files, contents, strict=True):
             file.write_text(content, encoding="utf-8")
     return place / NAMES[0]

@@ -19,7 +19,7 @@ from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
 from sagline.core.results import Result
 from sagline.files.variables import PARTS
-from sagline.files.writing import is_taken
+from sagline.files.writing import try_lock
 from sagline.sweep.folder import GROUP, STEP, SweepFolder, check_packages, open_folder
 from sagline.sweep.request import Request, variables_of
 from sagline.sweep.work import Counts
@@ -151,7 +151,7 @@ def marking(folder: SweepFolder) -> Iterator[Marks]:
     except OSError as error:
         raise FileError(path, f"cannot be written ({error.strerror or error})", STEP) from None
     with file:
-        if not is_taken(file.fileno(), if_unknown=True):
+        if not try_lock(file.fileno(), if_unknown=True):
             raise FileError(folder.path, "is being worked on by another process", "Wait for it, or stop it.")
         marks = Marks(folder, file, read_marks(folder))
         marks.begin()
