@@ -12,13 +12,13 @@ import numpy as np
 import sagline as sl
 from benchmarks import vibrations
 from benchmarks.measure import Row, best_of_calls, best_seconds, print_table
-from sagline.dynamics.simulate import Integrator
+from sagline.dynamics.simulation.simulate import Integrator
 from tests.dynamics.let_go import beside
 from tests.dynamics.machines import prototype
 from tests.dynamics.residuals import HEAVY, WAYPOINTS, residual, scene
-from tests.dynamics.test_chains import cogiro as broken_state
-from tests.dynamics.test_chains import moved, pushed, spectrum_peaks
-from tests.dynamics.test_fastest import shortest_quintic
+from tests.dynamics.simulation.test_chains import cogiro as broken_state
+from tests.dynamics.simulation.test_chains import moved, pushed, spectrum_peaks
+from tests.dynamics.trajectories.test_fastest import shortest_quintic
 
 AWAY: Final = np.array([0.004, -0.003, 0.0033])  # m
 LUMPED_STEP: Final = 5e-5  # s, the default of 20 nodes on CoGiRo

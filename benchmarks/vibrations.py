@@ -9,10 +9,9 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.dynamics.count import modes_below
-from sagline.dynamics.reduced import reduced, setting_of
+from sagline.dynamics.vibration.robot_modes import modes_below, reduced, setting_of
 from tests.dynamics.states import at, middle
-from tests.dynamics.test_vibration import LOWEST_SIX
+from tests.dynamics.vibration.test_vibration import LOWEST_SIX
 from tests.kernels.dynamics.strings import chain, held, string
 from tests.kernels.dynamics.test_collocation import CABLES, extrapolated, irvine_errors
 

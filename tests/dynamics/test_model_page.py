@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import sagline as sl
-from sagline.dynamics.chains_at_rest import chains_at_rest
-from tests.dynamics.test_chains import cogiro, moved
+from sagline.dynamics.simulation.chains_at_rest import chains_at_rest
+from tests.dynamics.simulation.test_chains import cogiro, moved
 from tests.tiers import extended
 
 pytestmark = extended

@@ -14,13 +14,13 @@ from sagline.cli.results import figure_files, listed, write_figures
 from sagline.cli.tables import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.frequency_map import frequency_map
+from sagline.dynamics.vibration.frequency_map import frequency_map
 from sagline.files.writing import check_files, create_folder, file_stem
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
-    from sagline.dynamics.damping import Damping
-    from sagline.dynamics.frequency_map import FrequencyMap
+    from sagline.dynamics.vibration.dynamic_stiffness import Damping
+    from sagline.dynamics.vibration.frequency_map import FrequencyMap
     from sagline.robot.robot import Robot
 
 COUNTS = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")

@@ -34,8 +34,7 @@ from sagline.files.writing import check_files, create_folder
 if TYPE_CHECKING:
     from sagline.cli.line import Line
     from sagline.core.arrays import Array
-    from sagline.dynamics.events import Break
-    from sagline.dynamics.simulation import Simulation
+    from sagline.dynamics.simulation.results import Break, Simulation
     from sagline.kinematics.plan import Plan
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.equilibrium import Equilibrium
@@ -100,7 +99,7 @@ def simulate(
         sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
     """
     from sagline.cli.values import damping_of, loaded, quantity
-    from sagline.dynamics.simulate import simulate as integrated
+    from sagline.dynamics.simulation.simulate import simulate as integrated
     from sagline.files.path_file import load_path
     from sagline.files.pose_text import wrench_of
     from sagline.files.robot_file import load_robot
@@ -151,7 +150,7 @@ def simulate(
 
 def _break(text: str, robot: Robot) -> Break:
     from sagline.cli.values import quantity
-    from sagline.dynamics.events import Break
+    from sagline.dynamics.simulation.results import Break
 
     found = BREAK.fullmatch(text.strip())
     if found is None:
@@ -173,10 +172,8 @@ def _start(
 ) -> Plan | Equilibrium:
     """A plan along the path, shaped if asked for; or the robot at rest."""
     from sagline.cli.values import middle_of
-    from sagline.dynamics.shaped import shaped
-    from sagline.dynamics.shapers import EI, ZV, ZVD
-    from sagline.dynamics.to_shape import to_shape
-    from sagline.dynamics.vibrating import vibration
+    from sagline.dynamics.trajectories.shapers import EI, ZV, ZVD, shaped
+    from sagline.dynamics.vibration.vibration import to_shape, vibration
     from sagline.kinematics.inverse import inverse
     from sagline.statics.stiffness import modes
 

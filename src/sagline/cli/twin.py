@@ -16,7 +16,7 @@ from sagline.cli.options import RobotArgument
 from sagline.cli.terminal import note, show, working
 
 if TYPE_CHECKING:
-    from sagline.dynamics.simulator import Reading
+    from sagline.dynamics.simulation.simulator import Reading
     from sagline.files.mcap_writer import Recorder
     from sagline.twin.link import Report
     from sagline.twin.machine import Machine

@@ -14,7 +14,7 @@ from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose
 
 if TYPE_CHECKING:
-    from sagline.dynamics.damping import Damping
+    from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.robot.robot import Robot
 
 LAST_PORT = 65535
@@ -91,7 +91,7 @@ def damping_of(loss_time: str, air_damping: str, modal_damping: str = "0") -> Da
     Raises:
         InvalidValueError: If one is no such quantity, or negative.
     """
-    from sagline.dynamics.damping import Damping
+    from sagline.dynamics.vibration.dynamic_stiffness import Damping
 
     times = quantity(loss_time, "--loss-time", "s", low=0.0)
     return Damping(times, quantity(air_damping, "--air-damping", "N*s/m^2", low=0.0), ratio(modal_damping, "--damping"))

@@ -28,8 +28,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.files.writing import check_files, create_folder, write_text
 
 if TYPE_CHECKING:
-    from sagline.dynamics.mode_list import ListedMode
-    from sagline.dynamics.vibration import Vibration
+    from sagline.dynamics.vibration.mode_list import ListedMode
+    from sagline.dynamics.vibration.vibration import Vibration
     from sagline.robot.equilibrium import Equilibrium
 
 LEAST_SHARE = 0.05  # of the platform in a mode that is shown; the file has them all
@@ -82,9 +82,8 @@ def vibrate(
     """
     from sagline.cli.maps import counts_of, vibrate_all_over
     from sagline.cli.values import damping_of, loaded, middle_of, quantity
-    from sagline.dynamics.mode_list import listed_modes
-    from sagline.dynamics.vibrating import vibration
-    from sagline.dynamics.vibration_status import VibrationStatus
+    from sagline.dynamics.vibration.mode_list import listed_modes
+    from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
     from sagline.files.pose_text import pose_of, wrench_of
     from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
@@ -145,7 +144,7 @@ def _check_alone(**others: object) -> None:
 
 
 def _check_film(film: int | None, modes: list[ListedMode]) -> None:
-    from sagline.dynamics.mode_list import WITH_MASS
+    from sagline.dynamics.vibration.mode_list import WITH_MASS
 
     count = sum(mode.kind == WITH_MASS for mode in modes)
     if film is not None and not 1 <= film <= count:
@@ -154,7 +153,7 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
     """The table, with each massless mode beside the one in which most of its motion is found."""
-    from sagline.dynamics.mode_list import MASSLESS, WITH_MASS, successors
+    from sagline.dynamics.vibration.mode_list import MASSLESS, WITH_MASS, successors
 
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]
     shares = successors(found)

@@ -11,12 +11,11 @@ from sagline.cables.model import CableModel
 from sagline.control.null_space import Gains, gains_along
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array, Indices, locked
-from sagline.dynamics.drives import lever_of
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
-from sagline.robot.drum import drum_tension
+from sagline.robot.drum import drum_lever, drum_tension
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -218,7 +217,7 @@ def _check_feasible(plan: Plan, path: Path) -> None:
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
     """Refuse what a winch cannot do, where its limits are known."""
     winches = robot.winches
-    lever = lever_of(robot, length)  # what is missing is told here
+    lever = drum_lever(robot, length)  # what is missing is told here
     if winches is None:
         return
     ratio = np.abs(winches.gear) / lever  # radians of the motor for a meter of cable

@@ -33,9 +33,9 @@ from sagline.control.tension_loop import TensionLoop, TensionSettings
 from sagline.core.arguments import brief, instance, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.drives import lever_of
 from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.plan import Plan
+from sagline.robot.drum import drum_lever
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest
@@ -69,7 +69,7 @@ class Loop:
         self.robot = instance(robot, Robot, "robot")
         m = robot.cable_count
         _check_link(link)
-        lever_of(robot, np.ones(m))  # what is missing is told now
+        drum_lever(robot, np.ones(m))  # what is missing is told now
         if sorted(winch for group in link.groups for winch in group) != list(range(m)):
             count = sum(map(len, link.groups))
             raise InvalidValueError("link", f"of {count} winches", f"{m}, as {robot.name} has", "Check its addresses.")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from sagline.dynamics.frequency_map import FrequencyMap
-from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.dynamics.vibration.frequency_map import FrequencyMap
+from sagline.dynamics.vibration.vibration import VibrationStatus
 from sagline.files.format import Format
 from sagline.files.netcdf import attributes_with_units, labeled_dataset
 from sagline.files.robot_file import dump_robot

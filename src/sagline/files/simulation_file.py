@@ -12,9 +12,9 @@ import numpy as np
 from sagline.core.arguments import choice, instance
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.damping import Damping
-from sagline.dynamics.drives import SecondOrder
-from sagline.dynamics.simulation import EnergyBalance, Occurrence, Simulation
+from sagline.dynamics.simulation.results import EnergyBalance, Occurrence, Simulation
+from sagline.dynamics.simulation.winches import SecondOrder
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.files.format import Format
 from sagline.files.netcdf import attributes_with_units, labeled_dataset, numbered, robot_of
 from sagline.files.robot_file import dump_robot

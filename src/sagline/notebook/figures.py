@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from sagline.calibration.result import Calibration
-from sagline.dynamics.simulation import Simulation
+from sagline.dynamics.simulation.results import Simulation
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path

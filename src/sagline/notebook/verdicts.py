@@ -11,8 +11,8 @@ from sagline.calibration.result import Calibration
 from sagline.calibration.summary import chi_squared_text
 from sagline.core.numbers import n
 from sagline.core.results import Result
-from sagline.dynamics.simulation import Simulation
-from sagline.dynamics.vibration import Vibration
+from sagline.dynamics.simulation.results import Simulation
+from sagline.dynamics.vibration.vibration import Vibration
 from sagline.kernels.jit import is_compiled
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.forward_solution import ForwardSolution

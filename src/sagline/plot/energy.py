@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.core.arguments import instance
 from sagline.core.numbers import n
-from sagline.dynamics.simulation import Simulation
+from sagline.dynamics.simulation.results import Simulation
 from sagline.plot.names import name_lines, wrapped
 from sagline.plot.sheet import COLORS, GAP_COLOR, dressed, sheet
 from sagline.plot.style import current

@@ -14,8 +14,8 @@ from PIL import Image
 
 from sagline.core.arguments import file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
-from sagline.dynamics.vibration import Vibration
+from sagline.dynamics.vibration.mode_list import WITH_MASS, ListedMode, listed_modes
+from sagline.dynamics.vibration.vibration import Vibration
 from sagline.files.writing import atomic_file
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
 from sagline.viewer.swing import PERIOD, Swing

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from sagline.core.arguments import instance
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.vibration import Vibration
+from sagline.dynamics.vibration.vibration import Vibration
 from sagline.plot.names import above
 from sagline.plot.sheet import BLUE, TICK, VERMILLION, axes_or_new, dressed
 from sagline.plot.style import current

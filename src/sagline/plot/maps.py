@@ -10,7 +10,7 @@ from matplotlib.colors import LogNorm, Normalize
 
 from sagline.core.arguments import choice, instance
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.frequency_map import FrequencyMap
+from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.plot.sheet import GAP_COLOR, WIDTH, sheet
 from sagline.plot.style import current
 

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from sagline.dynamics.response import FrequencyResponse
-from sagline.dynamics.response_curves import drawn_curves, response_curves
+from sagline.dynamics.vibration.response import FrequencyResponse, drawn_curves, response_curves
 from sagline.plot.names import name_lines
 from sagline.plot.sheet import BLUE, VERMILLION, axes_or_new, dressed
 from sagline.plot.style import current
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from sagline.core.arrays import Array
-    from sagline.dynamics.vibration import Vibration
+    from sagline.dynamics.vibration.vibration import Vibration
 
 HIGHEST, LOWEST = 2e2, 1e-3  # over the answer at rest: undamped peaks have no top, and zeros no bottom
 MARK = 0.035  # longest mark of a mode, of the axes' height

@@ -316,3 +316,29 @@ def _check_width(winches: Winch, pitch: Array) -> None:
 
 def _at(item: str, sample: int, cable: int, samples: int) -> str:
     return f"{f'sample {sample}, ' if samples > 1 else ''}cable {cable}: {item}"
+
+
+def drum_lever(robot: Robot, length: Array) -> Array:
+    """Length of cable for a radian of its drum, at given lengths off the drums [m].
+
+    Args:
+        robot: With winches.
+        length: Unstrained lengths off the drums [m], (m,) or (N, m).
+
+    Returns:
+        That of the layer at these lengths where the drums are known, else drum_radius and half the cable's diameter; of
+        the shape of the lengths.
+
+    Raises:
+        InvalidValueError: If drum_radius is not given.
+    """
+    winch = robot.winches
+    if winch is None or winch.drum_radius is None:
+        step = "Give it in the robot file, or with robot.replace(winches=Winch(drum_radius=...))."
+        raise InvalidValueError("winches: drum_radius", "not given", "known where the speed of winches counts", step)
+    if winch.groove_pitch is not None and robot.cables.diameter is not None:
+        drums = drums_of(robot)
+        travel: Array = drums.turns(np.atleast_2d(length) * (1.0 + drums.rest_strain))[1] / (2.0 * np.pi)
+        return travel.reshape(length.shape)
+    thick = 0.0 if robot.cables.diameter is None else 0.5 * robot.cables.diameter
+    return np.broadcast_to(winch.drum_radius + thick, length.shape)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.dynamics.simulation import Simulation
+from sagline.dynamics.simulation.results import Simulation
 from sagline.kernels.cable import geometry
 from sagline.kinematics.plan import Gap, Plan
 from sagline.kinematics.status import PoseStatus

@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from sagline.core.arrays import Array
-from sagline.dynamics.damping import Damping
-from sagline.dynamics.drives import lever_of
-from sagline.dynamics.simulator import Reading, Simulator
+from sagline.dynamics.simulation.simulator import Reading, Simulator
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.robot.drum import drum_lever
 from sagline.robot.robot import Robot
 from sagline.twin.start import Start
 
@@ -45,7 +45,7 @@ class Hardware:
         m, winch, reading = robot.cable_count, robot.winches, self._simulator.reading
         assert winch is not None
         self._full = np.full(m, np.inf) if winch.load_cell_range is None else winch.load_cell_range
-        self._lever = lever_of(robot, reading.length) / np.abs(winch.gear)
+        self._lever = drum_lever(robot, reading.length) / np.abs(winch.gear)
         self._weight, self._gravity, self._slip = np.zeros(6), robot.gravity, np.zeros(m)
         self._wrong: dict[int, tuple[float, float]] = {}  # load cells: what counts of a reading, and what is added
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)

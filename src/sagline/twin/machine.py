@@ -11,8 +11,8 @@ from sagline.control.link import COUNTERS, PERIOD, Command, groups_of
 from sagline.core.arguments import brief, choice, instance, optional, whole_number
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.damping import Damping
-from sagline.dynamics.simulator import Reading
+from sagline.dynamics.simulation.simulator import Reading
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.hardware import CELL, LENGTH, Hardware

@@ -27,7 +27,7 @@ from sagline.twin.link import Report
 from sagline.twin.machine import Machine
 
 if TYPE_CHECKING:
-    from sagline.dynamics.simulator import Reading
+    from sagline.dynamics.simulation.simulator import Reading
 
 SCAN: Final = 0.005  # s, of a twin's PLCs: half a cycle, so that none of a controller's meets the same block twice
 SILENT: Final = bytes(FROM_PLC.size)

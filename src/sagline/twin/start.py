@@ -11,13 +11,13 @@ from sagline.control.link import HEARTBEAT
 from sagline.core.arguments import optional
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.drives import drive_data, lever_of
-from sagline.dynamics.steps import highest_frequency, with_drives
+from sagline.dynamics.simulation.steps import highest_frequency, with_drives
+from sagline.dynamics.simulation.winches import drive_data
 from sagline.kernels.cable.drum import lengths_of_turns, turns_of_lengths
 from sagline.kernels.dynamics import drives as d
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
-from sagline.robot.drum import drums_of
+from sagline.robot.drum import drum_lever, drums_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -50,7 +50,7 @@ class Scale:
             raise InvalidValueError("winches: counts_per_turn", "not given", "known where encoders count", step)
         stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
         each = winch.gear * winch.counts_per_turn
-        self.per_meter = each * stretch / (2.0 * np.pi * lever_of(robot, length))
+        self.per_meter = each * stretch / (2.0 * np.pi * drum_lever(robot, length))
         self._drums = None
         if winch.groove_pitch is not None and robot.cables.diameter is not None:
             drums = drums_of(robot)

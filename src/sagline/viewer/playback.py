@@ -11,7 +11,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.core.progress import Progress
-from sagline.dynamics.simulation import Occurrence, Simulation
+from sagline.dynamics.simulation.results import Occurrence, Simulation
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose

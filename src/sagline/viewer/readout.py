@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.dynamics.mode_list import MASSLESS
+from sagline.dynamics.vibration.mode_list import MASSLESS
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -10,16 +10,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
-from sagline.dynamics.at_rest import end_motions, following
-from sagline.dynamics.beginning import beginning
-from sagline.dynamics.chains import wave_frequency
-from sagline.dynamics.damping import Damping
-from sagline.dynamics.events import Break
-from sagline.dynamics.mode_list import WITH_MASS, ListedMode, listed_modes
-from sagline.dynamics.simulate import run_of
-from sagline.dynamics.simulation import Simulation
-from sagline.dynamics.vibrating import vibration
-from sagline.dynamics.vibration import Vibration
+from sagline.dynamics.simulation.chain_plant import wave_frequency
+from sagline.dynamics.simulation.initial_conditions import beginning
+from sagline.dynamics.simulation.results import Break, Simulation
+from sagline.dynamics.simulation.simulate import run_of
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.dynamics.vibration.mode_list import WITH_MASS, ListedMode, end_motions, following, listed_modes
+from sagline.dynamics.vibration.vibration import Vibration, vibration
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.statics.stiffness import modes

@@ -10,7 +10,7 @@ from scipy.linalg import eigh, solve
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.cable_dynamics import EXACT, waves_of
+from sagline.dynamics.vibration.dynamic_stiffness import EXACT, waves_of
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.string import STRING_COLUMNS
 from sagline.statics.strings import COUNTING, undamped

@@ -10,7 +10,7 @@ import viser
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.dynamics.simulation import Simulation
+from sagline.dynamics.simulation.results import Simulation
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -12,10 +12,9 @@ import numpy as np
 import viser
 
 from sagline.core.arrays import Array
-from sagline.dynamics.mode_list import MASSLESS, ListedMode, listed_modes
-from sagline.dynamics.response_curves import MOTIONS, ResponseCurves, response_curves
-from sagline.dynamics.vibration import Vibration
-from sagline.dynamics.vibration_status import VibrationStatus
+from sagline.dynamics.vibration.mode_list import MASSLESS, ListedMode, listed_modes
+from sagline.dynamics.vibration.response import MOTIONS, ResponseCurves, response_curves
+from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.channel import Channel, chosen_by
 from sagline.viewer.drawn import Drawn

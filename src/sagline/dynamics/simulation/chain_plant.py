@@ -1,0 +1,307 @@
+"""A robot that is simulated on lumped-mass cables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.dynamics.simulation.chains_at_rest import chains_at_rest
+from sagline.dynamics.simulation.initial_conditions import Beginning, Course
+from sagline.dynamics.simulation.plant import Plant, Records
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.kernels import codes, tables
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.dynamics import chain as c
+from sagline.kernels.dynamics import chain_records as ends
+from sagline.kernels.dynamics import chain_run, chains
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import rigid_body as body
+from sagline.kernels.dynamics.progress import COUNTERS, FAILED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carrier:
+    """The rigid body of a platform with masses at its cables' ends; both have principal axes of their own.
+
+    Attributes:
+        inertia: Mass and principal moments of the whole, infinite where it does not turn, (4,).
+        center: Of its mass, from that of the platform's, the platform's principal axes [m], (3,).
+        axes: Its principal axes in those of the platform, one a column, (3, 3).
+    """
+
+    inertia: Array
+    center: Array
+    axes: Array
+
+    @classmethod
+    def of(cls, inertia: Array, masses: Array, ends: Array) -> Carrier:
+        """A platform and masses at places on it.
+
+        Args:
+            inertia: Mass and principal moments of the platform, (4,).
+            masses: [kg], (m,).
+            ends: From its center of mass, its principal axes [m], (m, 3).
+        """
+        mass = inertia[0] + masses.sum()
+        center = (masses @ ends) / mass
+        turns = np.isfinite(inertia[1:])
+        own = np.diag(np.where(turns, inertia[1:], 0.0))
+        whole = own + _about(inertia[:1], -center[None]) + _about(masses, ends - center)
+        if turns.all():
+            moments, axes = np.linalg.eigh(whole)
+            axes[:, 0] *= np.sign(np.linalg.det(axes))
+        else:  # a planar motion, about the last axis, or none
+            moments, axes = np.where(turns, np.diag(whole), np.inf), np.eye(3)
+        return cls(np.array([mass, *moments]), center, axes)
+
+    def levers(self, ends: Array) -> Array:
+        """Places on the platform (m, 3) as the whole sees them, from its center along its axes."""
+        levers: Array = (ends - self.center) @ self.axes
+        return levers
+
+    def state(self, place: Array, turning: Array, velocity: Array, spin: Array) -> Array:
+        """The row of the whole's state, where the platform is and moves.
+
+        Args:
+            place: Of the platform's center of mass [m], (3,).
+            turning: From its principal axes to the world, (3, 3).
+            velocity: Of its center of mass [m/s], (3,).
+            spin: Its angular velocity, world axes [rad/s], (3,).
+        """
+        lever, axes = turning @ self.center, turning @ self.axes
+        moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
+        quaternion = Rotation.from_matrix(axes).as_quat()
+        momentum = axes @ (moments * (axes.T @ spin))
+        return np.concatenate((place + lever, quaternion, velocity + np.cross(spin, lever), momentum))
+
+    def seen(self, states: Array) -> Array:
+        """States of the whole (N, 13) as those of the platform; both with the angular velocity in momentum's place."""
+        turning = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]).as_matrix() @ self.axes.T
+        lever, spin = turning @ self.center, states[:, body.MOMENTUM :]
+        place = states[:, : body.TURN] - lever
+        velocity = states[:, body.VELOCITY : body.MOMENTUM] - np.cross(spin, lever)
+        return np.concatenate((place, Rotation.from_matrix(turning).as_quat(), velocity, spin), axis=1)
+
+    def spin(self, state: Array) -> Array:
+        """Angular velocity of a state of the whole, world axes [rad/s], (3,)."""
+        axes = Rotation.from_quat(state[body.TURN : body.VELOCITY]).as_matrix()
+        spin: Array = axes @ ((axes.T @ state[body.MOMENTUM :]) / self.inertia[1:])
+        return spin
+
+
+def _about(masses: Array, places: Array) -> Array:
+    """Inertia of point masses (m,) at places (m, 3) about the origin."""
+    squares = (places * places).sum(axis=1)
+    inertia: Array = (masses * squares).sum() * np.eye(3) - (masses[:, None] * places).T @ places
+    return inertia
+
+
+FEWEST, MOST = 4, 500  # elements a cable
+SHORTEST: Final = 0.86  # of l sqrt(rho/EA): the limit of steps where the element at the frame is 0.4 l
+SPARE: Final = 8  # nodes
+TRAVELS: Final = 20.0  # of a stretch wave from end to end: a cable without tension for so long is slack
+STRETCH: Final = 1.1  # of the longest length that is asked for: room for winches that overshoot
+
+
+class ChainRecords(Records):
+    """What the kernel writes down of N steps, the cables' shapes with it."""
+
+    def __init__(self, count: int, cables: int, points: int) -> None:
+        """Room for so many steps."""
+        super().__init__(count, cables)
+        self.points = np.full((count, cables, points, 3), np.nan)
+
+    @property
+    def arrays(self) -> tuple[Array, ...]:
+        """As the kernel takes them."""
+        assert self.points is not None
+        return *super().arrays, self.points
+
+
+class ChainPlant(Plant):
+    """A robot on lumped cables in the midst of a motion.
+
+    The kernel moves the platform with what it carries of the cables, half an element of each; what it writes down is
+    turned into the platform's own motion.
+
+    Attributes:
+        nodes: Elements a cable at the start.
+    """
+
+    kernel: ClassVar[Any] = staticmethod(chains.run_chains)
+    cable_mass: ClassVar[str] = "lumped"
+
+    def __init__(self, given: Beginning, data: Array, nodes: int, losses: Damping) -> None:
+        """Hang a robot on chains, at rest or at the speed of its path.
+
+        Args:
+            given: The beginning.
+            data: Of the drives, (DATA_ROWS, m).
+            nodes: Elements a cable.
+            losses: Of the cables.
+
+        Raises:
+            InvalidValueError: If the start has a slack cable.
+        """
+        state, robot = given.state, given.robot
+        rest = chains_at_rest(state, nodes)
+        super().__init__(robot, given.model, rest.pose, given.twist, state.unstrained_length, data)
+        m, self.nodes = robot.cable_count, nodes
+        self.rows[g.CHORD] = np.linalg.norm(rest.place[:, :, 0] - rest.place[:, :, -1], axis=1)
+        self.counters = np.zeros(COUNTERS + 1, dtype=np.int64)
+        table = _table(given, rest.place, nodes, losses, data)
+        longest = STRETCH * given.lengths.value.max(axis=0)[:m] / table[:, c.ELEMENT]
+        room = int(np.ceil(np.maximum(longest, nodes)).max()) + SPARE
+        place = np.zeros((m, 3, room))
+        place[:, :, : nodes + 1] = rest.place
+        self._chains = [table, place, np.zeros_like(place), np.zeros((m, room)), np.full(m, nodes - 1, dtype=np.int64)]
+        self._stock = np.full(2, np.nan)
+        self._travel = nodes * table[:, c.ELEMENT] * np.sqrt(table[:, c.DENSITY] / table[:, c.STIFFNESS])
+        self._ends = (robot.platform_anchors - robot.center_of_mass) @ self.axes
+        self._carried = 0.5 * table[:, c.DENSITY] * table[:, c.ELEMENT]
+        self._carrier = Carrier.of(self.inertia, self._carried, self._ends)
+        turning = Rotation.from_quat(self.state[body.TURN : body.VELOCITY]).as_matrix()
+        velocity, spin = self.state[body.VELOCITY : body.MOMENTUM], given.twist[3:]
+        self.state = self._carrier.state(self.state[: body.TURN], turning, velocity, spin)
+        self._swing(velocity + np.cross(spin, self._ends @ turning.T), given.rate)
+
+    def _swing(self, at_platform: Array, rate: Array) -> None:
+        """Give the nodes the speeds between those of their cable's ends, of which one is that of what is let out."""
+        table, place, speed, n = self._chains[0], self._chains[1], self._chains[2], self.nodes
+        at_exit = (rate / table[:, c.ELEMENT])[:, None] * (place[:, :, n - 1] - place[:, :, n])
+        share = np.linspace(0.0, 1.0, n + 1)
+        speed[:, :, : n + 1] = at_platform[..., None] * (1.0 - share) + at_exit[..., None] * share
+
+    def arguments(self, rules: Any, numbers: Any, courses: Any) -> Any:
+        """As those of `Plant`, for the kernel of chains."""
+        lengths: Course = courses[0]
+        if self._room.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
+            self._room = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
+        ends = self._table.copy()
+        ends[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1] = self._carrier.levers(self._ends)[self.cables]
+        freedom = self.robot.freedom
+        handle = self._carrier.levers(np.zeros(3))
+        whole = tuple(locked(array) for array in (ends, self._carrier.inertia.copy(), freedom.T @ freedom, handle))
+        kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._room)
+        given = tuple(course.arrays for course in courses)
+        _integrator, kind, remembered, _work, stride = rules
+        step, _loss_time, _air, filtering = numbers
+        self._chains[0][:, c.SMOOTH] = 1.0 - np.exp(-step / (TRAVELS * self._travel[self.cables]))
+        return (
+            (kind, remembered, stride),
+            (step, self.robot.gravity, filtering),
+            whole,
+            locked(self.data.view()),
+            given,
+            kept,
+            tuple(self._chains),
+            self._stock,
+        )
+
+    def records(self, count: int) -> ChainRecords:
+        """Room for records of so many steps."""
+        return ChainRecords(count, len(self.cables), self.nodes + 1)
+
+    def seen(self, states: Array) -> Array:
+        """Recorded states as those of the platform by itself."""
+        return self._carrier.seen(states)
+
+    def without(self, cable: int) -> None:
+        """Take a cable away; half of its last element stays on the platform."""
+        place = int(np.flatnonzero(self.cables == cable)[0])
+        super().without(cable)
+        self._chains = [np.delete(array, place, axis=0) for array in self._chains]
+
+    def with_mass(self, mass: float, *, at_rest: bool) -> None:
+        """Change the platform's mass [kg] and its inertia with it, while it carries as much of the cables as before."""
+        before, state = self._carrier, self.state
+        spin = before.spin(state)
+        moving = np.concatenate((state[: body.MOMENTUM], spin))
+        own = before.seen(moving[None])[0]
+        self.inertia = self.inertia * (mass / self.inertia[0])
+        self._carrier = after = Carrier.of(self.inertia, self._carried, self._ends)
+        turning = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix()
+        self.state = after.state(own[: body.TURN], turning, own[body.VELOCITY : body.MOMENTUM], spin)
+        if at_rest:  # momentum, and moment of momentum about any point, are what they were
+            momentum = before.inertia[0] * state[body.VELOCITY : body.MOMENTUM]
+            arm = state[: body.TURN] - self.state[: body.TURN]
+            self.state[body.VELOCITY : body.MOMENTUM] = momentum / after.inertia[0]
+            self.state[body.MOMENTUM :] = state[body.MOMENTUM :] + np.cross(arm, momentum)
+
+    def failure(self, time: float, step: float) -> InvalidValueError:
+        """Why the kernel stopped."""
+        cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[ends.ENDED]
+        if how == ends.GROWN:
+            return super().failure(time, step)
+        value = f"{'too long' if how == ends.LONG else 'all but wound in'} at {time:.6g} s"
+        element = self._chains[0][int(self.counters[FAILED]) - 1, c.ELEMENT]
+        low, high = (ends.FEWEST + 1) * element, self._chains[1].shape[2] * element
+        advice = 'Correct the lengths, give more nodes, or cable_mass="none".'
+        return InvalidValueError(f"cable {cable}: length", value, f"{low:.3g} to {high:.3g} m of its chain", advice)
+
+
+def _table(given: Beginning, place: Array, nodes: int, losses: Damping, data: Array) -> Array:
+    """What chains at rest are, (m, CHAIN_COLUMNS)."""
+    state, material = given.state, given.robot.cables
+    table = np.zeros((given.robot.cable_count, c.CHAIN_COLUMNS))
+    table[:, c.EXIT_X : c.EXIT_Z + 1] = place[:, :, -1]
+    table[:, c.ELEMENT] = state.free_length / nodes
+    table[:, c.DENSITY], table[:, c.STIFFNESS] = material.linear_density, material.axial_stiffness
+    table[:, c.LOSS_TIME], table[:, c.AIR_RATE] = losses.loss_time, losses.air_damping / material.linear_density
+    # what lies behind the exit is as strained as the element there
+    table[:, c.BEHIND] = state.unstrained_length - state.free_length
+    last = np.linalg.norm(place[:, :, -1] - place[:, :, -2], axis=1)
+    table[:, c.RUN] = table[:, c.BEHIND] * last / table[:, c.ELEMENT]
+    table[:, c.WIND], table[:, c.GRAVITY] = data[d.DRAG], given.robot.gravity
+    return table
+
+
+def checked_nodes(nodes: Any) -> int:
+    """Elements a cable.
+
+    Args:
+        nodes: What a caller gave.
+
+    Returns:
+        The number.
+
+    Raises:
+        InvalidValueError: If it is out of range.
+    """
+    return whole_number(nodes, "nodes", FEWEST, MOST)
+
+
+def check_lumped(given: Beginning) -> None:
+    """Refuse cables that cannot be lumped.
+
+    Args:
+        given: The beginning.
+
+    Raises:
+        InvalidValueError: If the cables have no weight or no mass.
+    """
+    if given.model.code != codes.CATENARY:
+        name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
+        raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
+    light = np.flatnonzero(~(given.robot.cables.linear_density > 0.0))
+    if light.size:
+        step = 'Give a density, or cable_mass="none".'
+        raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m where it has mass", step)
+
+
+def wave_frequency(given: Beginning, nodes: int) -> float:
+    """Highest angular frequency of cables in elements, one of which is as short as it may become [rad/s].
+
+    Args:
+        given: The beginning.
+        nodes: Elements a cable.
+    """
+    material = given.robot.cables
+    element = given.state.free_length / nodes
+    return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())

@@ -1,0 +1,213 @@
+"""Equilibrium of the platform on lumped-mass cables of given lengths, within the order of nodes^-2 of the exact one."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+
+STEPS = 60
+NEAR = 1e-8  # of a length, of a force: Newton squares what is left, and one more step leaves rounding
+NEUTRAL = 1e-12  # of the largest stiffness: smaller ones are rounding
+LONGEST_STEP = 0.2  # of a force: a longer one is shortened, which keeps far starts from folding a chain
+
+
+class ChainsAtRest(NamedTuple):
+    """Chains in equilibrium with a platform.
+
+    Attributes:
+        pose: Of the platform.
+        place: Of the nodes, world axes, from the platform's end to the exit [m], shape (m, 3, nodes + 1).
+        force: On the platform ends of the cables, half an element's weight included [N], shape (m, 3); the platform
+            feels the opposite.
+    """
+
+    pose: Pose
+    place: Array
+    force: Array
+
+
+class Divided(NamedTuple):
+    """Cables divided into elements.
+
+    Attributes:
+        element: Unstrained length of the elements [m], shape (m,).
+        weight: Of a length [N/m], shape (m,).
+        stiffness: EA [N], shape (m,).
+        nodes: Elements a cable.
+    """
+
+    element: Array
+    weight: Array
+    stiffness: Array
+    nodes: int
+
+    def elements(self, force: Array) -> tuple[Array, Array]:
+        """Forces of the elements from the platform on, those of the cable at their middles, and their sizes.
+
+        Args:
+            force: On the platform ends [N], shape (m, 3).
+
+        Returns:
+            Forces [N], shape (m, nodes, 3), and their norms.
+        """
+        below = (np.arange(self.nodes) + 0.5) * (self.weight * self.element)[:, None]
+        forces = np.repeat(force[:, None, :], self.nodes, axis=1)
+        forces[..., 2] -= below
+        return forces, np.linalg.norm(forces, axis=-1)
+
+    def steps(self, force: Array) -> Array:
+        """The elements as vectors towards the platform [m], shape (m, nodes, 3).
+
+        Args:
+            force: On the platform ends [N], shape (m, 3).
+        """
+        forces, size = self.elements(force)
+        return (self.element[:, None] * (1.0 / self.stiffness[:, None] + 1.0 / size))[..., None] * forces
+
+    def compliance(self, force: Array) -> Array:
+        """Derivative of a chain's platform end by the force on it [m/N], shape (m, 3, 3).
+
+        Args:
+            force: On the platform ends [N], shape (m, 3).
+        """
+        forces, size = self.elements(force)
+        unit = forces / size[..., None]
+        across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
+        along = self.nodes / self.stiffness[:, None, None] * np.eye(3)
+        compliance: Array = self.element[:, None, None] * (along + (across / size[..., None, None]).sum(axis=1))
+        return compliance
+
+
+def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
+    """The chains into which the cables of an equilibrium are divided, at rest at the same lengths.
+
+    An element's force is the exact cable's at its middle: a chain reaches as far as the midpoint rule says. Pose and
+    forces therefore differ from the exact ones by the order of nodes^-2, and the wrench is balanced to rounding.
+
+    Args:
+        state: A single equilibrium with taut cables.
+        nodes: Elements a cable.
+
+    Returns:
+        Pose, nodes and forces.
+
+    Raises:
+        InvalidValueError: If a cable is so slack that its chain folds, or the platform is not held.
+
+    Source:
+        docs/model.md, section 11.
+    """
+    robot, exits = state.one_robot, state.exit_point
+    length, material = state.free_length, state.cables.cable
+    chains = Divided(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
+    center, freedom = robot.center_of_mass, robot.freedom
+    given = state.wrench - np.array([0.0, 0.0, robot.mass * robot.gravity, 0.0, 0.0, 0.0])
+    force = _force_of(state)
+    _refuse_slack(force, chains)
+    pose, near = state.pose, False
+    for _ in range(STEPS):
+        levers = (robot.platform_anchors - center) @ pose.matrix.T
+        force = _hung(chains, pose.position + robot.platform_anchors @ pose.matrix.T - exits, force)
+        unbalance = np.concatenate((force.sum(axis=0), np.cross(levers, force).sum(axis=0))) - given
+        blocks = np.asarray(np.linalg.inv(chains.compliance(force)), dtype=np.float64)
+        motion = _against(unbalance, _platform_stiffness(blocks, levers, force), freedom, _size(levers))
+        pose = _moved(pose, center, motion)
+        if near:
+            break
+        near = bool(np.abs(motion).max() <= NEAR * length.max())
+    else:
+        raise _no_rest("start", "an equilibrium near which its chains have none")
+    ends = pose.position + robot.platform_anchors @ pose.matrix.T
+    force = _hung(chains, ends - exits, force)
+    place = np.empty((len(force), nodes + 1, 3))
+    place[:, 0] = ends
+    place[:, 1:] = ends[:, None] - np.cumsum(chains.steps(force), axis=1)
+    place[:, -1] = exits
+    return ChainsAtRest(pose, np.ascontiguousarray(np.swapaxes(place, 1, 2)), force)
+
+
+def _force_of(state: Equilibrium) -> Array:
+    """Forces on the platform ends of the exact cables, world axes, shape (m, 3)."""
+    chord = state.pose.transform(state.one_robot.platform_anchors) - state.exit_point
+    reach = np.hypot(chord[:, 0], chord[:, 1])
+    level = chord[:, :2] / np.where(reach > 0.0, reach, 1.0)[:, None]
+    sideways = level * state.cables.horizontal_tension[:, None]
+    return np.column_stack((sideways, state.cables.vertical_force))
+
+
+def _refuse_slack(force: Array, chains: Divided) -> None:
+    slack = np.flatnonzero(~(chains.elements(force)[1].min(axis=1) > 0.0))
+    if slack.size:
+        raise _no_rest(f"cable {slack[0]}", "slack at the start")
+
+
+def _no_rest(item: str, value: str) -> InvalidValueError:
+    step = 'Start elsewhere, or with cable_mass="none".'
+    return InvalidValueError(item, value, "taut cables that hold the platform", step)
+
+
+def _hung(chains: Divided, chord: Array, force: Array) -> Array:
+    """Forces on the platform ends of chains that reach along given chords (m, 3), from forces near them."""
+    near = False
+    for _ in range(STEPS):
+        missing = chord - chains.steps(force).sum(axis=1)
+        step = np.linalg.solve(chains.compliance(force), missing[..., None])[..., 0]
+        share = np.linalg.norm(step, axis=1) / np.linalg.norm(force, axis=1)
+        force = force + step / np.maximum(share / LONGEST_STEP, 1.0)[:, None]
+        if near:
+            return force
+        near = bool(share.max() <= NEAR)
+    raise _no_rest("start", "an equilibrium with a cable so slack that its chain folds")
+
+
+def _size(levers: Array) -> float:
+    """What makes an angle a length [m]: the longest lever, 1 where all cables meet in the center of mass."""
+    longest = float(np.linalg.norm(levers, axis=1).max())
+    return longest if longest > 0.0 else 1.0
+
+
+def _against(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
+    """The motion that takes an unbalance away; none in directions in which the platform is neutral.
+
+    So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, but for rounding.
+    """
+    units = np.array([1.0, 1.0, 1.0, size, size, size])
+    slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
+    found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]
+    return np.asarray(freedom.T @ found / units)
+
+
+def _platform_stiffness(blocks: Array, levers: Array, force: Array) -> Array:
+    """Derivative (6, 6) of the unbalance by displacement of the center and rotation, forces on the cables' ends."""
+    turn = -_cross_matrix(levers)  # a rotation about an axis e moves the platform end by e x r
+    across = _cross_matrix(levers)
+    matrix = np.empty((6, 6))
+    matrix[:3, :3] = blocks.sum(axis=0)
+    matrix[:3, 3:] = (blocks @ turn).sum(axis=0)
+    matrix[3:, :3] = (across @ blocks).sum(axis=0)
+    # the force keeps its direction while r turns: r T^T - (r.T) 1
+    kept = levers[:, :, None] * force[:, None, :] - (levers * force).sum(axis=1)[:, None, None] * np.eye(3)
+    matrix[3:, 3:] = (across @ blocks @ turn + kept).sum(axis=0)
+    return matrix
+
+
+def _cross_matrix(vectors: Array) -> Array:
+    """Matrices (m, 3, 3) that multiply as r x does."""
+    matrix = np.zeros((len(vectors), 3, 3))
+    x, y, z = vectors.T
+    matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -z, y, -x
+    matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = z, -y, x
+    return matrix
+
+
+def _moved(pose: Pose, center: Array, motion: Array) -> Pose:
+    """The pose after a motion: the center of mass displaced, the platform turned about it."""
+    rotation = Rotation.from_rotvec(motion[3:]) * pose.rotation
+    return Pose(pose.position + pose.matrix @ center + motion[:3] - rotation.as_matrix() @ center, rotation)

@@ -1,0 +1,324 @@
+"""Initial conditions of a simulation, and its inputs as time tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.cables.model import CableModel
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array, checked, exactly, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.kernels import codes
+from sagline.kernels.dynamics.tables_in_time import CourseArrays
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.winding import without_guides
+from sagline.motion.path import checked_time
+from sagline.robot.behind import differs
+from sagline.robot.drum import drum_tension
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.wheels import dead_cable
+from sagline.statics.balance import inertial_wrench
+
+TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and as many rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """n numbers in time: a cubic between two instants, by values and rates at both; held before and after.
+
+    Attributes:
+        time: Instants [s], shape (K,), increasing.
+        value: Shape (K, n).
+        begin: Rates where each interval begins, shape (K - 1, n).
+        end: Rates where each ends, shape (K - 1, n).
+    """
+
+    time: Array
+    value: Array
+    begin: Array
+    end: Array
+
+    @classmethod
+    def still(cls, value: Array) -> Course:
+        """Numbers (n,) that do not change."""
+        none = np.empty((0, value.size))
+        return cls(np.zeros(1), np.array(value[None]), none, none)
+
+    @classmethod
+    def straight(cls, time: Array, value: Array) -> Course:
+        """Straight lines between rows (K, n)."""
+        slope = np.diff(value, axis=0) / np.diff(time)[:, None]
+        return cls(time, value, slope, slope)
+
+    @classmethod
+    def smooth(cls, time: Array, value: Array, rate: Array) -> Course:
+        """Cubics through rows (K, n) whose rates are known."""
+        return cls(time, value, np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(rate[1:]))
+
+    @property
+    def arrays(self) -> CourseArrays:
+        """As kernels take it: read-only, C-contiguous."""
+        time, value, begin, end = (
+            locked(np.ascontiguousarray(array, dtype=np.float64).view())
+            for array in (self.time, self.value, self.begin, self.end)
+        )
+        return time, value, begin, end
+
+    def part(self, columns: Any) -> Course:
+        """Some of the numbers."""
+        return Course(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
+
+    def beside(self, other: Course) -> Course:
+        """These numbers, then those of another course of the same instants."""
+        pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
+        return Course(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
+
+    def at(self, time: float) -> tuple[Array, Array]:
+        """Values and rates (n,) at a time; where the rate jumps, the later one."""
+        if len(self.time) == 1 or time < self.time[0] or time >= self.time[-1]:
+            return self.value[0 if time < self.time[0] else -1], np.zeros(self.value.shape[1])
+        k = int(np.searchsorted(self.time, time, side="right")) - 1
+        whole = self.time[k + 1] - self.time[k]
+        x = (time - self.time[k]) / whole
+        slope = (self.value[k + 1] - self.value[k]) / whole
+        begin, end = self.begin[k] - slope, self.end[k] - slope
+        bend = (1.0 - x) * begin - x * end
+        value = (1.0 - x) * self.value[k] + x * self.value[k + 1] + whole * x * (1.0 - x) * bend
+        return value, slope + (1.0 - 2.0 * x) * bend - x * (1.0 - x) * (begin + end)
+
+    def with_instant(self, time: float) -> Course:
+        """The same course with one more instant."""
+        if time in self.time:
+            return self
+        k = int(np.searchsorted(self.time, time))
+        value, rate = self.at(time)
+        before = rate if 0 < k < len(self.time) else np.zeros_like(rate)
+        outside = k in (0, len(self.time))
+        times, values = np.insert(self.time, k, time), np.insert(self.value, k, value, axis=0)
+        if outside:
+            place = 0 if k == 0 else len(self.begin)
+            return Course(
+                times, values, np.insert(self.begin, place, before, axis=0), np.insert(self.end, place, before, axis=0)
+            )
+        begin, end = np.insert(self.begin, k, rate, axis=0), np.insert(self.end, k - 1, rate, axis=0)
+        return Course(times, values, begin, end)
+
+    def brought_to_rest(self, time: float, duration: float, columns: Any) -> Course:
+        """A course of which some columns come to rest from a time on, their rates falling evenly in a duration [s]."""
+        course = self.with_instant(time).with_instant(time + duration)
+        (start, rate), stop = course.at(time), time + duration
+        later = np.flatnonzero(course.time >= time)
+        passed = np.minimum(course.time[later] - time, duration)[:, None]
+        value, begin, end = course.value.copy(), course.begin.copy(), course.end.copy()
+        whole = (start + rate * passed * (1.0 - 0.5 * passed / duration))[:, columns]
+        left = (rate * (1.0 - passed / duration))[:, columns]
+        value[np.ix_(later, columns)] = whole
+        inner = later[later < len(begin)]
+        begin[np.ix_(inner, columns)] = left[: len(inner)]
+        end[np.ix_(later[1:] - 1, columns)] = left[1:]
+        assert stop in course.time
+        return Course(course.time, value, begin, end)
+
+
+def table_in_time(given: Any, item: str, unit: str, columns: int, begin: float) -> Course:
+    """Rows in time as a caller gives them: one row that holds all the time, or times and rows, straight in between.
+
+    Args:
+        given: Shape (n,); or a pair of times [s] (K,) and rows (K, n).
+        item: The name a message uses.
+        unit: Of the rows, for the message.
+        columns: n.
+        begin: The first time that is simulated [s].
+
+    Returns:
+        Course.
+
+    Raises:
+        InvalidValueError: If it is neither, or the table begins later.
+    """
+    if not (isinstance(given, tuple | list) and len(given) == 2):
+        return Course.still(exactly(given, item, unit, (columns,)))
+    try:
+        time = checked_time(given[0])
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{item}: {error.item}", error.value, error.allowed, error.next_step) from None
+    rows = checked(given[1], item, unit, shape=(None, columns))
+    if rows.shape != (time.size, columns):
+        allowed, step = f"shape ({time.size}, {columns})", "Give one row a time, or one row alone."
+        raise InvalidValueError(item, f"of shape {rows.shape}", allowed, step)
+    if time[0] > begin:
+        allowed = f"a time <= {begin:g} s, the start"
+        raise InvalidValueError(f"{item}: time[0]", f"{time[0]:g} s", allowed, "Begin the table where the run begins.")
+    return Course.straight(time, rows) if time.size > 1 else Course.still(rows[0])
+
+
+ROUNDING = 1e-12  # of the largest force and moment: less is none
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Beginning:
+    """A robot at the first instant, and what is given to it from then on.
+
+    Attributes:
+        robot: The robot.
+        model: Cable model.
+        state: State at the start, a single one.
+        poses: Poses on the way, a batch.
+        twist: Velocity of the platform's origin and angular velocity at the start, world axes, (6,).
+        rate: dL/dt at the start [m/s], (m,): of a plan its own, else none.
+        lengths: Set points of the unstrained lengths [m].
+        tensions: Expected at the drums [N], at the same instants.
+        wrench: Given on the platform.
+        begin: First time [s].
+        end: Last time of what is given [s].
+    """
+
+    robot: Robot
+    model: CableModel
+    state: Equilibrium
+    poses: Pose
+    twist: Array
+    rate: Array
+    lengths: Course
+    tensions: Course
+    wrench: Course
+    begin: float
+    end: float
+
+
+def beginning(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> Beginning:
+    """What `simulate` is given, checked.
+
+    Args:
+        start: A plan along a path, or a single equilibrium.
+        unstrained_length: Lengths in time, for an equilibrium; None to hold its own.
+        wrench: In time; None for that of the start.
+        duration: How long [s]; None for as long as the plan or the table of lengths is.
+
+    Returns:
+        Beginning.
+
+    Raises:
+        InvalidValueError: If there is something that cannot be simulated; the message names it.
+    """
+    if isinstance(start, Plan):
+        if unstrained_length is not None:
+            step = "Give plan.state[0] to wind other lengths than the plan's."
+            raise InvalidValueError("unstrained_length", "given with a plan", "None", step)
+        found = _from_plan(start)
+    elif isinstance(start, Equilibrium):
+        found = _from_equilibrium(start, unstrained_length)
+    else:
+        step = "Give inverse(robot, path), or the state of a pose: plan.state."
+        raise InvalidValueError("start", brief(start), "a Plan along a path, or an Equilibrium", step)
+    _check_robot(found.robot, found.model)
+    end = found.end
+    if duration is not None:
+        end = found.begin + number(duration, "duration", "s", above=0.0)
+    elif not end > found.begin:
+        raise InvalidValueError(
+            "duration", "not given", "> 0 s for a robot at rest", "Give duration=10.0 for instance."
+        )
+    course = found.wrench
+    if wrench is not None:
+        course = table_in_time(wrench, "wrench", "N or N m", 6, found.begin)
+    check_lengths(found.robot, found.lengths)
+    return replace(found, wrench=course, end=end)
+
+
+def _from_plan(plan: Plan) -> Beginning:
+    """The start of a plan along a path, at the speed that the path has there."""
+    path, rate = plan.path, plan.length_rate
+    if path is None or rate is None:
+        step = "Plan along a Path, or give plan.state and a duration."
+        raise InvalidValueError("start", "a plan of poses without times", "a plan along a path", step)
+    robot = plan.state.one_robot
+    lost = np.flatnonzero(~plan.feasible)
+    if lost.size:
+        k = int(lost[0])
+        why = PoseStatus(plan.status[k]).text
+        step = "Plan a path that is feasible throughout."
+        raise InvalidValueError(f"start: sample {k}, {path.time[k]:g} s", f"without an answer ({why})", "solved", step)
+    if plan.state.contact is not None and differs(robot, plan.state.contact.winding):
+        step = "Plan without winding: a simulation knows no friction of pulleys."
+        raise InvalidValueError("start: winding", "given", "None", step)
+    inertial = inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
+    given = plan.state.wrench - inertial
+    given[np.abs(given) <= ROUNDING * np.abs(inertial).max()] = 0.0
+    some = np.unique(np.linspace(0, len(path) - 1, 16).astype(np.int64))
+    tension = drum_tension(plan.state)
+    return Beginning(
+        robot=robot,
+        model=plan.state.cables.model,
+        state=plan.state[0],
+        poses=path.pose[some],
+        twist=path.twist[0],
+        rate=rate[0],
+        lengths=Course.smooth(path.time, plan.unstrained_length, rate),
+        tensions=Course.straight(path.time, tension),
+        wrench=Course.straight(path.time, given) if given.any() else Course.still(np.zeros(6)),
+        begin=float(path.time[0]),
+        end=float(path.time[-1]),
+    )
+
+
+def _from_equilibrium(state: Equilibrium, table: Any) -> Beginning:
+    """A robot at rest."""
+    if state.pose.shape:
+        item = f"a batch of {len(state)} equilibria"
+        raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give one of them: state[0].")
+    robot, length = state.one_robot, state.unstrained_length
+    if np.isnan(length).any():
+        step = "Give a pose that is feasible."
+        raise InvalidValueError("start", "a state without lengths", "one with an answer", step)
+    tension, end = Course.still(np.nan_to_num(drum_tension(state))), 0.0
+    lengths = Course.still(length)
+    if table is not None:
+        lengths = table_in_time(table, "unstrained_length", "m", robot.cable_count, 0.0)
+        tension = Course.straight(lengths.time, np.repeat(tension.value, lengths.time.size, axis=0))
+        end = float(lengths.time[-1])
+    return Beginning(
+        robot=robot,
+        model=state.cables.model,
+        state=state,
+        poses=Pose._adopt(state.pose.position[None], state.pose.quaternion[None]),
+        twist=np.zeros(6),
+        rate=np.zeros(robot.cable_count),
+        lengths=lengths,
+        tensions=tension,
+        wrench=Course.still(state.wrench),
+        begin=0.0,
+        end=end,
+    )
+
+
+def _check_robot(robot: Robot, model: CableModel) -> None:
+    without_guides(robot, "simulate", "forward")
+    if model.code not in (codes.CATENARY, codes.ELASTIC):
+        step = "Plan with Catenary() or Elastic(), whose forces have an energy."
+        raise InvalidValueError("start: model", f"{type(model).__name__}()", "Catenary() or Elastic()", step)
+
+
+def check_lengths(robot: Robot, lengths: Course) -> None:
+    """Refuse lengths that are none, or all dead cable.
+
+    Args:
+        robot: The robot.
+        lengths: Set points [m].
+
+    Raises:
+        InvalidValueError: If a length is not longer than its dead cable.
+    """
+    checked(lengths.value, "unstrained_length", "m")
+    least, dead = lengths.value.min(axis=0), dead_cable(robot)
+    if (short := least <= dead).any():
+        i = int(np.argmax(short))
+        allowed, step = f"> {dead[i]:g} m" + (", its dead cable" if dead[i] else ""), "Give longer ones."
+        raise InvalidValueError(f"unstrained_length: cable {i}", f"{least[i]:g} m", allowed, step)

@@ -1,0 +1,307 @@
+"""Small motion about an equilibrium, cables with mass: decoupled modal response."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.dynamics.simulation.initial_conditions import Beginning, Course
+from sagline.dynamics.simulation.results import Simulation, energy_balance, twist_of_origin
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
+from sagline.kernels import codes
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.statics.stiffness import Stiffness, modes, stiffness
+
+UP_TO: Final = 1.5  # of the highest massless frequency: modes above answer as at rest
+SHARE: Final = 0.1  # radians of the highest frequency in a step
+LONGEST: Final = 1e-3  # s
+MOST_STEPS: Final = 10**9
+SHORTER: Final = "Simulate a shorter time, or record less often."
+SMALL: Final = 0.02  # of its length: what a cable may be let out
+
+
+class Answering(NamedTuple):
+    """How the modes of a state answer to lengths and to the wrench, both as changes u = (dL, dw), (m + 6,).
+
+    Attributes:
+        found: The modes.
+        drive: Of u on every mode, (K, m + 6).
+        motion: Motion of the platform by u beyond what the modes have at rest, (6, m + 6).
+        pulled: Tensions at the frame ends by every mode, (m, K) [N/(m sqrt(kg))].
+        tension: Tensions by u beyond those of the modes at rest, (m, m + 6).
+    """
+
+    found: Vibration
+    drive: Array
+    motion: Array
+    pulled: Array
+    tension: Array
+
+
+class Swung(NamedTuple):
+    """Modes at N instants: amplitudes and rates, (N, K); work done on them and energy lost since the start, (N,)."""
+
+    amplitude: Array
+    rate: Array
+    supplied: Array
+    lost: Array
+
+
+def answering(state: Equilibrium, damping: Damping) -> Answering:
+    """How the modes of a state answer.
+
+    Args:
+        state: A single equilibrium, nothing behind its cables.
+        damping: What takes energy out of the modes.
+
+    Returns:
+        Answering.
+
+    Raises:
+        InvalidValueError: If the state has no linear vibration.
+
+    Source:
+        docs/model.md, section 11.
+    """
+    found = vibration(state, up_to=UP_TO * float(np.nanmax(modes(state).frequency)), damping=damping)
+    if found.status is not VibrationStatus.SOLVED:
+        step = 'Start elsewhere, or give cable_mass="lumped" or "none".'
+        raise InvalidValueError("start", found.status.text, 'a state with linear vibrations for "modal"', step)
+    rest, square = stiffness(state), (2.0 * np.pi * found.frequency) ** 2
+    force = _forces_at_frame(state, found, rest)
+    along = _at_frame(state)
+    size = np.linalg.norm(along, axis=1)
+    unit = along / size[:, None]
+    let_out = unit * (1.0 + size / state.cables.cable.axial_stiffness)[:, None]
+    drive = np.concatenate((np.einsum("kmi,mi->km", force, let_out), found.shape.T), axis=1)
+    pulled = np.einsum("kmi,mi->mk", force, unit)
+    ends = _ends_by_motion(state) @ rest.compliance
+    by_wrench = np.einsum("mi,mij,mjk->mk", unit, rest.cable_stiffness, ends)
+    whole = np.concatenate((rest.length_sensitivity, rest.compliance), axis=1)
+    tension = np.concatenate((rest.tension_sensitivity, by_wrench), axis=1)
+    slow = drive / square[:, None]
+    return Answering(found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow)
+
+
+def _at_frame(state: Equilibrium) -> Array:
+    """Forces in the cables at their frame ends, towards the platform, world axes [N], (m, 3)."""
+    chord = state.pose.transform(state.one_robot.platform_anchors) - state.exit_point
+    reach = np.maximum(np.hypot(chord[:, 0], chord[:, 1]), 1e-300)
+    level = chord[:, :2] * (state.cables.horizontal_tension / reach)[:, None]
+    return np.column_stack((level, state.cables.vertical_force - state.cables.cable_weight))
+
+
+def _ends_by_motion(state: Equilibrium) -> Array:
+    """Displacements of the platform ends by a motion of the platform, (m, 3, 6)."""
+    robot = state.one_robot
+    x, y, z = ((robot.platform_anchors - robot.center_of_mass) @ state.pose.matrix.T).T
+    ends = np.zeros((robot.cable_count, 3, 6))
+    ends[:, :, :3] = np.eye(3)
+    ends[:, 0, 4], ends[:, 0, 5], ends[:, 1, 5] = z, -y, x
+    ends[:, 1, 3], ends[:, 2, 3], ends[:, 2, 4] = -z, y, -x
+    return ends
+
+
+def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
+    """Changes of the forces at the frame ends in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))].
+
+    Along a cable f = f_0 - g with g' = rho omega^2 u; its end moves by the integral of C f.
+    """
+    material, length = state.cables.cable, state.free_length
+    at_frame, points = _at_frame(state), found.cable_shape.shape[2]
+    square = (2.0 * np.pi * found.frequency) ** 2
+    weight = state.cables.cable_weight
+    force = np.empty((len(square), len(length), 3))
+    for i in range(len(length)):
+        s = np.linspace(0.0, length[i], points)
+        here = at_frame[i] + np.outer(s / length[i], [0.0, 0.0, weight[i]])
+        size = np.linalg.norm(here, axis=1)
+        unit, stretch = here / size[:, None], 1.0 / material.axial_stiffness[i]
+        shape = np.moveaxis(found.cable_shape[:, i], 1, 0)  # (points, K, 3)
+        density = material.linear_density[i] * square[:, None]
+        passed = CubicSpline(s, shape).antiderivative()(s) * density
+        along = np.einsum("pi,pki->pk", unit, passed)[..., None] * unit[:, None, :]
+        bent = along * stretch + (passed - along) * (1.0 / size + stretch)[:, None, None]
+        missing = CubicSpline(s, bent).antiderivative()(length[i])
+        force[:, i] = (shape[-1] + missing) @ rest.cable_stiffness[i].T
+    return force
+
+
+def course_values(course: Course, time: Array) -> Array:
+    """Values (N, n) of a course at times (N,)."""
+    if len(course.time) == 1:
+        return np.repeat(course.value, len(time), axis=0)
+    at = np.clip(time, course.time[0], course.time[-1])
+    k = np.clip(np.searchsorted(course.time, at, side="right") - 1, 0, len(course.time) - 2)
+    whole = (course.time[k + 1] - course.time[k])[:, None]
+    x = (at - course.time[k])[:, None] / whole
+    low, high = course.value[k], course.value[k + 1]
+    slope = (high - low) / whole
+    bend = (1.0 - x) * (course.begin[k] - slope) - x * (course.end[k] - slope)
+    values: Array = (1.0 - x) * low + x * high + whole * x * (1.0 - x) * bend
+    return values
+
+
+def swing_modes(frequency: Array, ratio: Array, force: Array, step: float) -> Swung:
+    """Modes that rest at first, under forces that are straight between instants: exact but for rounding.
+
+    Args:
+        frequency: Angular [rad/s], (K,).
+        ratio: Of damping, below 1, (K,).
+        force: On the modes, (N, K).
+        step: Between instants [s].
+
+    Returns:
+        Swung; the energy that damping takes is an integral of order 4.
+    """
+    ringing = frequency * np.sqrt(1.0 - ratio * ratio)
+    root = -ratio * frequency + 1j * ringing
+    whole = np.exp(root * step)
+    mean = (whole - 1.0) / root
+    later = (whole - 1.0 - root * step) / (root * root * step)
+    moving: NDArray[np.complex128] = np.zeros(force.shape, dtype=np.complex128)
+    pushed = force[:-1] * (mean - later) + force[1:] * later
+    for n in range(len(force) - 1):
+        moving[n + 1] = whole * moving[n] + pushed[n]
+    amplitude = moving.imag / ringing
+    rate = moving.real - ratio * frequency * amplitude
+    drag = 2.0 * ratio * frequency
+    speeding = force - drag * rate - frequency**2 * amplitude
+    area = (0.5 * step * (force[1:] + force[:-1]) - np.diff(rate, axis=0) - drag * np.diff(amplitude, axis=0)) / (
+        frequency**2
+    )
+    work = np.diff(force * amplitude, axis=0) - np.diff(force, axis=0) / step * area
+    power, bend = drag * rate**2, 2.0 * drag * rate * speeding
+    taken = 0.5 * step * (power[1:] + power[:-1]) - step * step / 12.0 * np.diff(bend, axis=0)
+    start = np.zeros(1)
+    supplied = np.concatenate((start, np.cumsum(work.sum(axis=1))))
+    return Swung(amplitude, rate, supplied, np.concatenate((start, np.cumsum(taken.sum(axis=1)))))
+
+
+def modal_simulation(given: Beginning, damping: Damping, step: Any, record: float) -> Simulation:
+    """A robot in small motion about its equilibrium at the start.
+
+    Args:
+        given: The beginning.
+        damping: What takes energy out of the modes.
+        step: Between instants of the forces [s], which are straight between them; None for a tenth of a radian of the
+            highest frequency, at most 1 ms.
+        record: How often the motion is written down [s].
+
+    Returns:
+        Simulation; its energies are those of the modes, about rest.
+
+    Raises:
+        InvalidValueError: If the state has no linear vibration, or lengths change by more than is small.
+    """
+    state = given.state
+    _check(given)
+    answer = answering(state, damping)
+    found, frequency = answer.found, 2.0 * np.pi * answer.found.frequency
+    if (found.loss >= 1.0).any():
+        k = int(np.argmax(found.loss >= 1.0))
+        told = f"a ratio of {found.loss[k]:.3g} at {found.frequency[k]:.3g} Hz with cable mass"
+        raise InvalidValueError("damping", told, "< 1 for modes", 'Give less, or cable_mass="lumped".')
+    usual = min(LONGEST, SHARE / frequency[-1])
+    fine = usual if step is None else number(step, "step", "s", above=0.0)
+    every = max(1, math.ceil(record / fine - 1e-9))
+    size = record / every
+    count = int(np.ceil(min((given.end - given.begin) / size, MOST_STEPS) - 1e-9))
+    cables, points = found.cable_shape.shape[1:3]
+    check_memory(
+        "duration", 8.0 * count * (5.0 * len(frequency) + 4.0 * cables + 3.0 * cables * points / every), SHORTER
+    )
+    time: Array = given.begin + size * np.arange(count + 1, dtype=np.float64)
+    kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # the end too
+    lengths, wrenches = course_values(given.lengths, time), course_values(given.wrench, time)
+    change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
+    _check_small(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
+    swung = swing_modes(frequency, found.loss, change @ answer.drive.T, size)
+    amplitude, rate, driven = swung.amplitude[kept], swung.rate[kept], change[kept]
+    motion = amplitude @ found.shape.T + driven @ answer.motion.T
+    kinetic, potential = 0.5 * (rate**2).sum(axis=1), 0.5 * ((amplitude * frequency) ** 2).sum(axis=1)
+    supplied, lost = swung.supplied[kept], swung.lost[kept]
+    at_steps = state.cables.frame_end_tension + swung.amplitude @ answer.pulled.T + change @ answer.tension.T
+    slopes = np.gradient(driven, time[kept], axis=0)
+    moving, pose = rate @ found.shape.T + slopes @ answer.motion.T, _moved(state, motion)
+    return Simulation(
+        robot=given.robot,
+        time=locked(time[kept].copy()),
+        pose=pose,
+        twist=twist_of_origin(given.robot, pose, moving[:, :3], moving[:, 3:]),
+        tensions=locked(at_steps[kept].copy()),
+        length=locked(lengths[kept].copy()),
+        energy=energy_balance(kinetic, potential, supplied, lost, np.zeros_like(lost)),
+        events=(),
+        cable_mass="modal",
+        step=size,
+        integrator="exact",
+        damping=damping,
+        nodes=locked(_shapes(state, found, amplitude)),
+        largest_tension=locked(at_steps.max(axis=0)),
+    )
+
+
+def refuse_with_modes(others: list[str]) -> None:
+    """Refuse what modes about one equilibrium do not know.
+
+    Args:
+        others: Names of arguments that were given.
+
+    Raises:
+        InvalidValueError: If there is one.
+    """
+    if others:
+        step = 'Leave it out, or give cable_mass="lumped".'
+        raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
+
+
+def _check(given: Beginning) -> None:
+    """Refuse what has no modes that are known."""
+    if given.state.contact is not None:
+        step = 'Leave winches out of the robot, or give cable_mass="lumped".'
+        raise InvalidValueError("start", "a robot with pulleys or dead cable", 'none for cable_mass="modal"', step)
+    if given.model.code != codes.CATENARY:
+        step = 'Plan with Catenary(), or give cable_mass="none".'
+        raise InvalidValueError("start: model", type(given.model).__name__, "Catenary() where cables have mass", step)
+    if np.abs(given.twist).max() > 0.0 or np.abs(given.rate).max() > 0.0:
+        step = 'Give plan.state[0], or cable_mass="lumped".'
+        raise InvalidValueError("start", "in motion", 'at rest for cable_mass="modal"', step)
+
+
+def _check_small(most: Array, state: Equilibrium) -> None:
+    share = most / state.free_length
+    if (share > SMALL).any():
+        i = int(np.argmax(share))
+        told, allowed = f"{most[i]:.3g} m from its own", f'<= {SMALL * state.free_length[i]:.3g} m for "modal"'
+        step = 'Give cable_mass="lumped", which knows large motions.'
+        raise InvalidValueError(f"unstrained_length: cable {i}", told, allowed, step)
+
+
+def _moved(state: Equilibrium, motion: Array) -> Pose:
+    """Poses after motions (N, 6) of the platform: its center of mass displaced, itself turned about it."""
+    center = state.pose.matrix @ state.one_robot.center_of_mass
+    turned = Rotation.from_rotvec(motion[:, 3:])
+    place = state.pose.position + center + motion[:, :3] - turned.as_matrix() @ center
+    return Pose.from_quaternion(place, (turned * state.pose.rotation).as_quat())
+
+
+def _shapes(state: Equilibrium, found: Vibration, amplitude: Array) -> Array:
+    """Positions of the cables at equal material steps, (N, m, points, 3)."""
+    count = found.cable_shape.shape[2]
+    chord = state.pose.transform(state.one_robot.platform_anchors) - state.exit_point
+    level = chord[:, :2] / np.maximum(np.hypot(chord[:, 0], chord[:, 1]), 1e-300)[:, None]
+    own = state.cables.points(count)
+    at_rest = np.concatenate((own[..., :1] * level[:, None], own[..., 1:]), axis=-1) + state.exit_point[:, None]
+    shapes: Array = at_rest + np.tensordot(amplitude, found.cable_shape, axes=1)
+    return shapes

@@ -1,0 +1,243 @@
+"""A robot that is simulated: its state, and its data as kernel arrays."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from sagline.cables.model import CableModel
+from sagline.core.arrays import Array, Indices, locked
+from sagline.core.errors import InvalidValueError
+from sagline.dynamics.simulation.initial_conditions import Course
+from sagline.kernels import tables
+from sagline.kernels.cable.rows import CABLE_ROWS
+from sagline.kernels.cable.rows import LENGTH as LENGTH_ROW
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import motion
+from sagline.kernels.dynamics import progress as k
+from sagline.kernels.dynamics import rigid_body as body
+from sagline.kernels.dynamics.winding import BIN
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.several import anything_behind
+from sagline.statics.tables import cable_table
+
+MARGIN: Final = 5.0  # m of cable that a drum may let out beyond what it is asked for, and still remember
+BROKEN: Final = 1e-12  # of a cable's pull that is left when it is cut
+NOTES: Final = 1000  # of what begins by itself, between two events
+
+
+class Records:
+    """What the kernel writes down of N steps.
+
+    Attributes:
+        states: Center of mass, quaternion of the principal axes, velocity, angular velocity, (N, 13).
+        tensions: At the frame ends [N], (N, m).
+        lengths: Unstrained [m], (N, m).
+        energies: Kinetic, potential, supplied, lost [J], (N, 4).
+        notes: See `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS): a run pauses with more than NOTES.
+        points: Of cables with mass [m], (N, m, points, 3); None of cables without.
+    """
+
+    def __init__(self, count: int, cables: int) -> None:
+        """Room for so many steps."""
+        self.states = np.empty((count, body.STATE_COLUMNS))
+        self.tensions = np.empty((count, cables))
+        self.lengths = np.empty((count, cables))
+        self.energies = np.empty((count, k.ENERGY_COLUMNS))
+        self.notes = np.zeros((NOTES + 2 * cables, k.NOTE_COLUMNS))
+        self.points: Array | None = None
+
+    @property
+    def arrays(self) -> tuple[Array, ...]:
+        """As the kernel takes them."""
+        return self.states, self.tensions, self.lengths, self.energies, self.notes
+
+
+class Plant:
+    """A robot in the midst of a motion; mutable, with its own memory.
+
+    The platform's axes are its principal ones here, with the origin at the center of mass.
+
+    Attributes:
+        robot: The robot as it was at the start.
+        model: Cable model.
+        axes: Principal axes in the platform frame, one a column, (3, 3).
+        turn: Quaternion from principal axes to the platform frame, (4,).
+        turn_back: The reverse, (4,).
+        inertia: Mass and principal moments, (4,).
+        cables: Indices of the cables that are there, (m,).
+        state: As in `sagline.kernels.dynamics.rigid_body`, (13,).
+        rows: Of the cables, (CABLE_ROWS, m).
+        now: What the drives do, (DRIVE_ROWS, m).
+        data: What the drives are, (DATA_ROWS, m).
+        audit: What is added up, (AUDIT_SIZE,).
+        counters: Of the kernel, (COUNTERS,).
+        layers: Strain of the cable on the drums, (m, B).
+        kernel: What moves it: called with `arguments`, arrays of records, steps to take, and steps a record.
+        cable_mass: As `simulate` takes it.
+    """
+
+    kernel: ClassVar[Any] = staticmethod(motion.run)
+    cable_mass: ClassVar[str] = "none"
+
+    def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
+        """Place a robot at a pose.
+
+        Args:
+            robot: The robot.
+            model: Cable model with an energy.
+            pose: A single one.
+            twist: Velocity of the platform's origin, and angular velocity, world axes, (6,).
+            length: Unstrained lengths [m], (m,).
+            data: Of the drives, (DATA_ROWS, m).
+        """
+        m = robot.cable_count
+        self.robot, self.model, self.data = robot, model, data
+        moments, self.axes = principal_axes(robot, pose)
+        self.turn = Rotation.from_matrix(self.axes).as_quat()
+        self.turn_back = locked(self.turn * [-1.0, -1.0, -1.0, 1.0])
+        self.inertia = np.array([robot.mass, *moments])
+        self.cables: Indices = np.arange(m)
+        self._table = cable_table(robot)[0].copy()
+        anchors = slice(tables.PLATFORM_X, tables.PLATFORM_Z + 1)
+        self._table[:, anchors] = (robot.platform_anchors - robot.center_of_mass) @ self.axes
+        self._behind = anything_behind(robot) or None
+        self.state = self._state_at(pose, twist)
+        self.rows = np.full((CABLE_ROWS, m), np.nan)
+        self.rows[LENGTH_ROW] = length
+        self.now = np.zeros((d.DRIVE_ROWS, m))
+        self.now[d.WOUND] = length * (1.0 + data[d.WINDING_STRAIN])
+        self.now[d.STORED] = data[d.WINDING_STRAIN]
+        self.layers = np.zeros((m, 1))
+        self.audit, self.counters = np.zeros(d.AUDIT_SIZE), np.zeros(k.COUNTERS, dtype=np.int64)
+        self._room = np.zeros(0)
+
+    def remember_winding(self, longest: float) -> None:
+        """Let the drums remember the strain at which cable was wound in, up to a length off the drum [m] and MARGIN.
+
+        What lies farther in lies at the winding tension, and comes to it when it is wound in.
+        """
+        self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
+
+    def arguments(
+        self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], courses: Any
+    ) -> Any:
+        """What the kernel takes but for records and counts of steps; valid until a cable breaks or the mass changes.
+
+        Args:
+            rules: See `sagline.kernels.dynamics.massless.Rules`.
+            numbers: See there.
+            courses: Of lengths, of wrenches, of the wind.
+        """
+        lengths, wrenches, winds = courses
+        wide = lengths.value.shape[1]
+        needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
+        if self._room.size != needed:
+            self._room = np.zeros(needed)
+        platform = locked(np.array([self.inertia[0], self.robot.gravity, 0.0, 0.0, 0.0]))
+        robot = (locked(self._table.view()), platform, locked(self.inertia.copy()), self.robot.freedom)
+        kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._room)
+        terms = (self.model.code, *self.model.parameters, self.robot.gravity, self._behind)
+        given: tuple[Course, Course, Course] = (lengths, wrenches, winds)
+        return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept
+
+    def records(self, count: int) -> Records:
+        """Room for records of so many steps."""
+        return Records(count, len(self.cables))
+
+    def seen(self, states: Array) -> Array:
+        """Recorded states of what the kernel moves, (N, 13), as those of the platform."""
+        return states
+
+    def failure(self, time: float, step: float) -> InvalidValueError:
+        """Why the kernel stopped: at a time [s], with steps of so many seconds."""
+        return grown(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
+
+    def without(self, cable: int) -> None:
+        """Take a cable away, by its index among all that were ever there."""
+        place = int(np.flatnonzero(self.cables == cable)[0])
+        self.cables = np.delete(self.cables, place)
+        self._table = np.delete(self._table, place, axis=0)
+        self.layers = np.delete(self.layers, place, axis=0)
+        self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
+
+    def cut(self, places: Any) -> None:
+        """Let cables break in the midst of a run, by their places: the kernel's arrays stay as they are.
+
+        Stiffness and weight fall by one factor, so that every cable hangs as before and all it pulls with is nothing.
+        """
+        for column in (tables.STIFFNESS, tables.DENSITY):
+            self._table[places, column] *= BROKEN
+        self.counters[k.READY] = 0  # look at all forces and energies anew
+
+    def hold(self, places: Any) -> None:
+        """Lock winches, by their places among the cables that are there; what moves of them is lost at once."""
+        self.now[d.HELD, places] = 1.0
+        self.now[d.RATE, places] = 0.0
+
+    def with_mass(self, mass: float, *, at_rest: bool) -> None:
+        """Change the mass [kg] and the inertia with it; what is taken up at rest shares the momentum there is."""
+        factor = mass / self.inertia[0]
+        self.inertia = self.inertia * factor
+        if at_rest:
+            self.state[body.VELOCITY : body.VELOCITY + 3] /= factor
+        else:
+            self.state[body.MOMENTUM :] *= factor
+
+    def _state_at(self, pose: Pose, twist: Array) -> Array:
+        turned = pose.matrix
+        lever = turned @ self.robot.center_of_mass
+        state = np.empty(body.STATE_COLUMNS)
+        state[body.CENTER : body.TURN] = pose.position + lever
+        state[body.TURN : body.VELOCITY] = (pose.rotation * Rotation.from_quat(self.turn)).as_quat()
+        state[body.VELOCITY : body.MOMENTUM] = twist[:3] + np.cross(twist[3:], lever)
+        axes = turned @ self.axes
+        moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
+        state[body.MOMENTUM :] = axes @ (moments * (axes.T @ twist[3:]))
+        return state
+
+    def poses(self, states: Array) -> Pose:
+        """Poses of the platform frame at recorded states (N, 13)."""
+        turned = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]) * Rotation.from_quat(self.turn_back)
+        position = states[:, body.CENTER : body.TURN] - turned.as_matrix() @ self.robot.center_of_mass
+        return Pose.from_quaternion(position, turned.as_quat())
+
+
+def principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
+    """Principal moments of the platform [kg m^2], (3,), infinite where it does not turn, and axes, one a column.
+
+    Args:
+        robot: The robot.
+        pose: Where it is, by which the plane of a planar pattern is seen from the platform.
+    """
+    if robot.motion_pattern == "3R3T":
+        moments, axes = np.linalg.eigh(robot.inertia)
+        if np.linalg.det(axes) < 0.0:
+            axes[:, 0] *= -1.0
+        return moments, axes
+    if robot.motion_pattern != "1R2T" or robot.plane_normal is None:
+        return np.full(3, np.inf), np.eye(3)
+    normal = pose.matrix.T @ robot.plane_normal
+    axes = np.linalg.svd(normal[None])[2].T[:, [1, 2, 0]]  # the normal last
+    axes[:, 2] = normal
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
+    return np.array([np.inf, np.inf, normal @ robot.inertia @ normal]), axes
+
+
+def grown(step: float, time: float, cable: int) -> InvalidValueError:
+    """What is said of a run whose energy has come or gone by itself.
+
+    Args:
+        step: Of the integrator [s].
+        time: When it was seen [s].
+        cable: Which has the largest tension.
+
+    Returns:
+        The error, to be raised.
+    """
+    value = f"{step:g} s, at which energy grows or fades by itself: at {time:.6g} s most of it is in cable {cable}"
+    return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")

@@ -1,0 +1,299 @@
+"""Events during a simulation, and its result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+
+from sagline.core.arguments import brief, whole_number
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result, Saved
+from sagline.dynamics.simulation.winches import Winches
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+LAST: Final = 9_999  # cable or winch; no robot has more
+
+
+@dataclass(frozen=True, slots=True)
+class Break:
+    """A cable breaks: from then on it is not there. Its energy goes with it, as `energy.removed`.
+
+    Attributes:
+        cable: Which, from 0.
+        time: When [s].
+    """
+
+    cable: int
+    time: float
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "cable", whole_number(self.cable, "cable", 0, LAST))
+        object.__setattr__(self, "time", number(self.time, "time", "s"))
+
+
+@dataclass(frozen=True, slots=True)
+class Stall:
+    """A winch stops at once, and stands from then on while the others go on.
+
+    Attributes:
+        winch: Which, from 0.
+        time: When [s].
+    """
+
+    winch: int
+    time: float
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, LAST))
+        object.__setattr__(self, "time", number(self.time, "time", "s"))
+
+
+@dataclass(frozen=True, slots=True)
+class Brake:
+    """The rates that a winch is asked for, or those of all winches together, fall evenly to zero and stay there.
+
+    With one duration for all the platform keeps to the direction of its path.
+
+    Attributes:
+        time: When [s].
+        winch: Which, from 0; None for all.
+        duration: How long it takes [s], > 0.
+    """
+
+    time: float
+    winch: int | None = None
+    duration: float = 0.2
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "time", number(self.time, "time", "s"))
+        if self.winch is not None:
+            object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, LAST))
+        object.__setattr__(self, "duration", number(self.duration, "duration", "s", above=0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Drop:
+    """A part of the platform's mass falls off; the inertia shrinks with it, the center of mass stays where it is.
+
+    Attributes:
+        mass: How much [kg], > 0, less than the platform's.
+        time: When [s].
+    """
+
+    mass: float
+    time: float
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "mass", number(self.mass, "mass", "kg", above=0.0))
+        object.__setattr__(self, "time", number(self.time, "time", "s"))
+
+
+@dataclass(frozen=True, slots=True)
+class PickUp:
+    """A mass at rest is fixed to the platform: its momentum is then the momentum of both.
+
+    The inertia grows with the mass, the center of mass stays where it is.
+
+    Attributes:
+        mass: How much [kg], > 0.
+        time: When [s].
+    """
+
+    mass: float
+    time: float
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "mass", number(self.mass, "mass", "kg", above=0.0))
+        object.__setattr__(self, "time", number(self.time, "time", "s"))
+
+
+Event: TypeAlias = Break | Stall | Brake | Drop | PickUp
+KINDS = {Break: "break", Stall: "stall", Brake: "brake", Drop: "drop", PickUp: "pick up"}
+
+
+def cable_of(event: Event) -> int | None:
+    """Which cable or winch an event is of; None for the platform's, and for that of all winches."""
+    return event.cable if isinstance(event, Break) else getattr(event, "winch", None)
+
+
+def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple[Event, ...]:
+    """Events in order of time.
+
+    Args:
+        events: What a caller gave: one event or several.
+        robot: What they happen to.
+        begin: First time that is simulated [s].
+        end: The last [s].
+
+    Returns:
+        Events, sorted; of one time in the order given.
+
+    Raises:
+        InvalidValueError: If one is none, names a cable that there is not (any more), happens outside the run, or takes
+            all of the mass.
+    """
+    given = (events,) if isinstance(events, Event) else events
+    if not isinstance(given, Iterable) or isinstance(given, str):
+        step = "Give sl.Break(cable=3, time=2.5), or several in a list."
+        raise InvalidValueError("events", brief(events), "events, or none", step)
+    found: list[Event] = []
+    listed: list[Any] = list(given)
+    for k, event in enumerate(listed):
+        if not isinstance(event, Event):
+            names = ", ".join(kind.__name__ for kind in KINDS)
+            step = "Give sl.Break(cable=3, time=2.5) for instance."
+            raise InvalidValueError(f"events[{k}]", brief(event), f"one of {names}", step)
+        cable = cable_of(event)
+        if cable is not None and cable >= robot.cable_count:
+            name = "cable" if isinstance(event, Break) else "winch"
+            allowed = f"0 to {robot.cable_count - 1}, as {robot.name} has"
+            raise InvalidValueError(f"events[{k}]: {name}", cable, allowed, "They count from 0.")
+        if not begin <= event.time <= end:
+            step = "Correct it, or give a longer duration."
+            raise InvalidValueError(f"events[{k}]: time", f"{event.time:g} s", f"{begin:g} to {end:g} s", step)
+        found.append(event)
+    found.sort(key=lambda event: event.time)
+    _check_order(found, robot)
+    return tuple(found)
+
+
+def _check_order(events: list[Event], robot: Robot) -> None:
+    """Refuse what happens to a broken cable, and loads that are not there."""
+    broken: set[int] = set()
+    mass = robot.mass
+    for event in events:
+        cable = cable_of(event)
+        if cable in broken:
+            step = "Leave out what happens to it later."
+            raise InvalidValueError(f"events: cable {cable}", f"broken before {event.time:g} s", "there", step)
+        if isinstance(event, Break):
+            broken.add(event.cable)
+        if isinstance(event, Drop):
+            if event.mass >= mass:
+                allowed = f"< {mass:g} kg, what there is at {event.time:g} s"
+                raise InvalidValueError("events: Drop: mass", f"{event.mass:g} kg", allowed, "Drop less.")
+            mass -= event.mass
+        if isinstance(event, PickUp):
+            mass += event.mass
+    if len(broken) == robot.cable_count:
+        step = "Keep one: a platform without cables only falls."
+        raise InvalidValueError("events", "a break of every cable", "at least one left", step)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnergyBalance(Result):
+    """Where the energy of a simulation is [J]; each of shape (N,).
+
+    Attributes:
+        kinetic: Of platform, cables and drums.
+        potential: Of weight and of strain and height of the cables off the drums, frame ends and the origin at zero.
+        supplied: Work done on the robot since the start: by winches, given forces and wind.
+        lost: Work done by damping and friction since the start, strain that slipped on drums, and what chains lost
+            where nodes were born and merged.
+        removed: Energy that left the robot with cables that broke and loads that were dropped since the start, less
+            what loads brought that were picked up. Heights count in it as in `potential`, so it has either sign.
+        error: kinetic + potential - supplied + lost + removed, less its value at the start: what the integrator
+            invents.
+    """
+
+    kinetic: Array
+    potential: Array
+    supplied: Array
+    lost: Array
+    removed: Array
+    error: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Occurrence:
+    """Something that happened to the robot while it moved.
+
+    Attributes:
+        time: When [s].
+        kind: "break", "stall", "brake", "drop" or "pick up", as asked for; "saturate" or "slack" by itself.
+        cable: Which cable or winch, or None where it is the platform's.
+        tension_before: Largest tension of that cable, or of all, before it [N].
+        tension_after: Largest tension of any cable after it, to the end or the next [N].
+    """
+
+    time: float
+    kind: str
+    cable: int | None
+    tension_before: float
+    tension_after: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Simulation(Result, Saved):
+    """Result of `simulate`: N samples of a motion.
+
+    Attributes:
+        robot: The robot.
+        time: [s], increasing, shape (N,): every so many steps, and the end.
+        pose: Poses of the platform, a batch of N.
+        twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
+        tensions: At the frame ends [N], shape (N, m).
+        length: Unstrained lengths off the drum [m], shape (N, m); NaN of a cable that has broken.
+        energy: Where the energy is.
+        events: What happened, in order.
+        cable_mass: "none", "lumped" or "modal".
+        step: Of the integrator [s].
+        nodes: Position of every cable at its nodes, world axes [m], shape (N, m, P, 3); None without cable mass, NaN of
+            a cable that has broken.
+        integrator: "runge-kutta" or "splitting"; "exact" of modes.
+        winches: "ideal", "robot" or SecondOrder(...).
+        winding: "constant" or "remembered".
+        damping: What took energy out of the cables.
+        largest_tension: Of each cable at the frame end at any step, also between samples [N], shape (m,); None where it
+            is not known.
+    """
+
+    robot: Robot
+    time: Array
+    pose: Pose
+    twist: Array
+    tensions: Array
+    length: Array
+    energy: EnergyBalance
+    events: tuple[Occurrence, ...]
+    cable_mass: str
+    step: float
+    nodes: Array | None = None
+    integrator: str = "runge-kutta"
+    winches: Winches = "ideal"
+    winding: str = "constant"
+    damping: Damping = field(default_factory=Damping)
+    largest_tension: Array | None = None
+
+
+def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:
+    """The balance of five energies [J], each of shape (N,)."""
+    total = kinetic + potential - supplied + lost + removed
+    return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
+
+
+def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:
+    """Twists of the platform frame's origin, as a path has them, from motions of the center of mass.
+
+    Args:
+        robot: The robot.
+        pose: Poses, a batch of N.
+        velocity: Of the center of mass, world axes [m/s], (N, 3).
+        spin: Angular velocity, world axes [rad/s], (N, 3).
+
+    Returns:
+        Shape (N, 6), write-locked.
+    """
+    lever = pose.matrix @ robot.center_of_mass
+    return locked(np.concatenate((velocity - np.cross(spin, lever), spin), axis=1))

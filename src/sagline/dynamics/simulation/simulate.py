@@ -1,0 +1,339 @@
+"""Simulation of a robot: motion of the platform under winches, wrenches, wind and events."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, Final, Literal, get_args
+
+import numpy as np
+
+from sagline.core.arguments import choice, optional
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.dynamics.simulation.chain_plant import ChainPlant, check_lumped, checked_nodes, wave_frequency
+from sagline.dynamics.simulation.initial_conditions import Beginning, Course, TableInTime, beginning, table_in_time
+from sagline.dynamics.simulation.modal import modal_simulation, refuse_with_modes
+from sagline.dynamics.simulation.plant import Plant
+from sagline.dynamics.simulation.results import Drop, Event, PickUp, Simulation, checked_events
+from sagline.dynamics.simulation.run import Run
+from sagline.dynamics.simulation.steps import checked_step, highest_frequency, with_drives
+from sagline.dynamics.simulation.winches import Winches, Winding, check_winding, drive_data, kind_of
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import massless as k
+from sagline.kinematics.plan import Plan
+from sagline.robot.equilibrium import Equilibrium
+
+Integrator = Literal["splitting", "runge-kutta"]  # in the order of the kernel's codes
+CableMass = Literal["none", "lumped", "modal"]
+RECORD: Final = 0.01  # s
+MOST_STEPS: Final = 10**8  # some minutes
+
+
+def simulate(
+    start: Plan | Equilibrium,
+    *,
+    duration: float | None = None,
+    step: float | None = None,
+    cable_mass: CableMass = "none",
+    nodes: int = 20,
+    integrator: Integrator | None = None,
+    winches: Winches = "ideal",
+    winding: Winding = "constant",
+    unstrained_length: TableInTime | None = None,
+    events: Event | Iterable[Event] = (),
+    wrench: TableInTime | None = None,
+    wind: TableInTime | None = None,
+    damping: Damping | None = None,
+    record: float | None = None,
+) -> Simulation:
+    """Move a robot in time: the platform is a free body on exact cables, whose lengths its winches change.
+
+    Cables have no inertia ("massless"): they hang at every instant as they do at rest, pull or are slack as their
+    lengths say, over pulleys and with dead cable as the robot has them.
+
+    Between samples a plan's lengths are followed by cubics that have its `length_rate` there; at its samples they are
+    the plan's own. A plan that is sampled more often is followed more closely: give its path at 1 kHz.
+
+    Args:
+        start: A plan along a path, from the pose and at the speed that it begins with; its wrench, without the path's
+            inertia, acts. Or a single equilibrium, at rest.
+        duration: How long [s]; lengths are held after the end of what is given. None: as long as the plan, or the table
+            of lengths.
+        step: Of the integrator [s]; None: 0.2 radians of the highest frequency (massless, cables taut), at most 1 ms.
+        cable_mass: "none": cables hang at every instant as they do at rest. "lumped": each is a chain of nodes with
+            its mass, at fixed material points, which swings, and transmits its waves; new nodes are born at the frame
+            and merged there as cable is let out and wound in. A chain keeps the exit from its pulley of the start.
+            "modal": small motion about an equilibrium, each mode of `vibration` by itself; lengths and wrench may
+            change, and `Damping` may have modal_damping. No pulleys, events, winches or wind.
+        nodes: Elements a cable is divided into where it has mass, at the start, 4 to 500. At rest the pose differs from
+            the exact one by the order of nodes^-2.
+        integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2: its energy has no trend in long
+            runs. None: "runge-kutta"; "splitting" for winches="robot", which needs it.
+        winches: "ideal": lengths are what is given. SecondOrder(...): they lag. "robot": the robot's winches, with
+            inertia, limits of torque and speed, friction, and loops of position and speed that are closed every
+            millisecond; from the start on they expect the tensions of the plan.
+        winding: What lies on the drums. "constant": cable wound at the winches' winding_tension. "remembered": cable
+            that is wound in lies at its tension, until it is paid out. Of winches="robot" alone.
+        unstrained_length: Set points in time for an equilibrium: times [s] (K,) and lengths [m] (K, m), straight in
+            between; or one row (m,), which is kept from the start on.
+        events: What happens on the way, at the first step that is not earlier: `Break`, `Stall`, `Brake`, `Drop`,
+            `PickUp`.
+        wrench: On the platform, in place of that of the start: one row (6,) [N, N m], or times and rows (K, 6).
+        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3). Half of its force on a cable, as if it were
+            straight, acts on the platform; needs the cables' diameter. The platform's own is a wrench.
+        damping: What takes energy out of the cables; None: nothing.
+        record: How often the motion is written down [s], in whole steps; None: 0.01.
+
+    Returns:
+        Simulation. Its events name also when a cable began to be slack, and when a winch came to a limit.
+
+    Raises:
+        InvalidValueError: If a plan has samples without an answer (it names the first), the step is above the limit of
+            stability, energy grows by itself (it names time and cable), an event names no cable, the robot lacks data
+            that its winches need, or an argument is of the wrong kind.
+
+    Examples:
+        A gust that presses the platform down, and the work that it does:
+
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> state = sl.inverse(robot, sl.Pose.from_euler([0, 0, 2], 0, 0, 0)).state
+        >>> gust = ([0.0, 0.2, 0.3, 0.4], np.outer([0, 0, 1, 0], [0, 0, -500, 0, 0, 0]))
+        >>> run = sl.simulate(state, wrench=gust, duration=2.0)
+        >>> lowest = run.pose.position[:, 2].min() - 2.0
+        >>> print(f"{1e3 * lowest:.1f} mm, {run.energy.supplied[-1]:.2f} J")
+        -13.7 mm, 4.79 J
+
+    Source:
+        docs/model.md, section 11; the splitting of the free turn: Dullweber, Leimkuhler & McLachlan, J. Chem. Phys.
+        107, 1997.
+    """
+    choice(cable_mass, "cable_mass", get_args(CableMass))
+    elements = checked_nodes(nodes)
+    given = beginning(start, unstrained_length, wrench, duration)
+    if cable_mass == "modal":
+        others = {"events": events, "winches": winches != "ideal", "wind": wind is not None, "integrator": integrator}
+        refuse_with_modes([name for name, asked in others.items() if asked])
+        written = RECORD if record is None else number(record, "record", "s", above=0.0)
+        return modal_simulation(given, optional(damping, Damping, "damping") or Damping(), step, written)
+    return run_of(
+        given,
+        elements if cable_mass == "lumped" else 0,
+        step=step,
+        integrator=integrator,
+        winches=winches,
+        winding=winding,
+        events=events,
+        wind=wind,
+        damping=damping,
+        record=record,
+    ).finish()
+
+
+def run_of(
+    given: Beginning,
+    elements: int = 0,
+    *,
+    step: float | None = None,
+    integrator: Integrator | None = None,
+    winches: Winches = "ideal",
+    winding: Winding = "constant",
+    events: Event | Iterable[Event] = (),
+    wind: TableInTime | None = None,
+    damping: Damping | None = None,
+    record: float | None = None,
+) -> Run:
+    """A simulation that has begun, and can be looked at on its way.
+
+    Args:
+        given: The beginning.
+        elements: Of each cable where it has mass; 0 where it has none.
+        step: As in `simulate`, like all that follow.
+        integrator: Which.
+        winches: Which kind.
+        winding: What lies on the drums.
+        events: What happens on the way.
+        wind: Velocity of the air.
+        damping: What takes energy out of the cables.
+        record: How often the motion is written down.
+
+    Returns:
+        Run, at its start.
+
+    Raises:
+        InvalidValueError: As `simulate`.
+    """
+    if elements:
+        check_lumped(given)
+    kind, losses = kind_of(winches), checked_damping(damping)
+    code = code_of(integrator, kind, elements)
+    check_winding(winding, kind)
+    air = Course.still(np.zeros(3)) if wind is None else table_in_time(wind, "wind", "m/s", 3, given.begin)
+    happening = checked_events(events, given.robot, given.begin, given.end)
+    plant = plant_at(given, winches, wind is not None, elements, losses)
+    if winding == "remembered" and kind == d.DRUMS:
+        plant.remember_winding(float(given.lengths.value.max()))
+    waves = wave_frequency(given, elements) if elements else 0.0
+    size = step_of(given, plant, step, code, kind, losses, happening, waves)
+    work, every, count = work_of(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
+    numbers_each = 19 + given.robot.cable_count * (2 + (3 * elements + 3 if elements else 0))
+    check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
+    rules = (code, kind, int(winding == "remembered"), work, round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
+    numbers = (size, losses.loss_time, losses.air_damping, 1.0)
+    said = {"integrator": get_args(Integrator)[code], "winches": winches, "winding": winding, "damping": losses}
+    return Run(
+        plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count, happening, said
+    )
+
+
+def set_points(given: Beginning, plant: Plant, kind: int) -> Course:
+    """What the drives are to follow: lengths; of drums lengths along the path of winding, and tensions.
+
+    Args:
+        given: The beginning.
+        plant: The robot that is simulated.
+        kind: Of the winches.
+
+    Returns:
+        Course of m numbers, or 2 m.
+    """
+    if kind != d.DRUMS:
+        return given.lengths
+    stretch, course = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
+    wound = Course(course.time, course.value * stretch, course.begin * stretch, course.end * stretch)
+    return wound.beside(given.tensions)
+
+
+def plant_at(
+    given: Beginning, winches: Winches, blown: bool, elements: int = 0, losses: Damping | None = None
+) -> Plant:
+    """A robot at its beginning, its winches at the speeds that are asked for there.
+
+    Args:
+        given: The beginning.
+        winches: Which kind.
+        blown: Whether wind acts on the cables.
+        elements: Of each cable where it has mass; 0 where it has none.
+        losses: Of the cables, where they have mass.
+
+    Returns:
+        Plant.
+    """
+    length = given.state.unstrained_length
+    data = drive_data(given.robot, winches, length, blown)
+    if elements:
+        plant: Plant = ChainPlant(given, data, elements, losses or Damping())
+    else:
+        plant = Plant(given.robot, given.model, given.state.pose, given.twist, length, data)
+    plant.audit[d.BEGIN] = given.begin
+    plant.now[d.RATE] = given.rate
+    plant.now[d.SPEED] = given.rate * (1.0 + data[d.WINDING_STRAIN])
+    return plant
+
+
+def checked_damping(damping: Damping | None) -> Damping:
+    """Damping that a motion in time knows; none for None.
+
+    Args:
+        damping: What a caller gave.
+
+    Raises:
+        InvalidValueError: If it is none, or damps modes.
+    """
+    found = optional(damping, Damping, "damping") or Damping()
+    if found.modal_damping > 0.0:
+        step = "Give loss_time or air_damping, which act on cables; a ratio belongs to a mode."
+        raise InvalidValueError("damping: modal_damping", f"{found.modal_damping:g}", "0 in time", step)
+    return found
+
+
+def code_of(integrator: Any, kind: int, elements: int = 0) -> int:
+    """The kernel's code of an integrator.
+
+    Args:
+        integrator: What a caller gave; None to choose by the kind of winches.
+        kind: Of the winches.
+        elements: Of each cable where it has mass; 0 where it has none.
+
+    Raises:
+        InvalidValueError: If there is no such integrator, or it is not for these winches.
+    """
+    if integrator is not None:
+        choice(integrator, "integrator", get_args(Integrator))
+    if kind == d.DRUMS and integrator == "runge-kutta":
+        step = "Leave integrator out: friction that sticks is nothing for a smooth method."
+        raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for winches="robot"', step)
+    if elements and integrator == "runge-kutta":
+        step = "Leave integrator out: long runs of stiff chains need one that keeps their energy."
+        raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for cables with mass', step)
+    return k.SPLITTING if kind == d.DRUMS or elements or integrator == "splitting" else k.RUNGE_KUTTA
+
+
+def step_of(
+    given: Beginning,
+    plant: Plant,
+    step: Any,
+    code: int,
+    kind: int,
+    losses: Damping,
+    events: Any,
+    waves: float = 0.0,
+) -> float:
+    """The step, by the lightest platform that there will be.
+
+    Args:
+        given: The beginning.
+        plant: The robot that is simulated.
+        step: What a caller gave [s], or None.
+        code: Of the integrator.
+        kind: Of the winches.
+        losses: What damps.
+        events: What will happen.
+        waves: Highest angular frequency of cables with mass [rad/s]; 0 without.
+    """
+    robot, lengths = given.robot, given.lengths.value
+    platform = highest_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
+    highest = with_drives(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
+    return checked_step(step, code, highest, losses, kind == d.DRUMS, waves)
+
+
+def _lightness(mass: float, events: tuple[Event, ...]) -> float:
+    """How much faster the platform may swing after loads are dropped."""
+    least = now = mass
+    for event in events:
+        now += event.mass if isinstance(event, PickUp) else -event.mass if isinstance(event, Drop) else 0.0
+        least = min(least, now)
+    return float(np.sqrt(mass / least))
+
+
+def work_of(losses: Damping, wrench: Course, blown: bool) -> int:
+    """The kernel's bits of what damps or loads.
+
+    Args:
+        losses: What damps.
+        wrench: In time.
+        blown: Whether there is wind.
+    """
+    damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
+    loaded = blown or bool(wrench.value.any())
+    return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * blown
+
+
+def _every(record: Any, step: float) -> int:
+    """After how many steps one is recorded."""
+    given = RECORD if record is None else number(record, "record", "s", above=0.0)
+    if record is not None and given < 0.999 * step:
+        raise InvalidValueError("record", f"{given:g} s", f">= {step:g} s, the step", "Give a longer one, or a step.")
+    return max(1, round(min(given / step, MOST_STEPS)))
+
+
+def _count(given: Beginning, step: float) -> int:
+    """How many steps there are."""
+    count = np.ceil((given.end - given.begin) / step - 1e-9)
+    if not count <= MOST_STEPS:
+        longest, advice = f"<= {MOST_STEPS * step:g} s, {MOST_STEPS:.0e} steps", "Simulate a shorter time."
+        raise InvalidValueError("duration", f"{given.end - given.begin:g} s", longest, advice)
+    return int(count)

@@ -1,0 +1,352 @@
+"""Simulator for a controller, period by period, without allocation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final, NamedTuple, NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.core.arguments import brief, instance, integer, whole_number
+from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.dynamics.simulation.initial_conditions import Beginning, Course, beginning, check_lengths
+from sagline.dynamics.simulation.plant import Plant, Records, grown
+from sagline.dynamics.simulation.simulate import (
+    Integrator,
+    checked_damping,
+    code_of,
+    plant_at,
+    step_of,
+    work_of,
+)
+from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding, check_winding, kind_of
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.kernels.cable.rows import LENGTH
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import motion
+from sagline.kernels.dynamics import progress as k
+from sagline.kernels.dynamics import rigid_body as body
+from sagline.kernels.dynamics.massless import LOADED
+from sagline.kernels.dynamics.period import begin_period
+from sagline.kernels.jit import machine_code
+from sagline.kinematics.caller import take
+from sagline.kinematics.inverse import inverse
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.robot.wheels import dead_cable
+
+NEAR: Final = 1e-6  # of a step: so far may a period be from whole steps
+MOST_STEPS: Final = 10**7  # in one period
+MOST_SEED: Final = 2**128
+
+
+class Reading(NamedTuple):
+    """What sensors read, and what is true; the arrays are read-only, and the simulator's next step fills them anew.
+
+    Attributes:
+        counts: Of the encoders, whole numbers as floats, shape (m,); None where data are missing that counts need.
+        load_cell: [N], shape (m,).
+        position: Of the platform's origin [m], shape (3,).
+        quaternion: Rotation platform -> world, scalar last, shape (4,).
+        twist: Velocity of that origin and angular velocity, world axes [m/s, rad/s], shape (6,).
+        tension: At the frame ends [N], shape (m,).
+        length: Unstrained lengths off the drums [m], shape (m,).
+        force: Of the motors, at the cable, outward [N], shape (m,); 0 without the robot's winches.
+        saturated: Which drives are at a limit of torque or speed, not 0 where they are, shape (m,).
+    """
+
+    counts: Array | None
+    load_cell: Array
+    position: Array
+    quaternion: Array
+    twist: Array
+    tension: Array
+    length: Array
+    force: Array
+    saturated: Array
+
+
+class Simulator:
+    """The machine behind a controller: winches, cables without mass, platform and sensors.
+
+    It goes where `simulate` goes, to the last bit where it is given the same periods, to rounding where a table says
+    the same at other times. It is not to be shared between threads.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        start: Pose | Equilibrium,
+        *,
+        winches: Winches = "robot",
+        winding: Winding = "constant",
+        integrator: Integrator | None = None,
+        step: float | None = None,
+        damping: Damping | None = None,
+        load_cell_filter: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """Place a robot at rest.
+
+        Args:
+            robot: The machine that there is, which may be another than the one that is planned for.
+            start: A pose, at which the robot rests with the tensions of `inverse`; or a single equilibrium: where the
+                platform is, with the lengths that are off the drums there and the wrench that acts.
+            winches: As of `simulate`.
+            winding: As of `simulate`.
+            integrator: As of `simulate`.
+            step: As of `simulate`.
+            damping: As of `simulate`.
+            load_cell_filter: Time constant of the load cells' first-order filter [s], >= 0.
+            seed: Of their noise.
+
+        Raises:
+            InvalidValueError: If the robot lacks data that its winches need, the step is above the limit of stability,
+                or an argument is of the wrong kind.
+
+        Examples:
+            >>> import sagline as sl
+            >>> robot = sl.load_robot("cogiro")
+            >>> state = sl.inverse(robot, sl.Pose.from_euler([0, 0, 2], 0, 0, 0)).state
+            >>> machine = sl.Simulator(robot, state, winches="ideal")
+            >>> for _ in range(100):
+            ...     reading = machine.step(state.unstrained_length - 0.01 * machine.time, 0.01)
+            >>> print(f"{machine.time:.1f} s, {reading.position[2]:.3f} m")
+            1.0 s, 2.034 m
+        """
+        given: Beginning = beginning(_at_rest(instance(robot, Robot, "robot"), start), None, None, 1.0)
+        kind, losses = kind_of(winches), checked_damping(damping)
+        code = code_of(integrator, kind)
+        check_winding(winding, kind)
+        self._plant: Plant = plant_at(given, winches, False)
+        if winding == "remembered" and kind == d.DRUMS:
+            self._plant.remember_winding(2.0 * float(given.lengths.value.max()))
+        self._step = step_of(given, self._plant, step, code, kind, losses, ())
+        self._kind, plant, m = kind, self._plant, given.robot.cable_count
+        self._set_up_course(given, m)
+        lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
+        stride = round(d.LOOP_PERIOD / self._step) if kind == d.DRUMS else 1
+        rules = (code, kind, int(winding == "remembered"), work_of(losses, given.wrench, False) | LOADED, stride)
+        numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
+        courses = (self._course, self._load, Course.still(np.zeros(3)))
+        self._records = Records(0, m).arrays
+        self._arguments = plant.arguments(rules, numbers, courses)
+        self._run: Any = machine_code(motion.run, (*self._arguments, self._records, 0, 0))
+        self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
+        stretch = 1.0 + plant.data[d.WINDING_STRAIN]
+        places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
+        self._encoders = Encoders(given.robot, *places) if Encoders.are_on(given.robot) else None
+        frame = (locked(given.robot.center_of_mass @ plant.axes), plant.turn_back)
+        self._platform = np.empty(body.STATE_COLUMNS)
+        self._seen: tuple[Any, ...] = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
+        self._look: Any = machine_code(body.platform_of, self._seen)
+        self._reading = self._new_reading()
+        self._run(*self._arguments, self._records, 0, 0)
+        self._read()
+
+    def _set_up_course(self, given: Beginning, m: int) -> None:
+        """The lengths between the last set points and the next; of drums with the tensions that are expected."""
+        drums = self._kind == d.DRUMS
+        stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
+        lengths = np.repeat(given.lengths.value, 2, axis=0)
+        wide = 2 * m if drums else m
+        self._course = Course(np.array([-1.0, 0.0]), np.zeros((2, wide)), np.zeros((1, wide)), np.zeros((1, wide)))
+        self._course.value[:, :m], self._lengths = lengths * stretch, lengths[1]
+        if drums:
+            self._course.value[:, m:] = given.tensions.value
+        self._load = Course(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
+        course, counters = self._course, self._plant.counters
+        # what is asked for goes here first, and to the run when all of it can be
+        self._given = np.zeros(m), np.zeros(wide - m), np.zeros(6)
+        self._asked, self._expected, self._wrench = (array.data for array in self._given)
+        writable = (course.time, course.value, course.begin, course.end)
+        read_only = tuple(locked(array.view()) for array in self._given)
+        least = locked(dead_cable(given.robot) + np.zeros(m))
+        self._next: tuple[Any, ...] = (
+            read_only, least, locked(stretch), lengths, writable, self._load.value[0], counters
+        )  # fmt: skip
+        self._begin: Any = machine_code(begin_period, (*self._next, False, False, 1.0))
+        self._counters = counters.data
+
+    @property
+    def time(self) -> float:
+        """Since the start [s]."""
+        return self._counters[k.STEPS] * self._step
+
+    @property
+    def reading(self) -> Reading:
+        """What was read last."""
+        return self._reading
+
+    def step(
+        self,
+        unstrained_length: ArrayLike,
+        dt: float,
+        *,
+        tension: ArrayLike | None = None,
+        wrench: ArrayLike | None = None,
+    ) -> Reading:
+        """Go on for a period, in which the set points go straight to those that are given.
+
+        Args:
+            unstrained_length: Set points at the end of the period [m], shape (m,).
+            dt: The period [s], > 0, of whole steps.
+            tension: Expected at the drums at its end [N], shape (m,), which the motors hold; None: as before. Of
+                winches="robot" alone.
+            wrench: On the platform, throughout the period [N, N m], shape (6,); None: as before.
+
+        Returns:
+            What is read at the end of the period; its arrays are filled anew by the next step.
+
+        Raises:
+            InvalidValueError: If the period is not of whole steps, a length is not longer than its dead cable, or an
+                argument is no such array: then nothing has changed. Or if energy grows by itself.
+        """
+        count = self._count(dt)
+        take(self._asked, unstrained_length, "unstrained_length", "m")
+        if tension is not None:
+            self._take_tension(tension)
+        if wrench is not None:
+            take(self._wrench, wrench, "wrench", "N or N m")
+        end = (self._counters[k.STEPS] + count) * self._step
+        if not self._begin(*self._next, tension is not None, wrench is not None, end):
+            self._refuse(tension is not None)
+        self._run(*self._arguments, self._records, count, 0)
+        if self._counters[k.FAILED]:
+            raise grown(self._step, self.time, self._counters[k.FAILED] - 1)
+        self._read()
+        return self._reading
+
+    def _take_tension(self, tension: ArrayLike) -> None:
+        if self._kind != d.DRUMS:
+            step = "Leave it out: these winches have no motors."
+            raise InvalidValueError("tension", "given", 'None but for winches="robot"', step)
+        take(self._expected, tension, "tension", "N")
+
+    def _refuse(self, with_tension: bool) -> NoReturn:
+        """Say what of what was asked for cannot be."""
+        lengths, tension, wrench = self._given
+        checked(lengths, "unstrained_length", "m", above=0.0)
+        check_lengths(self._plant.robot, Course.still(lengths))
+        if with_tension:
+            checked(tension, "tension", "N")
+        checked(wrench, "wrench", "N or N m")
+        raise AssertionError("a period that could not begin")
+
+    def _count(self, dt: float) -> int:
+        """How many steps a period has."""
+        period = dt if type(dt) is float and 0.0 < dt < MOST_STEPS else number(dt, "dt", "s", above=0.0)
+        parts = period / self._step
+        count = round(min(parts, 2.0 * MOST_STEPS))
+        if 1 <= count <= MOST_STEPS and abs(parts - count) <= NEAR:
+            return count
+        allowed = f"a whole multiple of {self._step:g} s, the step, up to {MOST_STEPS:.0e}"
+        raise InvalidValueError("dt", f"{period:g} s", allowed, "Choose another, or give Simulator a step.")
+
+    def hold(self, *winches: int) -> None:
+        """Lock drums at once, as brakes do; they stay so until `release`.
+
+        Args:
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch.
+        """
+        self._plant.hold(self._chosen(winches))
+
+    def release(self, *winches: int) -> None:
+        """Let drums go that were locked: from where they stood they go straight to the next set points.
+
+        A motor is switched on with an empty integral: it holds the tension that is expected, no more.
+
+        Args:
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch.
+        """
+        plant, chosen = self._plant, np.zeros(len(self._asked), dtype=np.bool_)
+        chosen[self._chosen(winches)] = True
+        freed = chosen & (plant.now[d.HELD] > 0.0)
+        plant.now[d.HELD, freed] = plant.now[d.INTEGRAL, freed] = 0.0
+        if self._kind != d.SECOND_ORDER:  # whose set points were not at where they stood before either
+            stood = plant.now[d.WOUND] if self._kind == d.DRUMS else plant.rows[LENGTH]
+            self._lengths[freed] = plant.rows[LENGTH, freed]
+            self._course.value[1, : len(freed)][freed] = stood[freed]
+
+    def shift(self, length: float, *winches: int) -> None:
+        """Let set points jump, as they do for a drive whose encoder loses counts; it comes after as its gains say.
+
+        Args:
+            length: By how much the way to the next set points begins elsewhere [m].
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch, or the length is no number.
+        """
+        chosen, by = self._chosen(winches), number(length, "length", "m")
+        drums = self._kind == d.DRUMS
+        self._lengths[chosen] += by
+        own = self._course.value[1, : len(self._asked)]
+        own[chosen] += by * (1.0 + self._plant.data[d.WINDING_STRAIN, chosen] if drums else 1.0)
+
+    def cut(self, *cables: int) -> None:
+        """Let cables break: they pull and weigh no longer; their drums go on as they are asked to.
+
+        Args:
+            cables: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such cable.
+        """
+        self._plant.cut(self._chosen(cables, "cables"))
+
+    def limit_force(self, force: float, *winches: int) -> None:
+        """Let drives give no more than so much, a motor that is too hot for instance.
+
+        Args:
+            force: At the cable [N], >= 0.
+            winches: Which, from 0; none for all.
+
+        Raises:
+            InvalidValueError: If there is no such winch, the force is no such number, or the winches have no motors.
+        """
+        if self._kind != d.DRUMS:
+            step = "Leave it out: these winches have no motors."
+            raise InvalidValueError("force", "given", 'for winches="robot" alone', step)
+        self._plant.data[d.FORCE_LIMIT, self._chosen(winches)] = number(force, "force", "N", low=0.0)
+
+    def _chosen(self, winches: tuple[Any, ...], item: str = "winches") -> Any:
+        m = len(self._asked)
+        for winch in winches:
+            if (found := integer(winch)) is None or not 0 <= found < m:
+                raise InvalidValueError(item, brief(winch), f"0 to {m - 1}", "They count from 0.")
+        return [integer(winch) for winch in winches] if winches else slice(None)
+
+    def _new_reading(self) -> Reading:
+        plant = self._plant
+        counts = None if self._encoders is None else locked(self._encoders.counts.view())
+        own = (self._platform[:3], self._platform[3:7], self._platform[7:])
+        true = (*own, plant.now[d.AT_FRAME], plant.rows[LENGTH], plant.now[d.FORCE], plant.now[d.SATURATED])
+        return Reading(counts, *(locked(array.view()) for array in (self._cells.reading, *true)))
+
+    def _read(self) -> None:
+        """Fill the reading."""
+        self._look(*self._seen)
+        self._cells.read()
+        if self._encoders is not None:
+            self._encoders.read()
+
+
+def _at_rest(robot: Robot, start: Any) -> Equilibrium:
+    """Where a robot is at the start."""
+    if isinstance(start, Pose):
+        return inverse(robot, start).state
+    state = instance(start, Equilibrium, "start")
+    if state.cables.shape[-1:] != (robot.cable_count,):
+        allowed = f"{robot.cable_count}, as {robot.name} has"
+        raise InvalidValueError("start", f"of {state.cables.shape[-1]} cables", allowed, "Give one of this robot.")
+    return replace(state, robot=robot)

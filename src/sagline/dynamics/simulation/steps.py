@@ -1,0 +1,112 @@
+"""Time step of a simulation, by the highest frequency of the robot with taut cables and of its winches."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.massless import RUNGE_KUTTA, SPLITTING
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # of step times highest angular frequency
+SHARE: Final = 0.2  # radians of that frequency in a step, unless told otherwise
+WAVE_SHARE: Final = 0.465  # of the limit of cables with mass, 0.4 l sqrt(rho/EA): what breaks shakes the shortest waves
+LONGEST: Final = 1e-3  # s
+
+
+def highest_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
+    """Highest angular frequency of the platform on cables that are all taut [rad/s]: sag only makes them softer.
+
+    Args:
+        robot: The robot.
+        poses: A batch along a way, to whose poses the lengths belong; or one, which the robot may leave: cables then
+            have their directions there, each the least of its lengths.
+        lengths: Set points of the unstrained lengths [m], (K, m).
+
+    Returns:
+        The highest at any of the poses, at tensions that stretch no cable by more than a hundredth.
+    """
+    rotation, freedom = poses.matrix, robot.freedom
+    levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
+    ends = (poses.position + rotation @ robot.center_of_mass)[:, None] + levers
+    chords = ends - robot.frame_anchors
+    distance = np.linalg.norm(chords, axis=-1, keepdims=True)
+    along = chords / np.maximum(distance, 1e-300)
+    rows = np.concatenate((along, np.cross(levers, along)), axis=-1) @ freedom.T
+    taut = np.maximum(distance[..., 0], 1e-300)
+    springs = robot.cables.axial_stiffness / (np.minimum(lengths.min(axis=0), taut) if len(poses) == 1 else taut)
+    stiffness = np.swapaxes(rows, 1, 2) @ (springs[..., None] * rows)
+    mass = np.zeros((len(poses), 6, 6))
+    mass[:, :3, :3] = robot.mass * np.eye(3)
+    mass[:, 3:, 3:] = rotation @ robot.inertia @ np.swapaxes(rotation, 1, 2)
+    squares = np.linalg.eigvals(np.linalg.solve(freedom @ mass @ freedom.T, stiffness)).real
+    return float(np.sqrt(max(squares.max(), 0.0)))
+
+
+def checked_step(
+    step: float | None, integrator: int, highest: float, damping: Damping, stride: bool, waves: float = 0.0
+) -> float:
+    """The step of a run.
+
+    Args:
+        step: What a caller gave [s]; None to let it follow from the highest frequency.
+        integrator: SPLITTING or RUNGE_KUTTA.
+        highest: Highest angular frequency [rad/s].
+        damping: Of the cables.
+        stride: Whether loops are closed every millisecond, of which a step must then be a whole part.
+        waves: Highest angular frequency of cables with mass [rad/s]; 0 without.
+
+    Returns:
+        The step [s]: unless given, a whole part of a millisecond.
+
+    Raises:
+        InvalidValueError: If it is above the limit of stability, or no whole part where it must be.
+    """
+    limit = _limit(integrator, max(highest, waves), damping)
+    if step is None:
+        usual = min(SHARE / LIMIT[integrator] * _limit(integrator, highest, damping), LONGEST)
+        usual = min(usual, WAVE_SHARE * limit) if waves > 0.0 else usual
+        return LONGEST / math.ceil(LONGEST / usual - 1e-9)
+    given = number(step, "step", "s", above=0.0)
+    if given > limit:
+        what = "cables with mass" if waves > highest else "massless cables taut"
+        at = f"{max(highest, waves) / (2.0 * math.pi):.3g} Hz, {what}"
+        allowed = f"<= {limit:.3g} s, the limit of stability at {at}"
+        raise InvalidValueError("step", f"{given:g} s", allowed, "Leave it out, or give a tenth of that.")
+    parts = LONGEST / given
+    if stride and (parts < 0.5 or abs(parts - round(parts)) > 1e-9 * parts):
+        step_to = "Give 1e-3, 5e-4 or the like; drives close their loops every millisecond."
+        raise InvalidValueError("step", f"{given:g} s", "a whole part of 0.001 s", step_to)
+    return LONGEST / round(parts) if stride else given
+
+
+def _limit(integrator: int, highest: float, damping: Damping) -> float:
+    """Longest step that is stable at an angular frequency [s]."""
+    ratio = 0.5 * damping.loss_time * highest  # of that frequency's damping
+    slower = math.sqrt(1.0 + ratio * ratio) - ratio
+    return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
+
+
+def with_drives(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
+    """Highest angular frequency of a platform and its winches together [rad/s].
+
+    Args:
+        platform: That of the platform where the winches stand [rad/s].
+        kind: IDEAL, SECOND_ORDER or DRUMS.
+        data: What the drives are, (DATA_ROWS, m).
+        lengths: Set points of the unstrained lengths [m], (K, m).
+        stiffness: EA [N], (m,).
+    """
+    if kind == d.SECOND_ORDER:
+        return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
+    if kind == d.DRUMS:  # the springs' largest eigenvalue on both masses is at most the sum of those on each
+        drums = stiffness / (lengths.min(axis=0) * data[d.INERTIA])
+        return math.hypot(platform, math.sqrt(float(drums.max())))
+    return platform

@@ -1,0 +1,203 @@
+"""Winches, encoders and load cells of a simulated robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final, Literal, TypeAlias, get_args
+
+import numpy as np
+
+from sagline.core.arguments import brief, choice
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.period import read_cells, read_encoders
+from sagline.kernels.jit import machine_code
+from sagline.robot.drum import drum_lever, drums_of, not_given
+from sagline.robot.robot import Robot
+
+AIR: Final = 1.2  # kg/m^3
+ROUND: Final = 1.2  # drag of a long round cable across the wind, by its diameter
+NEEDED: Final = ("drum_radius", "inertia", "position_gain", "speed_gain", "integral_gain")
+
+
+@dataclass(frozen=True, slots=True)
+class SecondOrder:
+    """Winches whose lengths follow their set points as a damped mass on a spring does.
+
+    On a set point that moves at a steady rate they lag by 2 damping_ratio / (2 pi bandwidth) times that rate.
+
+    Attributes:
+        bandwidth: Natural frequency [Hz], > 0.
+        damping_ratio: Of that oscillation, > 0.
+
+    Raises:
+        InvalidValueError: If a value is not positive.
+    """
+
+    bandwidth: float
+    damping_ratio: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        object.__setattr__(self, "bandwidth", number(self.bandwidth, "bandwidth", "Hz", above=0.0))
+        object.__setattr__(self, "damping_ratio", number(self.damping_ratio, "damping_ratio", "", above=0.0))
+
+
+Winches: TypeAlias = Literal["ideal", "robot"] | SecondOrder
+Winding: TypeAlias = Literal["constant", "remembered"]
+
+
+def kind_of(winches: Any) -> int:
+    """The kernel's code of a kind of winches.
+
+    Raises:
+        InvalidValueError: If there is no such kind.
+    """
+    if isinstance(winches, SecondOrder):
+        return d.SECOND_ORDER
+    if isinstance(winches, str) and winches in ("ideal", "robot"):
+        return d.IDEAL if winches == "ideal" else d.DRUMS
+    allowed = '"ideal", "robot" or SecondOrder(bandwidth, damping_ratio)'
+    raise InvalidValueError("winches", brief(winches), allowed, "Choose one of them as winches.")
+
+
+def check_winding(winding: Any, kind: int) -> None:
+    """Refuse what lies on drums where there are none.
+
+    Args:
+        winding: What a caller gave.
+        kind: Of the winches, from `kind_of`.
+
+    Raises:
+        InvalidValueError: If there is no such winding, or it is remembered by winches that have no drums.
+    """
+    if choice(winding, "winding", get_args(Winding)) == "remembered" and kind != d.DRUMS:
+        step = 'Give winches="robot" too, or leave winding out.'
+        raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
+
+
+def drive_data(robot: Robot, winches: Winches, length: Array, blown: bool) -> Array:
+    """The drives as kernels take them, (DATA_ROWS, m).
+
+    Args:
+        robot: The robot.
+        winches: Which kind.
+        length: Unstrained lengths at the start [m], (m,), at which drums are looked at.
+        blown: Whether wind acts on the cables.
+
+    Returns:
+        Array, zero where a row has no meaning.
+
+    Raises:
+        InvalidValueError: If data are missing; the message names them.
+    """
+    data = np.zeros((d.DATA_ROWS, robot.cable_count))
+    if isinstance(winches, SecondOrder):
+        data[d.BANDWIDTH] = 2.0 * np.pi * winches.bandwidth
+        data[d.RATIO] = winches.damping_ratio
+    if robot.winches is not None:
+        data[d.WINDING_STRAIN] = robot.winches.winding_tension / robot.cables.axial_stiffness
+        data[d.BEHIND_RISE] = robot.winches.dead_rise
+    if blown:
+        if robot.cables.diameter is None:
+            step = "Give it in the robot file or with Cable(..., diameter=...), or leave wind out."
+            raise InvalidValueError("cables: diameter", "not given", "known where there is wind", step)
+        data[d.DRAG] = 0.5 * AIR * ROUND * robot.cables.diameter
+    if kind_of(winches) == d.DRUMS:
+        _fill_drums(data, robot, length)
+    return data
+
+
+def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
+    """Inertia, limits and gains at the cable, on the layer where each drum is at the start."""
+    winch = robot.winches
+    missing = [f"winches: {name}" for name in NEEDED if winch is None or getattr(winch, name) is None]
+    if winch is None or missing:
+        step = "Give them in the robot file, or with robot.replace(winches=Winch(...))."
+        raise InvalidValueError(*not_given(missing), 'known for winches="robot"', step)
+    ratio = np.abs(winch.gear) / drum_lever(robot, length)  # turns of the motor, in rad, for a meter of cable
+    data[d.INERTIA] = winch.inertia * ratio**2  # type: ignore[operator]
+    data[d.FORCE_LIMIT] = np.inf if winch.torque_limit is None else winch.torque_limit * ratio
+    data[d.SPEED_LIMIT] = np.inf if winch.speed_limit is None else winch.speed_limit / ratio
+    data[d.FRICTION] = winch.friction
+    data[d.POSITION_GAIN] = winch.position_gain
+    data[d.SPEED_GAIN] = winch.speed_gain
+    data[d.INTEGRAL_GAIN] = winch.integral_gain
+    most = 2.0 * data[d.INERTIA] / d.LOOP_PERIOD  # a larger correction in a period turns the error over, and more
+    if (wild := data[d.SPEED_GAIN] >= most).any():
+        i = int(np.argmax(wild))
+        allowed = f"< {most[i]:.4g} N s/m for {data[d.INERTIA, i]:.4g} kg at the cable, closed every millisecond"
+        step = "Give a smaller gain, or more inertia."
+        raise InvalidValueError(f"winches: speed_gain[{i}]", f"{data[d.SPEED_GAIN, i]:g} N s/m", allowed, step)
+
+
+COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # what an encoder's counts need
+
+
+class Encoders:
+    """Encoders on drums.
+
+    Attributes:
+        counts: Whole counts, as floats, (m,).
+    """
+
+    def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
+        """Look at the drums of a robot that has all that counts need.
+
+        Args:
+            robot: The robot.
+            wound: Where its lengths off the drums will be [m], (m,).
+            stretch: From these to those along the path of winding, (m,).
+        """
+        drums, m = drums_of(robot), robot.cable_count
+        zero, rate = drums.zero_and_rate()
+        self.counts = np.empty(m)
+        offset = drums.winches.count_zero + zero * rate
+        given = ((drums.table, drums.starts), wound, locked(stretch), locked(offset), locked(rate * 1.0))
+        self._arguments: tuple[Any, ...] = (*given, np.empty((3, 1, m)), self.counts)
+        self._read: Any = machine_code(read_encoders, self._arguments)
+
+    @staticmethod
+    def are_on(robot: Robot) -> bool:
+        """Whether a robot's winches and cables have all that counts need."""
+        winch = robot.winches
+        known = winch is not None and all(getattr(winch, name) is not None for name in COUNTED)
+        return known and robot.cables.diameter is not None
+
+    def read(self) -> None:
+        """Fill the counts."""
+        self._read(*self._arguments)
+
+
+class LoadCells:
+    """Load cells at the frame ends of the cables.
+
+    Attributes:
+        reading: [N], (m,).
+        generator: Of the noise.
+    """
+
+    def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
+        """Make the load cells of a robot; without winches they read what is there.
+
+        Args:
+            robot: The robot.
+            seed: Of the noise.
+            tension: Where the tensions behind the filter will be [N], (m,).
+        """
+        m, winch = robot.cable_count, robot.winches
+        cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])
+        if winch is not None:
+            cells[:3] = winch.load_cell_gain, winch.load_cell_bias, winch.load_cell_deviation
+            if winch.load_cell_range is not None:
+                cells[3] = winch.load_cell_range
+        self.generator, self.reading = np.random.default_rng(seed), np.empty(m)
+        self._noise = np.empty(m)
+        self._arguments: tuple[Any, ...] = (tension, locked(cells), self._noise, self.reading)
+        self._read: Any = machine_code(read_cells, self._arguments)
+
+    def read(self) -> None:
+        """Fill the readings."""
+        self.generator.standard_normal(out=self._noise)
+        self._read(*self._arguments)

@@ -1,0 +1,1 @@
+"""Shaped and time-optimal motion along paths."""

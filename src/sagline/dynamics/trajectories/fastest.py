@@ -1,0 +1,253 @@
+"""The fastest motion along a path's curve that keeps the tension limits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from sagline.core.arguments import callback, instance
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.progress import Progress
+from sagline.dynamics.trajectories.force_balance import Balances, HalfPlanes, Profile, fastest_profile
+from sagline.dynamics.trajectories.jerk_bounded import Bounds, JerkProfile, fastest_course
+from sagline.dynamics.trajectories.segments import Curve, Move, moves_of
+from sagline.dynamics.trajectories.shapers import sample_time
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.motion.path import Path
+from sagline.motion.rest_to_rest import time_grid
+from sagline.robot.drum import drum_lever
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.balance import inertial_wrench, structure_matrix
+
+_PLACES: Final = 201  # along a move, at which limits are looked at
+_ROUNDS: Final = 8  # of the cables' sag
+_SETTLED: Final = 1e-7  # of the time, that a round changes
+_INSTANTS: Final = 4001  # of a move, at which its limits are checked in the end
+_SLOWER: Final = 1e-6  # of the time, that is given first where a limit is missed; four times as much each time
+_TRIES: Final = 12
+_GENTLE: Final = 8  # of these, in which no more is given than winches may need
+_ROUNDING: Final = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class _Timed:
+    """A move with its new motion: parameter of the curve over time, a little slower than it was found."""
+
+    curve: Curve
+    motion: Profile | JerkProfile
+    slower: float = 1.0
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return self.motion.duration * self.slower
+
+    def at(self, time: Array) -> tuple[Pose, Array]:
+        """Poses, and twist, its rate and its jerk (3, N, 6)."""
+        values = self.motion.at(np.clip(time / self.slower, 0.0, self.motion.duration))
+        jet = self.curve.at(np.clip(values[0], 0.0, 1.0))
+        return jet.pose, jet.twists(values / self.slower ** np.arange(4)[:, None])
+
+
+def fastest(
+    robot: Robot,
+    path: Path,
+    margin: float = 5.0,
+    jerk: float | None = None,
+    *,
+    angular_jerk: float | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """The path's curve in the shortest time that the tension limits allow, each move from rest to rest.
+
+    The limits hold exactly, on sagging cables: at each sample, and 4,000 instants of each move, `inverse` finds
+    tensions that are the margin off them. Without a bound on the jerk the acceleration jumps, as no winch does. With
+    one, the motion is of 100 pieces of constant jerk (of the curve's parameter) a move, whose best is found to some
+    0.1 % of the time.
+
+    Speed limits of the robot's winches hold for the platform's motion; where the jerk is bounded also for what cables
+    stretch, with the load shared by `Closest`.
+
+    Args:
+        robot: The robot. Its tension_min and tension_max are kept, of chords or at the frame ends as it says.
+        path: Its curve is followed, whatever its times; where it rests the new one rests too.
+        margin: How far off both limits [N], >= 0.
+        jerk: Largest jerk of the platform's origin [m/s^3], > 0; None for no bound.
+        angular_jerk: Largest second rate of the angular velocity [rad/s^3], > 0; None for no bound.
+        progress: Called after each move: how many are done, of how many.
+
+    Returns:
+        Path at the sample rate of the given one. Its jerk is None where no bound was given.
+
+    Raises:
+        InvalidValueError: If the path is in motion at an end or turns around in the middle of a curve, if the robot
+            cannot hold a pose of it at rest with this margin (the message says where), if an argument is out of its
+            range, or winches with a speed_limit have no drum_radius.
+
+    Source:
+        Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018;
+        docs/howto/without-vibration.md.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-suspended")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (3, 0, 1.5)], durations=2.0)
+        >>> quick = sl.fastest(robot, path, jerk=200.0)
+        >>> plan = sl.inverse(robot, quick)
+        >>> print(f"{quick.duration:.2f} s", plan.feasible.all())
+        0.96 s True
+    """
+    inner = _with_margin(instance(robot, Robot, "robot"), number(margin, "margin", "N", low=0.0))
+    step = sample_time(instance(path, Path, "path"))
+    limits = (
+        np.inf if jerk is None else number(jerk, "jerk", "m/s^3", above=0.0),
+        np.inf if angular_jerk is None else number(angular_jerk, "angular_jerk", "rad/s^3", above=0.0),
+    )
+    callback(progress, "progress")
+    moves = moves_of(path)
+    timed: list[_Timed | None] = []
+    for k, move in enumerate(moves):
+        timed.append(None if move.curve is None else _quickest(inner, move, move.curve, limits))
+        if progress is not None:
+            progress(k + 1, len(moves))
+    bounded = bool(np.isfinite(limits).any())
+    for again in range(_TRIES):
+        new = _assembled(path, step, moves, timed, bounded)
+        plan = inverse(inner, new)
+        slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
+        if bounded and _has_speed_limits(robot):
+            ratio = _exceeding(plan)  # what stretches falls with the cube of the time, the rest in proportion
+            slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
+        if slower == 1.0:
+            return new
+        timed = [None if one is None else replace(one, slower=one.slower * slower) for one in timed]
+    raise _unheld(f"of {len(moves)} moves", plan)
+
+
+def _with_margin(robot: Robot, margin: float) -> Robot:
+    low, high = robot.tension_min + margin, robot.tension_max - margin
+    if (low >= high).any():
+        i = int(np.argmax(low >= high))
+        most = f"< {0.5 * (robot.tension_max[i] - robot.tension_min[i]):g} N, half the range of cable {i}"
+        raise InvalidValueError("margin", f"{margin:g} N", most, "Give a smaller one.")
+    return robot.replace(tension_min=low, tension_max=high)
+
+
+def _quickest(robot: Robot, move: Move, curve: Curve, limits: tuple[float, float]) -> _Timed:
+    """One move, as fast as the robot's limits allow, checked."""
+    place = np.linspace(0.0, 1.0, _PLACES)
+    jet = curve.at(place)
+    rest = inverse(robot, jet.pose)
+    if not rest.feasible.all():
+        raise _unheld(f"from {move.begin:g} s to {move.end:g} s at rest", rest)
+    balances, speeds = Balances.at(robot, jet, rest), _speeds(robot, curve, place, rest)
+    bounds, least = speeds(place), np.inf
+    for _ in range(_ROUNDS):
+        profile = fastest_profile(place, balances.half_planes().joined(bounds))
+        if profile is None:
+            raise _unheld(f"from {move.begin:g} s to {move.end:g} s in motion", rest)
+        before, least = least, profile.duration
+        if abs(least - before) <= _SETTLED * least:
+            break
+        balances = balances.near(profile.motion)
+    motion: Profile | JerkProfile | None = profile
+    if np.isfinite(limits).any():
+        motion = fastest_course(curve, robot, speeds, limits, least)
+        if motion is None:
+            raise _unheld(f"from {move.begin:g} s to {move.end:g} s in motion", rest)
+    assert motion is not None
+    return _checked(robot, _Timed(curve, motion), limits)
+
+
+def _checked(robot: Robot, timed: _Timed, limits: tuple[float, float]) -> _Timed:
+    """A move that keeps its limits between the places too, if need be a little slower."""
+    for again in range(_TRIES):
+        pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
+        plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
+        sizes = (np.linalg.norm(twists[2][:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
+        slower = max(1.0, *(np.cbrt(size / limit) for size, limit in zip(sizes, limits, strict=True)))
+        if plan.feasible.all() and slower <= 1.0 + _ROUNDING:
+            return timed
+        if not plan.feasible.all():  # at rest the limits hold, and what moves needs is the less the slower
+            slower = max(slower, 1.0 + _SLOWER * 4.0**again)
+        timed = replace(timed, slower=timed.slower * slower)
+    raise _unheld("in motion", plan)
+
+
+def _unheld(item: str, plan: Plan) -> InvalidValueError:
+    k = int(np.argmin(plan.feasible))
+    where = ", ".join(f"{x:.4g}" for x in plan.state.pose.position[k])
+    status = PoseStatus(plan.status[k]).name.lower().replace("_", " ")
+    value = f"{status} at ({where}) m" if not plan.feasible[k] else "not found"
+    return InvalidValueError(
+        f"the move {item}",
+        value,
+        "tensions within the limits less the margin",
+        "Give a smaller margin, or other poses.",
+    )
+
+
+def _has_speed_limits(robot: Robot) -> bool:
+    return robot.winches is not None and robot.winches.speed_limit is not None
+
+
+def _speeds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
+    """What the speed limits of winches leave of the squared speed, from how fast the chords change."""
+    if not _has_speed_limits(robot):
+        return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
+    fastest_cable = _fastest_rates(robot, rest.unstrained_length)
+
+    def bounds(parameter: Array) -> HalfPlanes:
+        jet = curve.at(parameter)
+        lever = jet.pose.matrix @ robot.center_of_mass
+        twist = jet.rates[0].copy()
+        twist[:, :3] += np.cross(twist[:, 3:], lever)
+        change = np.einsum("knm,kn->km", structure_matrix(robot, jet.pose), twist @ robot.freedom.T)
+        limit = np.stack([np.interp(parameter, place, column) for column in fastest_cable.T], axis=1)
+        return HalfPlanes(np.stack((np.zeros_like(change), (change / limit) ** 2), axis=-1), np.ones_like(change))
+
+    return bounds
+
+
+def _fastest_rates(robot: Robot, length: Array) -> Array:
+    """The fastest that winches change lengths [m/s], at lengths (N, m)."""
+    winch = robot.winches
+    assert winch is not None
+    assert winch.speed_limit is not None
+    stretch = 1.0 + winch.winding_tension / robot.cables.axial_stiffness
+    rates: Array = np.abs(winch.speed_limit / winch.gear) * drum_lever(robot, length) / stretch
+    return rates
+
+
+def _exceeding(plan: Plan) -> float:
+    """How much too fast the winches are somewhere: 1 where they are not."""
+    assert plan.length_rate is not None
+    limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
+    ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))
+    return ratio * (1.0 + _SLOWER) if ratio > 1.0 else 1.0
+
+
+def _assembled(path: Path, step: float, moves: Sequence[Move], timed: Sequence[_Timed | None], bounded: bool) -> Path:
+    """The moves one after the other, sampled."""
+    durations = [move.duration if one is None else one.duration for move, one in zip(moves, timed, strict=True)]
+    ends = np.cumsum(durations)
+    rests = np.append(0.0, ends)
+    time = time_grid(float(ends[-1]), 1.0 / step)
+    position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
+    which = np.minimum(np.searchsorted(ends, time, side="right"), len(moves) - 1)
+    for k, (move, one) in enumerate(zip(moves, timed, strict=True)):
+        part = which == k
+        pose = path.pose[move.sample]
+        if one is not None:
+            pose, rates[:, part] = one.at(time[part] - rests[k])
+        position[part], quaternion[part] = pose.position, pose.quaternion
+    jerk = locked(rates[2]) if bounded else None
+    start = path.time[0]
+    return Path(time + start, Pose.from_quaternion(position, quaternion), rates[0], rates[1], jerk, rests + start)

@@ -1,0 +1,251 @@
+"""Bounds on acceleration and speed along a curve by the tension limits, and the fastest motion within them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from sagline.core.arrays import Array
+from sagline.dynamics.trajectories.segments import Jet
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.robot.robot import Robot
+from sagline.statics.balance import inertial_wrench, structure_matrix
+
+_NOTHING: Final = 1e-11  # of what a direction gains by the tension that it gains most by
+_BLOCK: Final = 40_000  # matrices taken apart at once
+_WIDER: Final = (1.0, 0.03)  # N: limits that a pose on their border is solved with
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HalfPlanes:
+    """What holds at K places: rates @ (acceleration, square of the speed) <= bound, row by row.
+
+    Attributes:
+        rates: Shape (K, R, 2).
+        bound: Shape (K, R); infinite where a row says nothing.
+    """
+
+    rates: Array
+    bound: Array
+
+    def joined(self, other: HalfPlanes) -> HalfPlanes:
+        """What holds of both."""
+        return HalfPlanes(np.hstack((self.rates, other.rates)), np.hstack((self.bound, other.bound)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Balances:
+    """The platform's balance at K places of a curve, on cables that pull as they do at tensions near by.
+
+    J tau = needed - u w_u - x w_x, u the acceleration and x the square of the speed along the curve's parameter. What
+    the cables pull beside their chords is that of the tensions last found: it is exact there, and hardly changes.
+
+    Attributes:
+        robot: The robot; its limits are those to keep.
+        jet: The places.
+        wrenches: w_u and w_x: inertial wrenches for u = 1 and for x = 1, shape (2, K, 6).
+        normals: Directions of wrenches that may bound what cables can give, shape (K, R, n).
+        gains: What a unit of each tension gives along them, shape (K, R, m), at most 1.
+        standing: The needed wrench where u = x = 0, in free motions, shape (K, n).
+        low: Lower limits of the chord tensions [N], shape (K, m).
+        high: Upper limits [N], shape (K, m).
+    """
+
+    robot: Robot
+    jet: Jet
+    wrenches: Array
+    normals: Array
+    gains: Array
+    standing: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def at(cls, robot: Robot, jet: Jet, plan: Plan) -> Balances:
+        """The balance at places where a plan at rest is known."""
+        nothing = np.zeros(plan.chord_tension.shape)
+        freedoms = robot.degrees_of_freedom
+        one = np.zeros((len(nothing), 1, freedoms))
+        new = cls(robot, jet, np.zeros((2, len(nothing), 6)), one, one, nothing[:, :freedoms], nothing, nothing)
+        return new.moved(jet).pulled(plan, np.zeros((len(jet.pose), 2)))
+
+    def moved(self, jet: Jet) -> Balances:
+        """The same balance, with the same pulls, at places near by."""
+        robot, (first, second, _) = self.robot, jet.rates
+        by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
+        by_speed = inertial_wrench(robot, jet.pose, first, second)
+        matrix = structure_matrix(robot, jet.pose)
+        normals = np.concatenate(list(_normals(matrix)))
+        gains = normals @ matrix
+        size = np.maximum(np.abs(gains).max(axis=-1, keepdims=True), _NOTHING)
+        gains[np.abs(gains) <= _NOTHING * size] = 0.0  # of the columns in the plane; a limit may be infinite
+        wrenches = np.stack((by_rate, by_speed))
+        return replace(self, jet=jet, wrenches=wrenches, normals=normals / size, gains=gains / size)
+
+    def wrench(self, motion: Array) -> Array:
+        """Inertial wrench of accelerations and squared speeds (K, 2), shape (K, 6)."""
+        total: Array = np.einsum("ck,cki->ki", motion.T, self.wrenches)
+        return total
+
+    def pulled(self, plan: Plan, motion: Array) -> Balances:
+        """The same with the pulls of a plan for motions of shape (K, 2); poses without an answer keep theirs."""
+        assert plan.needed is not None
+        found, freedom = plan.feasible[:, None], self.robot.freedom.T
+        # a limit at the frame end is one of the chord tension that differs from it as it does here
+        chords = self.robot.tension_limits_of == "chord"
+        below = 0.0 if chords else plan.state.cables.frame_end_tension - plan.chord_tension
+        return replace(
+            self,
+            standing=np.where(found, (plan.needed + self.wrench(motion)) @ freedom, self.standing),
+            low=np.where(found, self.robot.tension_min - below, self.low),
+            high=np.where(found, self.robot.tension_max - below, self.high),
+        )
+
+    def near(self, motion: Array) -> Balances:
+        """The same with the pulls that cables have in motions of shape (K, 2), on the border perhaps, or a little off.
+
+        On the border itself tensions are all but fixed, but rounding may leave none: they are those within limits a
+        little wider, the narrowest that have an answer.
+        """
+        found, wrench = self, self.wrench(motion)
+        for by in _WIDER:
+            low, high = np.maximum(self.robot.tension_min - by, 0.0), self.robot.tension_max + by
+            wider = self.robot.replace(tension_min=low, tension_max=high)
+            found = found.pulled(inverse(wider, self.jet.pose, wrench=wrench), motion)
+        return found
+
+    def half_planes(self) -> HalfPlanes:
+        """The polygons: along no normal is more needed than the cables give within their limits."""
+        with np.errstate(invalid="ignore"):  # no share of an infinite limit
+            ends = [np.where(self.gains == 0.0, 0.0, self.gains * limit[:, None]) for limit in (self.low, self.high)]
+        most = np.maximum(*ends).sum(axis=-1)
+        along = np.einsum("krn,ckn->krc", self.normals, self.wrenches @ self.robot.freedom.T)
+        return HalfPlanes(-along, most - np.einsum("krn,kn->kr", self.normals, self.standing))
+
+
+def _normals(matrix: Array) -> Iterator[Array]:
+    """Both sides of every plane that n - 1 columns of matrices (K, n, m) span, shape (K, 2 S, n), block by block.
+
+    They hold all facets of the body that the columns make with bounded shares; of columns in a plane of less
+    dimensions any normal is taken, which bounds it too.
+    """
+    n, m = matrix.shape[1:]
+    sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
+    step = max(1, _BLOCK // len(sets))
+    for first in range(0, len(matrix), step):
+        columns = np.swapaxes(matrix[first : first + step], 1, 2)[:, sets]
+        normal = np.linalg.svd(columns, full_matrices=True)[2][..., -1, :]
+        yield np.concatenate((normal, -normal), axis=1)
+
+
+_FLAT = 1e-12  # of the largest: rates that are none
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """Constant acceleration of the parameter from place to place.
+
+    Attributes:
+        place: Parameters, shape (K,).
+        square: Squares of the speed there, shape (K,).
+        time: When they are passed [s], shape (K,).
+    """
+
+    place: Array
+    square: Array
+    time: Array
+
+    @classmethod
+    def of(cls, place: Array, square: Array) -> Profile:
+        """The profile with the times that follow."""
+        speed = np.sqrt(square)
+        return cls(place, square, np.append(0.0, np.cumsum(2.0 * np.diff(place) / (speed[1:] + speed[:-1]))))
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return float(self.time[-1])
+
+    @property
+    def acceleration(self) -> Array:
+        """From each place to the next, shape (K - 1,)."""
+        rate: Array = 0.5 * np.diff(self.square) / np.diff(self.place)
+        return rate
+
+    @property
+    def motion(self) -> Array:
+        """Acceleration that follows and square of the speed at each place, shape (K, 2)."""
+        rate = self.acceleration
+        return np.stack((np.append(rate, rate[-1]), self.square), axis=1)
+
+    def at(self, time: Array) -> Array:
+        """Parameter and its first three derivatives by time, shape (4, N); the last is 0 where it is one."""
+        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.place) - 2)
+        since, rate, speed = time - self.time[k], self.acceleration[k], np.sqrt(self.square[k])
+        place = self.place[k] + since * (speed + 0.5 * since * rate)
+        return np.stack((place, speed + since * rate, rate, np.zeros_like(place)))
+
+
+def fastest_profile(place: Array, planes: HalfPlanes) -> Profile | None:
+    """The profile from rest to rest that is at each place as fast as any that stays within the bounds.
+
+    Backward, from which squares of the speed the end can be reached; forward, the largest acceleration that stays
+    among them. What holds at both ends of a step holds in it, but for the bounds' curvature.
+
+    Args:
+        place: Parameters, ascending, shape (K,).
+        planes: Bounds at each.
+
+    Returns:
+        Profile; None where there is none from rest to rest.
+
+    Source:
+        Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018.
+    """
+    steps, last = np.diff(place), len(place) - 1
+    reach = np.zeros((len(place), 2))
+    for i in range(last - 1, -1, -1):
+        reach[i] = _range(*_rows(planes, i, steps[i], reach[i + 1]))
+        if not reach[i, 0] <= reach[i, 1]:
+            return None
+    if reach[0, 0] > 0.0:
+        return None
+    square = np.zeros(len(place))
+    for i in range(last):
+        rates, bound = _rows(planes, i, steps[i], reach[i + 1])
+        rising = rates[:, 0] > _FLAT * np.abs(rates[:, 0]).max()
+        most = np.min((bound - rates[:, 1] * square[i])[rising] / rates[rising, 0])
+        square[i + 1] = np.clip(square[i] + 2.0 * steps[i] * most, *reach[i + 1])
+    inner = square[1:-1]
+    return Profile.of(place, square) if (inner > 0.0).all() else None
+
+
+def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
+    """Bounds on (acceleration, square of the speed) at place i: there, at the next, and to stay in reach."""
+    sheared = planes.rates[i + 1].copy()
+    sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the square grows by 2 step times the acceleration
+    ahead = np.array([[2.0 * step, 1.0], [-2.0 * step, -1.0], [0.0, -1.0]])
+    rates = np.concatenate((planes.rates[i], sheared, ahead))
+    bound = np.concatenate((planes.bound[i], planes.bound[i + 1], [reach[1], -reach[0], 0.0]))
+    said = np.isfinite(bound)
+    return rates[said], bound[said]
+
+
+def _range(rates: Array, bound: Array) -> tuple[float, float]:
+    """Least and largest second variable that some first one goes with; the least the larger where there is none."""
+    flat = np.abs(rates[:, 0]) <= _FLAT * np.abs(rates[:, 0]).max()
+    up, down = ~flat & (rates[:, 0] > 0.0), ~flat & (rates[:, 0] < 0.0)
+    slope, level = rates[:, 1] / np.where(flat, 1.0, rates[:, 0]), bound / np.where(flat, 1.0, rates[:, 0])
+    # what bounds the first from above, less what bounds it from below, must leave something
+    rate = np.concatenate(((slope[up][:, None] - slope[down]).ravel(), rates[flat, 1]))
+    room = np.concatenate(((level[up][:, None] - level[down]).ravel(), bound[flat]))
+    size = np.abs(rate).max(initial=0.0) * _FLAT
+    above, below = rate > size, rate < -size
+    low = max(0.0, float(np.max(room[below] / rate[below], initial=0.0)))
+    high = float(np.min(room[above] / rate[above], initial=np.inf))
+    return low, high

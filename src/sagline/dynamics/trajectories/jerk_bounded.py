@@ -1,0 +1,194 @@
+"""Time-optimal motion along a curve with bounded jerk, by linear programs in the jerk over normalized time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, TypeAlias
+
+import numpy as np
+
+from sagline.core.arrays import Array
+from sagline.dynamics.trajectories.force_balance import Balances, HalfPlanes
+from sagline.dynamics.trajectories.segments import Curve
+from sagline.kinematics.inverse import inverse
+from sagline.robot.robot import Robot
+
+Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # what else holds at parameters
+
+PIECES: Final = 100  # of constant jerk
+_ROUNDS: Final = 40
+_DONE: Final = 1e-6  # of the time, that a round changes
+_SLOWER: Final = 1.2  # times the least time: where the rounds begin
+_NOTHING: Final = 1e-30
+_SIDES: Final = 32  # directions in which a polygon's border is looked for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JerkProfile:
+    """Constant jerk of the parameter in equal pieces of the time.
+
+    Attributes:
+        jerk: Third derivative of the parameter by the share of the time, shape (P,).
+        duration: The time [s].
+    """
+
+    jerk: Array
+    duration: float
+
+    def at(self, time: Array) -> Array:
+        """Parameter and its first three derivatives by time, shape (4, N)."""
+        state = sums(len(self.jerk)) @ self.jerk  # at the knots
+        scaled = np.clip(time / self.duration, 0.0, 1.0) * len(self.jerk)
+        k = np.minimum(scaled.astype(np.intp), len(self.jerk) - 1)
+        h = (scaled - k) / len(self.jerk)
+        place, speed, rate = state[:, k]
+        jerk = self.jerk[k]
+        values = (
+            place + h * (speed + 0.5 * h * (rate + h / 3.0 * jerk)),
+            speed + h * (rate + 0.5 * h * jerk),
+            rate + h * jerk,
+            jerk,
+        )
+        return np.stack([value / self.duration**order for order, value in enumerate(values)])
+
+
+def sums(pieces: int) -> Array:
+    """Parameter, its rate and its second rate at the knots by the jerk of each piece, shape (3, P + 1, P)."""
+    h = 1.0 / pieces
+    since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h  # since each piece's begin
+    left = np.maximum(since - h, 0.0)  # and its end
+    return np.stack([(since**k - left**k) / f for k, f in ((3, 6.0), (2, 2.0), (1, 1.0))])
+
+
+def fastest_course(
+    curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
+) -> JerkProfile | None:
+    """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk.
+
+    Linear in the jerk and in the square of the time, but for where the platform is at each share of the time, the
+    square of its speed and the time's third power: those are taken anew in rounds, each a linear program.
+
+    Args:
+        curve: Where it leads, for parameters from 0 to 1.
+        robot: The robot; its limits are those to keep.
+        speeds: Bounds on the square of the parameter's speed at parameters.
+        limits: Of the origin's jerk [m/s^3] and the angular jerk [rad/s^3], may be infinite.
+        least: A time in which no course can be faster [s].
+
+    Returns:
+        The profile; None where no round finds any.
+    """
+    from scipy.optimize import linprog  # takes longer to load than all the rest of dynamics
+
+    course = _first(curve, limits, least)
+    state = sums(PIECES)
+    jet = curve.at(np.clip(state[0] @ course.jerk, 0.0, 1.0))
+    balances = Balances.at(robot, jet, inverse(robot, jet.pose))
+    ends = np.hstack((state[:, -1], np.zeros((3, 1))))
+    cost = np.append(np.zeros(PIECES), 1.0)
+    for _ in range(_ROUNDS):
+        place, speed, rate = state @ course.jerk
+        square = course.duration**2
+        jet = curve.at(np.clip(place, 0.0, 1.0))
+        balances = balances.moved(jet).near(np.stack((rate, speed**2), axis=1) / square)
+        planes = reduced(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
+        rows, bounds = zip(
+            _within(planes, state, speed),
+            (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # never back
+            *(
+                _jerk_rows(jet.rates[..., part], state, course, limit)
+                for part, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True)
+                if np.isfinite(limit)
+            ),
+            strict=True,
+        )
+        between = [(None, None)] * PIECES + [(0.5 * square, None)]
+        found = linprog(cost, np.vstack(rows), np.concatenate(bounds), ends, [1.0, 0.0, 0.0], between, method="highs")
+        if found.x is None:
+            return None
+        before, course = course, JerkProfile(found.x[:-1], float(np.sqrt(found.x[-1])))
+        if abs(course.duration - before.duration) <= _DONE * course.duration:
+            break
+    return course
+
+
+def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfile:
+    """The profile of 5th degree, in a time in which it may keep the limits."""
+    middle = (np.arange(PIECES) + 0.5) / PIECES
+    jerk = 60.0 - 360.0 * middle + 360.0 * middle**2
+    state = sums(PIECES)
+    jerk -= state[:, -1].T @ np.linalg.solve(state[:, -1] @ state[:, -1].T, state[:, -1] @ jerk - (1.0, 0.0, 0.0))
+    rates = curve.at(state[0] @ jerk).rates[0]
+    extents = (np.linalg.norm(rates[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
+    times = [np.cbrt(60.0 * extent / limit) for extent, limit in zip(extents, limits, strict=True)]
+    return JerkProfile(jerk, float(max(_SLOWER * least, *times)))
+
+
+def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Array]:
+    """Rows of a linear program in (jerk, square of the time): the half planes at each knot, shape (K r, P + 1)."""
+    by_rate, by_square = (planes.rates[..., k, None] for k in range(2))
+    left = by_rate * state[2][:, None] + by_square * 2.0 * speed[:, None, None] * state[1][:, None]
+    rows = np.concatenate((left, -planes.bound[..., None]), axis=-1).reshape(-1, PIECES + 1)
+    right = (planes.rates[..., 1] * speed[:, None] ** 2).ravel()
+    size = np.maximum(np.abs(rows).max(axis=1), np.abs(right))
+    size[size == 0.0] = 1.0
+    return rows / size[:, None], right / size
+
+
+def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
+    """Rows that keep a jerk, R1 s''' + 3 R2 s' s'' + R3 s'^3, within its limit in some directions at all knots.
+
+    Along the way and across, and in its own direction, so that the rounds end with its size within the limit.
+
+    Args:
+        rates: R1 to R3 at the knots, shape (3, P + 1, 3).
+        state: As `sums` makes it.
+        course: Whose way and speeds are taken.
+        limit: Of its size.
+    """
+    _, speed, rate = (values[:, None] for values in state @ course.jerk)
+    first, second, third = rates
+    rest = 3.0 * second * speed * rate + third * speed**3  # as it is now: it changes little from round to round
+    rows, bounds = [], []
+    square = course.duration**2
+    for knots in (slice(None, -1), slice(1, None)):  # both ends of each piece
+        whole = first[knots][..., None] * np.eye(PIECES)[:, None]
+        now = whole @ course.jerk + rest[knots]
+        along = _unit(first[knots])
+        aside = rest[knots] - np.sum(rest[knots] * along, axis=1, keepdims=True) * along
+        for direction in (along, -along, _unit(aside), -_unit(aside), _unit(now)):
+            said = direction.any(axis=1)
+            left = np.einsum("kc,kcp->kp", direction, whole)[said]
+            rows.append(np.hstack((left / limit, np.full((len(left), 1), -1.5 * np.sqrt(square)))))
+            bounds.append(-np.sum(direction * rest[knots], axis=1)[said] / limit - 0.5 * square**1.5)
+    return np.vstack(rows), np.concatenate(bounds)
+
+
+def _unit(vectors: Array) -> Array:
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    unit: Array = np.where(size > _NOTHING, vectors / np.where(size > _NOTHING, size, 1.0), 0.0)
+    return unit
+
+
+def reduced(planes: HalfPlanes) -> HalfPlanes:
+    """Half planes that contain the origin, without those that the border shows in none of some directions.
+
+    Args:
+        planes: Half planes with bounds that are not negative.
+
+    Returns:
+        HalfPlanes, r of the R of each place.
+    """
+    normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
+    scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
+    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)
+    ray = np.stack((np.sin(angle), np.cos(angle)), axis=1)
+    first = np.argmax(np.einsum("krc,sc->krs", normed / scale, ray), axis=1)
+    kept = np.zeros(planes.bound.shape, dtype=np.bool_)
+    np.put_along_axis(kept, first, True, axis=1)
+    order = np.argsort(~kept, axis=1, kind="stable")[:, : kept.sum(axis=1).max()]
+    rates = np.take_along_axis(planes.rates, order[..., None], axis=1)
+    bound = np.take_along_axis(planes.bound, order, axis=1)
+    said = np.isfinite(bound)
+    return HalfPlanes(np.where(said[..., None], rates, 0.0), np.where(said, bound, 1.0))

@@ -1,0 +1,356 @@
+"""Rest-to-rest segments of a path: the curve of each, and the parameter along it over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from math import comb, factorial
+from typing import Any, Final, NamedTuple, Protocol
+
+import numpy as np
+
+from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
+from sagline.motion.path import Path
+from sagline.motion.segments import QUINTIC, Segments
+from sagline.robot.pose import Pose
+
+_STOPPED: Final = 1e-6  # of the largest speed
+_NARROW: Final = 0.2  # of the mean step: knots of a spline are no nearer, as where a motion begins
+
+
+class Jet(NamedTuple):
+    """Poses of a curve, and how they change with its parameter.
+
+    Attributes:
+        pose: Poses, a batch of N.
+        rates: Twist for a parameter that grows by 1 a second, and its first two derivatives by the parameter, shape
+            (3, N, 6).
+    """
+
+    pose: Pose
+    rates: Array
+
+    def twists(self, motion: Array) -> Array:
+        """Twist, its rate and its jerk of a motion along the curve, by the chain rule.
+
+        Args:
+            motion: Parameter and its first three derivatives by time, shape (4, N).
+
+        Returns:
+            Array of shape (3, N, 6).
+        """
+        (first, second, third), (_, v, a, j) = self.rates, motion[:, :, None]
+        return np.stack((first * v, second * v**2 + first * a, third * v**3 + 3.0 * second * v * a + first * j))
+
+
+class Curve(Protocol):
+    """A curve in the space of poses."""
+
+    def at(self, parameter: Array) -> Jet:
+        """Poses and their change at parameters of shape (N,)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """A straight way with a turn about a fixed axis; its parameter is the share of both that is done.
+
+    Attributes:
+        ends: The one segment that it is.
+    """
+
+    ends: Segments
+
+    @classmethod
+    def between(cls, pose: Pose) -> Line:
+        """The line from the first pose of a batch to the last."""
+        return cls(Segments.between(pose[np.array([0, -1])], QUINTIC))
+
+    @property
+    def moves(self) -> bool:
+        """Whether it leads anywhere."""
+        return bool(self.ends.moves[0])
+
+    @property
+    def direction(self) -> Array:
+        """Twist for a parameter that grows by 1 a second, shape (6,)."""
+        return np.concatenate((self.ends.move[0], self.ends.turn[0]))
+
+    def parameter(self, pose: Pose) -> Array:
+        """Parameters of poses that are on the line, shape (N,)."""
+        move, turn = self.ends.move[0], self.ends.turn[0]
+        if (extent := move @ move) >= (angle := float(np.linalg.norm(turn))) ** 2:
+            along: Array = (pose.position - self.ends.start[0]) @ move / extent
+            return along
+        # half angles from -45 to 135 degrees: the sign of a quaternion means nothing
+        half = np.arctan2(
+            pose.quaternion @ self.ends.side_quaternion[0], pose.quaternion @ self.ends.start_quaternion[0]
+        )
+        turned: Array = (np.mod(half + 0.25 * np.pi, np.pi) - 0.25 * np.pi) * 2.0 / angle
+        return turned
+
+    def at(self, parameter: Array) -> Jet:
+        """Poses and their change at parameters of shape (N,)."""
+        rates = np.zeros((3, parameter.size, 6))
+        rates[0] = self.direction
+        half = (0.5 * np.linalg.norm(self.ends.turn[0]) * parameter)[:, None]
+        quaternion = np.cos(half) * self.ends.start_quaternion + np.sin(half) * self.ends.side_quaternion
+        position = self.ends.start + parameter[:, None] * self.ends.move
+        return Jet(Pose.from_quaternion(position, quaternion), rates)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bent:
+    """A curve through samples, by splines of 5th degree in position and quaternion over its own length.
+
+    Attributes:
+        position: Spline of the position.
+        quaternion: Spline of a quaternion that need not be of unit length.
+    """
+
+    position: Any
+    quaternion: Any
+
+    @classmethod
+    def through(cls, pose: Pose, parameter: Array) -> Bent:
+        """The splines through poses at ascending parameters; where these are too near each other, through some."""
+        from scipy.interpolate import make_interp_spline  # takes longer to load than all the rest of motion
+
+        least, knots = _NARROW * parameter[-1] / len(parameter), [0]
+        for k in range(1, len(parameter)):
+            if parameter[k] - parameter[knots[-1]] >= least:
+                knots.append(k)
+        knots[-1] = len(parameter) - 1
+        degree = min(5, len(knots) - 1)
+        aligned = np.sum(pose.quaternion[1:] * pose.quaternion[:-1], axis=1) >= 0.0
+        sign = np.cumprod(np.append(1.0, np.where(aligned, 1.0, -1.0)))
+        columns = (pose.position, pose.quaternion * sign[:, None])
+        return cls(*(make_interp_spline(parameter[knots], values[knots], k=degree) for values in columns))
+
+    def at(self, parameter: Array) -> Jet:
+        """Poses and their change at parameters of shape (N,)."""
+        place = [self.position(parameter, order) for order in range(4)]
+        q = [self.quaternion(parameter, order) for order in range(4)]
+        # with w = 2 vec(q' q*)/(q . q), whatever the length of q: numerator, denominator and their derivatives
+        top = [2.0 * _vector(q[1], q[0]), 2.0 * _vector(q[2], q[0])]
+        top.append(2.0 * _vector(q[3], q[0]) + 2.0 * _vector(q[2], q[1]))
+        below = [np.sum(q[0] * q[k], axis=1)[:, None] * (1.0 if k == 0 else 2.0) for k in range(3)]
+        below[2] += 2.0 * np.sum(q[1] * q[1], axis=1)[:, None]
+        spin = top[0] / below[0]
+        second = (top[1] - spin * below[1]) / below[0]
+        third = (top[2] - 2.0 * second * below[1] - spin * below[2]) / below[0]
+        rates = np.stack([np.hstack(pair) for pair in zip(place[1:], (spin, second, third), strict=True)])
+        return Jet(Pose.from_quaternion(place[0], q[0]), rates)
+
+
+def lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
+    """Length of the way at each sample, a radian counted as a meter, with its first two derivatives by time.
+
+    Args:
+        time: Times of the samples [s], shape (N,).
+        twist: Twists, shape (N, 6), not zero but for the first and the last.
+        twist_rate: Their rates, shape (N, 6).
+
+    Returns:
+        Array of shape (3, N); the length is good to the fourth order of the time step.
+
+    Raises:
+        InvalidValueError: If the platform stops in between: there it turns around.
+    """
+    speed = np.linalg.norm(twist, axis=1)
+    inside = speed[1:-1] <= _STOPPED * speed.max()
+    if inside.any():
+        k = int(np.argmax(inside)) + 1
+        raise InvalidValueError(
+            f"the path at {time[k]:g} s",
+            "without speed in the middle of a curve, where it turns around",
+            "moves along a straight line, or without stops",
+            "Make it of two paths, each from rest to rest.",
+        )
+    growth = np.sum(twist * twist_rate, axis=1) / np.where(speed > 0.0, speed, 1.0)
+    growth[[0, -1]] = np.linalg.norm(twist_rate[[0, -1]], axis=1) * (1.0, -1.0)  # where it stands
+    step = np.diff(time)
+    pieces = 0.5 * step * (speed[1:] + speed[:-1]) + step**2 / 12.0 * (growth[:-1] - growth[1:])
+    return np.stack((np.append(0.0, np.cumsum(pieces)), speed, growth))
+
+
+def _vector(a: Array, b: Array) -> Array:
+    """Vector part of the quaternion product a b*, scalars last, shapes (N, 4) -> (N, 3)."""
+    vector: Array = b[:, 3:] * a[:, :3] - a[:, 3:] * b[:, :3] - np.cross(a[:, :3], b[:, :3])
+    return vector
+
+
+def piecewise(knots: Array, values: Array, at_end: int) -> Any:
+    """The piecewise polynomial with given derivatives at both ends of every piece: of 7th degree for four of each.
+
+    Args:
+        knots: Strictly increasing, shape (n,), n >= 2.
+        values: Value and first K - 1 derivatives at the knots, shape (K, n).
+        at_end: How many of them hold at the end of the last piece, from the value on.
+
+    Returns:
+        scipy's PPoly, which goes on beyond the outermost knots.
+    """
+    from scipy.interpolate import PPoly  # takes longer to load than all the rest of motion
+
+    step = np.diff(knots)
+    known = len(values)
+    # derivatives as Taylor coefficients of a piece, its length taken as 1
+    left, right = (values[:, part] * _powers(step, known) for part in (slice(None, -1), slice(1, None)))
+    pieces = np.concatenate((left, np.zeros_like(left)))
+    pieces[:, :-1] = _pieces(left[:, :-1], right[:, :-1])
+    last = _pieces(left[:, -1:], right[:at_end, -1:])
+    pieces[: len(last), -1:] = last
+    return PPoly((pieces / step ** np.arange(2 * known)[:, None])[::-1], knots, extrapolate=True)
+
+
+def _powers(step: Array, count: int) -> Array:
+    return np.array([step**k / factorial(k) for k in range(count)])
+
+
+def _pieces(left: Array, right: Array) -> Array:
+    """Coefficients of ascending order from Taylor coefficients at both ends, shape (left + right, pieces)."""
+    low, high = len(left), len(right)
+    binomials = np.array([[float(comb(i, j)) for i in range(low + high)] for j in range(high)])
+    rest = np.linalg.solve(binomials[:, low:], right - binomials[:, :low] @ left)
+    return np.concatenate((left, rest))
+
+
+RESTING: Final = 1e-3  # of the path's largest speed or acceleration: splines through samples stand no better
+_STANDING: Final = 1e-9  # of its largest speed: in between, where it might only turn around
+_ON_A_LINE: Final = 1e-7  # of the way: how far samples may be off a line that they are on
+TINY: Final = 1e-300
+_SAME_TIME: Final = 1e-9  # of the path's duration
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Move:
+    """A motion from rest to rest.
+
+    Attributes:
+        begin: When it begins [s].
+        end: When it ends [s].
+        curve: Where it leads; None where the platform stands all the time.
+        progress: Parameter of the curve over the time since the begin: scipy's PPoly; None likewise.
+        sample: Index of its first sample.
+    """
+
+    begin: float
+    end: float
+    curve: Curve | None
+    progress: Any
+    sample: int
+
+    @property
+    def duration(self) -> float:
+        """How long it takes [s]."""
+        return self.end - self.begin
+
+    def rates(self, time: Array) -> Array:
+        """Parameter of the curve and its first three derivatives at given times since the begin, shape (4, N).
+
+        Before the begin and after the end it rests. A derivative that jumps is that of the later side.
+        """
+        assert self.progress is not None
+        held = np.clip(time, 0.0, self.duration)
+        values = np.stack([self.progress(held, order) for order in range(4)])
+        values[1:, (time < 0.0) | (time >= self.duration)] = 0.0
+        return values
+
+
+def moves_of(path: Path) -> tuple[Move, ...]:
+    """The moves of a path, in order.
+
+    Between rests the parameter runs through the samples with all derivatives that the path knows: a polynomial of
+    7th degree from sample to sample, of 5th without jerk. Paths of `quintic_path` and `septic_path` are that exactly.
+
+    Args:
+        path: The path; where it does not know its rests, they are the samples that stand.
+
+    Returns:
+        Moves that follow on each other.
+
+    Raises:
+        InvalidValueError: If the path is in motion at an end, or turns around in the middle of a curve.
+    """
+    _check_ends(path)
+    rests = path.rests if path.rests is not None else _standing(path)
+    return tuple(_move(path, float(first), float(last)) for first, last in pairwise(rests))
+
+
+def _check_ends(path: Path) -> None:
+    speed = _speed(path.twist)
+    for k, which in ((0, "begin"), (len(path) - 1, "end")):
+        if speed[k] > RESTING * speed.max():
+            raise InvalidValueError(
+                f"the path at its {which}",
+                f"in motion, at {np.linalg.norm(path.twist[k, :3]):.3g} m/s and "
+                f"{np.linalg.norm(path.twist[k, 3:]):.3g} rad/s",
+                "at rest",
+                "Give a path from rest to rest.",
+            )
+
+
+def _speed(twist: Array) -> Array:
+    """A radian counts as a meter, shape (N,)."""
+    speed: Array = np.linalg.norm(twist, axis=-1)
+    return speed
+
+
+def _standing(path: Path) -> Array:
+    """Times of the samples that stand, the first and the last among them."""
+    speed, rate = _speed(path.twist), _speed(path.twist_rate)
+    still = (speed <= _STANDING * speed.max()) & (rate <= RESTING * rate.max())
+    still[[0, -1]] = True
+    times: Array = path.time[still]
+    return times
+
+
+def _move(path: Path, begin: float, end: float) -> Move:
+    """The move between two rests; those that are no samples are reached by the polynomials beside them."""
+    near = _SAME_TIME * max(path.duration, abs(begin))
+    first, last = np.searchsorted(path.time, (begin - near, end + near))
+    part = slice(int(first), int(last))
+    time = path.time[part] - begin
+    if not _speed(path.twist[part]).any():
+        return Move(begin, end, None, None, part.start)
+    if time.size < 2:
+        value = f"of {time.size} samples"
+        raise InvalidValueError(
+            f"the move from {begin:g} s to {end:g} s", value, ">= 2", "Give the path a higher rate."
+        )
+    rates = [path.twist[part], path.twist_rate[part], *([] if path.jerk is None else [path.jerk[part]])]
+    curve, values = _parametrized(time, path.pose[part], rates)
+    standing, over = abs(time[0]) <= near, abs(time[-1] - (end - begin)) <= near
+    # a sample at a rest may know of the move after it only; quintic paths are exact with 3 of 4, septic ones to h^7
+    at_end = 3 if path.jerk is not None or part.stop == len(path) else 2
+    progress = piecewise(time, values, at_end if over else len(values))
+    if not (standing and over):
+        knots = np.concatenate(([] if standing else [0.0], time, [] if over else [end - begin]))
+        held = np.zeros((len(values), knots.size))
+        held[:, int(not standing) :][:, : time.size] = values
+        held[0] = progress(knots)
+        if not standing and len(values) > 3:
+            held[3, 0] = progress(0.0, 3)  # it rests, but its jerk need not be zero
+        progress = piecewise(knots, held, at_end if over else 3)
+    return Move(begin, end, curve, progress, part.start)
+
+
+def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
+    """A curve through samples, and its parameter with its derivatives at each, shape (K, n)."""
+    line = Line.between(pose)
+    if line.moves:
+        parameter, square = line.parameter(pose), float(line.direction @ line.direction)
+        values = np.stack((parameter, *(rate @ line.direction / square for rate in rates)))
+        there = line.at(parameter).pose
+        off = [np.abs(there.position - pose.position).max() ** 2]
+        off.append(1.0 - np.abs(np.sum(there.quaternion * pose.quaternion, axis=1)).min())
+        for rate, value in zip(rates, values[1:], strict=True):  # the last sample may be in the next move
+            aside = np.abs(rate - value[:, None] * line.direction)[:-1].max()
+            off.append((aside / max(np.abs(rate[:-1]).max(), TINY)) ** 2)
+        if max(off) <= _ON_A_LINE**2 * max(1.0, square):
+            return line, values
+    way = lengths(time, *rates[:2])
+    way /= way[0, -1]
+    return Bent.through(pose, way[0]), way

@@ -1,0 +1,341 @@
+"""Input shapers, and paths convolved with them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import reduce
+from operator import mul
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
+from sagline.dynamics.trajectories.segments import Move, moves_of
+from sagline.motion.path import Path, checked_time
+from sagline.motion.rest_to_rest import time_grid
+from sagline.robot.pose import Pose
+
+MOST_IMPULSES: Final = 10_000  # three for each of eight frequencies are 6,561
+_SAME: Final = 1e-12  # of a shaper's duration: impulses so near are one
+_ROUNDING: Final = 1e-9  # of the sum of the amplitudes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shaper(Result):
+    """Impulses that a motion is convolved with: it is made of shares of itself, each a little later.
+
+    The product of two shapers convolves them: what either leaves at rest, the product leaves at rest.
+
+    Attributes:
+        time: When the impulses come [s], shape (K,), ascending, the first no earlier than 0.
+        amplitude: Share of the motion that starts at each, shape (K,), their sum 1.
+        frequency: What they were made for [Hz], shape (F,); empty where that is not known.
+    """
+
+    time: Array
+    amplitude: Array
+    frequency: Array
+
+    def __init__(self, time: ArrayLike, amplitude: ArrayLike, frequency: ArrayLike = ()) -> None:
+        """Check the impulses.
+
+        Args:
+            time: When they come [s], shape (K,), strictly increasing, >= 0.
+            amplitude: Their shares, shape (K,); they sum to 1.
+            frequency: What they are made for [Hz], > 0, shape (F,).
+
+        Raises:
+            InvalidValueError: If they are no such impulses.
+
+        Examples:
+            >>> import sagline as sl
+            >>> both = sl.ZV(1.8) * sl.ZV(2.9)
+            >>> print(both.time.round(3), both.amplitude)
+            [0.    0.172 0.278 0.45 ] [0.25 0.25 0.25 0.25]
+        """
+        clock = checked(checked_time(time), "time", "s", low=0.0)
+        shares = checked(amplitude, "amplitude", "", shape=(None,))
+        if shares.shape != clock.shape or abs(shares.sum() - 1.0) > _ROUNDING:
+            value = f"{shares.size} that sum to {shares.sum():.9g}"
+            raise InvalidValueError("amplitude", value, f"{clock.size} that sum to 1", "Divide them by their sum.")
+        object.__setattr__(self, "time", clock)
+        object.__setattr__(self, "amplitude", shares)
+        object.__setattr__(self, "frequency", _frequencies(frequency))
+
+    @property
+    def duration(self) -> float:
+        """How much later a shaped motion ends [s]."""
+        return float(self.time[-1])
+
+    def __mul__(self, other: Shaper) -> Shaper:
+        """Both, one after the other, in any order.
+
+        Args:
+            other: A shaper.
+
+        Returns:
+            Shaper with an impulse for each pair of impulses; those at one time are one.
+
+        Raises:
+            InvalidValueError: If the other is none, or there were more than 10,000 impulses.
+        """
+        theirs = instance(other, Shaper, "the other factor")
+        if (count := self.time.size * theirs.time.size) > MOST_IMPULSES:
+            step = "Shape fewer frequencies."
+            raise InvalidValueError("a product of shapers", f"of {count} impulses", f"<= {MOST_IMPULSES}", step)
+        times = np.add.outer(self.time, theirs.time).ravel()
+        order = np.argsort(times, kind="stable")
+        times, shares = times[order], np.multiply.outer(self.amplitude, theirs.amplitude).ravel()[order]
+        first = np.append(True, np.diff(times) > _SAME * times[-1])
+        merged = np.add.reduceat(shares, np.flatnonzero(first))
+        return Shaper(times[first], merged, np.concatenate((self.frequency, theirs.frequency)))
+
+    def residual(self, frequency: ArrayLike, damping_ratio: float = 0.0) -> Array:
+        """Share of the vibration that is left when a motion ends, of what the unshaped motion leaves.
+
+        Args:
+            frequency: Of the vibration, undamped [Hz], >= 0, of any shape.
+            damping_ratio: Of the vibration, >= 0, < 1.
+
+        Returns:
+            |sum A_j exp((zeta w + i w_d) t_j)| exp(-zeta w t_K), w = 2 pi frequency, w_d = w sqrt(1 - zeta^2), of the
+            shape of the frequency: 1 without a shaper.
+
+        Raises:
+            InvalidValueError: If an argument is out of its range.
+
+        Source:
+            Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+        """
+        turning = 2.0 * np.pi * checked(frequency, "frequency", "Hz", low=0.0)[..., None]
+        ratio = _damping_ratio(damping_ratio)
+        before = self.time - self.time[-1]
+        damped = np.exp(ratio * turning * before) * np.exp(1j * turning * np.sqrt(1.0 - ratio**2) * before)
+        left: Array = locked(np.asarray(np.abs(damped @ self.amplitude)))
+        return left
+
+
+def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
+    """Zero vibration: two impulses half a period apart leave nothing at the frequency.
+
+    Args:
+        frequency: Natural frequency [Hz], > 0; of several, shape (F,), the product of their shapers.
+        damping_ratio: Of the vibration, >= 0, < 1, one for all or one a frequency.
+
+    Returns:
+        Shaper that makes a motion half a period longer.
+
+    Raises:
+        InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
+
+    Source:
+        Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+
+    Examples:
+        >>> import sagline as sl
+        >>> shaper = sl.ZV(2.0)
+        >>> print(shaper.time, shaper.amplitude, shaper.residual(2.2).round(3))
+        [0.   0.25] [0.5 0.5] 0.156
+    """
+    return _several(frequency, damping_ratio, "damping_ratio", _zero_vibration)
+
+
+def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
+    """Zero vibration and derivative: as `ZV`, and little is left where the frequency is a little off.
+
+    Args:
+        frequency: Natural frequency [Hz], > 0; of several, shape (F,), the product of their shapers.
+        damping_ratio: Of the vibration, >= 0, < 1, one for all or one a frequency.
+
+    Returns:
+        Shaper of three impulses that makes a motion a period longer.
+
+    Raises:
+        InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
+
+    Source:
+        Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+
+    Examples:
+        >>> import sagline as sl
+        >>> shaper = sl.ZVD(2.0)
+        >>> print(shaper.time, shaper.amplitude, shaper.residual(2.2).round(3))
+        [0.   0.25 0.5 ] [0.25 0.5  0.25] 0.024
+    """
+    return _several(frequency, damping_ratio, "damping_ratio", _zero_vibration_and_derivative)
+
+
+def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N802
+    """Extra insensitive: leaves the tolerance at the frequency itself, nothing a little above and below.
+
+    Args:
+        frequency: Natural frequency [Hz], > 0, of a vibration that is hardly damped; of several, shape (F,), the
+            product of their shapers.
+        tolerance: Share of the vibration that may be left, >= 0, < 1, one for all or one a frequency.
+
+    Returns:
+        Shaper of three impulses that makes a motion a period longer.
+
+    Raises:
+        InvalidValueError: If a frequency is not positive, or a tolerance out of its range.
+
+    Source:
+        Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009.
+
+    Examples:
+        >>> import sagline as sl
+        >>> shaper = sl.EI(2.0, tolerance=0.05)
+        >>> print(shaper.amplitude, shaper.residual([1.8, 2.0, 2.2]).round(3))
+        [0.2625 0.475  0.2625] [0.024 0.05  0.024]
+    """
+    return _several(frequency, tolerance, "tolerance", _extra_insensitive)
+
+
+def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[[float, float], Shaper]) -> Shaper:
+    """The product of the shapers of each frequency, each with its option, a number from 0 to below 1."""
+    frequencies, options = checked(frequency, "frequency", "Hz", above=0.0), checked(option, name, "", low=0.0)
+    if (options >= 1.0).any():
+        raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")
+    shape = broadcast_shape(f"frequency and {name}", frequencies.shape, options.shape, (1,))
+    if len(shape) > 1 or shape == (0,):
+        step = "Give what is to be left at rest."
+        raise InvalidValueError("frequency", f"of shape {frequencies.shape}", "one number, or shape (F,), F >= 1", step)
+    each = zip(np.broadcast_to(frequencies, shape), np.broadcast_to(options, shape), strict=True)
+    return reduce(mul, (make(float(f), float(o)) for f, o in each))
+
+
+def _zero_vibration(frequency: float, damping_ratio: float) -> Shaper:
+    half, decay = _half_period(frequency, damping_ratio)
+    return Shaper([0.0, half], np.array([1.0, decay]) / (1.0 + decay), [frequency])
+
+
+def _zero_vibration_and_derivative(frequency: float, damping_ratio: float) -> Shaper:
+    half, decay = _half_period(frequency, damping_ratio)
+    shares = np.array([1.0, 2.0 * decay, decay**2]) / (1.0 + decay) ** 2
+    return Shaper([0.0, half, 2.0 * half], shares, [frequency])
+
+
+def _half_period(frequency: float, damping_ratio: float) -> tuple[float, float]:
+    """Half a period of the damped vibration [s], and what is left of it after that."""
+    root = np.sqrt(1.0 - damping_ratio**2)
+    return 0.5 / (frequency * root), float(np.exp(-np.pi * damping_ratio / root))
+
+
+def _extra_insensitive(frequency: float, tolerance: float) -> Shaper:
+    outer, inner = 0.25 * (1.0 + tolerance), 0.5 * (1.0 - tolerance)
+    return Shaper(np.array([0.0, 0.5, 1.0]) / frequency, [outer, inner, outer], [frequency])
+
+
+def _frequencies(frequency: ArrayLike) -> Array:
+    found = checked(frequency, "frequency", "Hz", above=0.0)
+    if found.ndim != 1:
+        raise InvalidValueError("frequency", f"of shape {found.shape}", "shape (F,)", "Give a list of them.")
+    return found
+
+
+def _damping_ratio(value: float) -> float:
+    ratio = number(value, "damping_ratio", "", low=0.0)
+    if ratio >= 1.0:
+        raise InvalidValueError("damping_ratio", f"{ratio:g}", ">= 0, < 1", "Give the ratio, 0.01 for 1 %.")
+    return ratio
+
+
+_BYTES: Final = 300.0  # a sample for each impulse, while it is shaped
+
+
+def shaped(path: Path, shaper: Shaper) -> Path:
+    """The path, shaped: it leads along the same curve, a little later, and leaves the shaper's frequencies at rest.
+
+    How far along its curve the platform is at each time is convolved with the shaper's impulses, in each move from rest
+    to rest by itself; the next begins when the last has ended, later than before. Along a straight line with a turn
+    about a fixed axis the acceleration itself is so convolved, and a linear vibration cancels exactly; along a curve
+    the platform stays on it, and most cancels.
+
+    Paths of `quintic_path` and `septic_path` are the polynomials that they are, to rounding. Between the samples of
+    others splines of 5th or 7th degree are taken; along a curve poses are off it by the sixth power of the way from
+    sample to sample.
+
+    Args:
+        path: A path from rest to rest; where it does not know its rests (see `Path.rests`), they are the samples
+            without velocity and acceleration.
+        shaper: What to convolve with: `ZV`, `ZVD`, `EI` of a frequency, or their product.
+
+    Returns:
+        Path at the same sample rate, each of its moves longer by the shaper's duration.
+
+    Raises:
+        InvalidValueError: If the path is in motion at an end or turns around in the middle of a curve, or a frequency
+            of the shaper is above half the path's sample rate.
+
+    Source:
+        Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009;
+        docs/howto/without-vibration.md.
+
+    Examples:
+        >>> import sagline as sl
+        >>> path = sl.quintic_path([(0, 0, 1.5), (3, 0, 1.5)], durations=2.0)
+        >>> calm = sl.shaped(path, sl.ZVD(2.5))
+        >>> print(f"{calm.duration} s, to {calm.pose.position[-1]}")
+        2.4 s, to [3.  0.  1.5]
+    """
+    step = sample_time(instance(path, Path, "path"))
+    fastest = instance(shaper, Shaper, "shaper").frequency.max(initial=0.0)
+    if fastest > 0.5 / step:
+        limit = f"<= {0.5 / step:g} Hz, half the path's sample rate"
+        raise InvalidValueError("the shaper's frequency", f"{fastest:g} Hz", limit, "Give the path a higher rate.")
+    moves = moves_of(path)
+    longer = np.array([move.duration + (0.0 if move.curve is None else shaper.duration) for move in moves])
+    ends = np.cumsum(longer)
+    rests = np.append(0.0, ends)
+    time = time_grid(float(ends[-1]), 1.0 / step)
+    check_memory("the shaped path", _BYTES * time.size * shaper.time.size, "Shape a shorter path.")
+    position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
+    which = np.minimum(np.searchsorted(ends, time, side="right"), len(moves) - 1)
+    for k, move in enumerate(moves):
+        part = which == k
+        pose = _held(path, move)
+        if move.curve is not None:
+            motion = convolved(move, shaper, time[part] - rests[k])
+            jet = move.curve.at(motion[0])
+            pose, rates[:, part] = jet.pose, jet.twists(motion)
+        position[part], quaternion[part] = pose.position, pose.quaternion
+    start = path.time[0]
+    kept = None if path.jerk is None else locked(rates[2])
+    return Path(time + start, Pose.from_quaternion(position, quaternion), rates[0], rates[1], kept, rests + start)
+
+
+def convolved(move: Move, shaper: Shaper, time: Array) -> Array:
+    """Parameter of a shaped move and its first three derivatives at times since its begin, shape (4, N)."""
+    motion = np.zeros((4, time.size))
+    for delay, share in zip(shaper.time, shaper.amplitude, strict=True):
+        motion += share * move.rates(time - delay)
+    return motion
+
+
+def _held(path: Path, move: Move) -> Pose:
+    """Where the platform is at the first sample of a move."""
+    return path.pose[move.sample]
+
+
+def sample_time(path: Path) -> float:
+    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that.
+
+    Args:
+        path: The path.
+
+    Returns:
+        The time.
+
+    Raises:
+        InvalidValueError: If the path has one sample only.
+    """
+    if len(path) < 2:
+        raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
+    rate = 1.0 / float(np.median(np.diff(path.time)))
+    return 1.0 / (round(rate) if abs(rate - round(rate)) <= 1e-6 * rate else rate)

@@ -1,0 +1,1 @@
+"""Modes, dynamic stiffness and frequency response of robots whose cables have mass."""

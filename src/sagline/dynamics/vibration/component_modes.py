@@ -1,0 +1,277 @@
+"""Fixed-end modes of every cable and their participation factors: the components of a robot's modes."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.special import roots_jacobi
+
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.kernels.dynamics import string as columns
+from sagline.kernels.dynamics.spectral import interpolate, node_counts, spectral_matrices, stretch_matrices
+from sagline.kernels.dynamics.spectral_elements import LARGEST_DEGREE, Lobatto
+from sagline.statics.strings import Strings
+
+
+@cache
+def lobatto() -> Lobatto:
+    """The nodes and what belongs to them.
+
+    Returns:
+        Lobatto, its arrays in rows by degree.
+    """
+    n = LARGEST_DEGREE + 1
+    rule = Lobatto(np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n, n)), np.zeros((n, n, n)))
+    for p in range(2, n):
+        nodes = np.concatenate(([-1.0], roots_jacobi(p - 1, 1.0, 1.0)[0], [1.0]))
+        values = np.asarray(legendre.legvander(nodes, p + 1), dtype=np.float64)
+        weights = np.asarray(2.0 / (p * (p + 1) * values[:, p] ** 2))
+        rule.nodes[p, : p + 1], rule.weights[p, : p + 1] = nodes, weights
+        rule.slopes[p, : p + 1, : p + 1] = _slopes(nodes, values[:, p])
+        rule.integrals[p, : p + 1, : p + 1] = _integrals(weights, values)
+    for field in rule:
+        locked(field)
+    return rule
+
+
+def _slopes(nodes: Array, last: Array) -> Array:
+    """Slopes at the nodes of the polynomials that are 1 at one of them; last: Legendre's of the degree there."""
+    apart = nodes[:, None] - nodes
+    np.fill_diagonal(apart, 1.0)
+    slopes = last[:, None] / last / apart
+    np.fill_diagonal(slopes, 0.0)
+    np.fill_diagonal(slopes, -slopes.sum(axis=1))  # a constant has none
+    return np.asarray(slopes)
+
+
+def _integrals(weights: Array, values: Array) -> Array:
+    """Integrals from -1 to the nodes of the same polynomials; values: Legendre's to one degree more at the nodes."""
+    p = weights.size - 1
+    scale = np.arange(p + 1) + 0.5
+    scale[p] = 0.5 * p  # the rule makes more of its square
+    shares = scale[:, None] * (values[:, : p + 1] * weights[:, None]).T  # of Legendre's polynomials, a node a column
+    odd = 2.0 * np.arange(1, p + 1) + 1.0
+    sums = np.column_stack((values[:, 0] + values[:, 1], (values[:, 2:] - values[:, :p]) / odd))
+    return np.asarray(sums @ shares)
+
+
+_TINY = 1e-300
+
+
+class Components(NamedTuple):
+    """Motions of the t taut cables of one state with both ends held, T together: those in the planes come first.
+
+    Attributes:
+        square: Of their angular frequencies [1/s^2], shape (T,).
+        cable: Whose they are, shape (T,).
+        participation: P, by which an acceleration of the platform end drives them, world axes, shape (T, 3) [sqrt(kg)].
+        still: M_0, mass of every cable as its platform end moves it at rest, world axes, shape (m, 3, 3) [kg].
+        plane: The motions in the cables' planes, cable by cable.
+        normal: Those normal to them.
+        mesh: Where they are known.
+    """
+
+    square: Array
+    cable: Indices
+    participation: Array
+    still: Array
+    plane: Motions
+    normal: Motions
+    mesh: Mesh
+
+    def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[Motions, Array, Array], ...]:
+        """The motions in the planes and those normal to them, each with what moves them.
+
+        Args:
+            ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
+            amplitudes: Of the components, shape (T, K).
+
+        Returns:
+            Motions; displacements of the platform ends in their directions, (t, d, K); amplitudes, (t, k, K).
+        """
+        own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
+        swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])
+        sway = amplitudes[inside:].reshape(*self.normal.square.shape, ends.shape[2])
+        return (self.plane, own[:, ::2], swing), (self.normal, own[:, 1:2], sway)
+
+
+class Mesh(NamedTuple):
+    """Nodes of the taut cables.
+
+    Attributes:
+        taut: Indices of the cables, t of them.
+        table: Their rows of the table of strings, shape (t, STRING_COLUMNS).
+        axes: Level along the plane, normal to it, and up, shape (t, 3, 3).
+        omega: Angular frequency whose waves they carry [rad/s].
+        points: Material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6).
+    """
+
+    taut: Indices
+    table: Array
+    axes: Array
+    omega: float
+    points: Array
+
+    @property
+    def density(self) -> Array:
+        """Of the cables [kg/m], shape (t,)."""
+        return np.asarray(self.table[:, columns.DENSITY])
+
+
+class Motions(NamedTuple):
+    """Motions of the taut cables in one plane, k of each.
+
+    Displacements of a cable's u unknowns are times the roots of their masses.
+
+    Attributes:
+        rest: Of the nodes with the platform end displaced at rest, shape (t, u, d).
+        square: Angular frequencies squared, ascending [1/s^2], shape (t, k).
+        shape: Of the nodes, shape (t, u, k).
+        drive: By the platform end, shape (t, k, d).
+    """
+
+    rest: Array
+    square: Array
+    shape: Array
+    drive: Array
+
+
+def component_modes(strings: Strings, row: int, up_to: float) -> Components:
+    """Motions of the cables of one state, right up to a frequency; those above complete what the cables can do.
+
+    Args:
+        strings: Of N states.
+        row: Which of them.
+        up_to: That frequency [Hz].
+
+    Returns:
+        Components.
+    """
+    omega = 2.0 * np.pi * up_to
+    taut = np.flatnonzero(strings.taut[row])
+    table, axes = np.ascontiguousarray(strings.table[row, taut]), strings.axes[row, taut]
+    counts = np.empty(taut.size, dtype=np.int64)
+    node_counts(table, omega, counts)
+    t, n = taut.size, int(counts.max(initial=2))
+    points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
+    plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
+    spectral_matrices(table, omega, lobatto(), points, plane, normal, carried, mass)
+    free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is held
+    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # and so is a frame end that does not give way
+    inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
+    aside = _motions(normal, carried[:, :, 4:], free, first)
+    swings = inside.drive @ axes[:, ::2]
+    sways = aside.drive @ axes[:, 1:2]
+    return Components(
+        np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1))),
+        np.concatenate((np.repeat(taut, inside.square.shape[1]), np.repeat(taut, aside.square.shape[1]))),
+        np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3))),
+        _still(mass, axes, taut, strings.taut.shape[1]),
+        inside,
+        aside,
+        Mesh(taut, table, axes, omega, points),
+    )
+
+
+def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> Motions:
+    """Of the unknowns from the first that moves to the last that does in any cable."""
+    last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
+    square, own = np.linalg.eigh(matrix[:, first:last, first:last])
+    shape = np.zeros((*matrix.shape[:2], last - first))
+    shape[:, first:last] = own
+    return Motions(rest, square, shape, np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last])
+
+
+def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
+    """Masses xx, xz, zz, yy of the taut cables in their axes as matrices in the world, (m, 3, 3)."""
+    own = np.zeros((taut.size, 3, 3))
+    own[:, 0, 0], own[:, 0, 2], own[:, 2, 0], own[:, 2, 2], own[:, 1, 1] = mass[:, [0, 1, 1, 2, 3]].T
+    still = np.zeros((count, 3, 3))
+    still[taut] = np.swapaxes(axes, -1, -2) @ own @ axes
+    return still
+
+
+def field(components: Components, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
+    """Motion of the nodes times the roots of their masses: in the planes and normal to them.
+
+    Args:
+        components: Of the cables.
+        ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
+        amplitudes: Of the components, shape (T, K).
+
+    Returns:
+        Shapes (t, 2 nodes, K) and (t, nodes, K).
+    """
+    plane, normal = (
+        motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
+    )
+    return plane, normal
+
+
+def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: int) -> Array:
+    """Displacements of all cables at equally spaced material points, from frame to platform end.
+
+    Args:
+        components: Of the cables.
+        ends: As of `field`.
+        amplitudes: As of `field`.
+        count: How many points.
+
+    Returns:
+        World axes, shape (K, m, count, 3); zero for cables that are not taut.
+    """
+    mesh = components.mesh
+    t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
+    values = np.empty((t, count, n))
+    interpolate(mesh.table, mesh.omega, lobatto(), mesh.points, values)
+    plane, normal = field(components, ends, amplitudes)
+    inside = plane.reshape(t, n, 2, k)
+    behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
+    slide = np.hypot(*behind.T)  # a frame end that gives way has one motion in the plane
+    inside[:, 0] = (behind / np.maximum(slide, _TINY)[:, None])[:, :, None] * inside[:, 0, :1]
+    own = np.concatenate((inside, normal[:, :, None]), axis=2)
+    turned = np.swapaxes(mesh.axes[:, None, [0, 2, 1]], -1, -2) @ own
+    shapes = (values @ turned.reshape(t, n, 3 * k)).reshape(t, count, 3, k)
+    if t < ends.shape[0]:
+        moved, shapes = shapes, np.zeros((ends.shape[0], count, 3, k))
+        shapes[mesh.taut] = moved
+    return np.moveaxis(shapes, -1, 0)
+
+
+def stretch(components: Components, ends: Array, amplitudes: Array) -> Array:
+    """Twice the energy of stretch in each mode of unit modal mass.
+
+    Args:
+        components: Of the cables.
+        ends: As of `field`.
+        amplitudes: As of `field`.
+
+    Returns:
+        Of the taut cables, shape (t, K) [1/s^2].
+    """
+    plane, _ = field(components, ends, amplitudes)
+    return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
+
+
+def stretch_of_motions(components: Components) -> Array:
+    """Stiffness of stretch between displacements of the platform end at rest and the motions in the plane.
+
+    Args:
+        components: Of the cables.
+
+    Returns:
+        Symmetric, shape (t, 2 + k, 2 + k).
+    """
+    motions = components.plane
+    basis = np.concatenate((motions.rest, motions.shape), axis=2)
+    return np.asarray(np.swapaxes(basis, -1, -2) @ _stretch_matrices(components.mesh) @ basis)
+
+
+def _stretch_matrices(mesh: Mesh) -> Array:
+    n = mesh.points.shape[1]
+    matrices = np.empty((mesh.taut.size, 2 * n, 2 * n))
+    stretch_matrices(mesh.table, mesh.omega, lobatto(), mesh.points, matrices)
+    return matrices

@@ -1,0 +1,244 @@
+"""Dynamic stiffness of cables at their platform ends, and damping."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from sagline.core.arguments import instance, optional
+from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.memory import check_memory
+from sagline.kernels import codes
+from sagline.kernels.dynamics import collocation
+from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.strings import Strings, strings_of
+
+
+@dataclass(frozen=True, slots=True)
+class Damping:
+    """What takes energy out of a vibration; none unless told otherwise.
+
+    Attributes:
+        loss_time: Eta of the cables' stretch [s], >= 0: at the angular frequency omega EA becomes EA (1 + i omega eta)
+            (Kelvin-Voigt).
+        air_damping: Force on a cable against its velocity, a length [N s/m^2], >= 0.
+        modal_damping: Damping ratio of every mode, on top of the others, >= 0, < 1.
+
+    Raises:
+        InvalidValueError: If a value is out of its range.
+
+    Source:
+        docs/vibration.md.
+    """
+
+    loss_time: float = 0.0
+    air_damping: float = 0.0
+    modal_damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name, unit in (("loss_time", "s"), ("air_damping", "N s/m^2"), ("modal_damping", "")):
+            object.__setattr__(self, name, number(getattr(self, name), name, unit, low=0.0))
+        if self.modal_damping >= 1.0:
+            step = "Give the ratio, 0.01 for 1 %."
+            raise InvalidValueError("modal_damping", f"{self.modal_damping:g}", "< 1", step)
+
+
+EXACT = 0.45 * np.pi  # phase of a transverse wave in an element [rad]
+Complex = NDArray[np.complex128]
+_BYTES = 400.0  # a cable and frequency
+
+
+def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> Complex:
+    """Force on the platform end of every cable by its displacement, while it vibrates about an equilibrium.
+
+    Exact about the elastic catenary, in its plane and out of it, from taut string to deep sag; the frame end is held,
+    or on what gives way behind it. At frequency zero it is that of `stiffness`.
+
+    Args:
+        state: An equilibrium, a single one.
+        frequency: [Hz], >= 0, shape (F,) or a single one.
+        damping: What takes energy out of the vibration; None: nothing. Its modal_damping is a loss factor twice as
+            large of all stiffness, which damps every mode by that ratio at its own frequency.
+
+    Returns:
+        Complex array of shape (F, m, 3, 3), or (m, 3, 3) [N/m], world axes; NaN for cables that hang folded or slack,
+        which have no linear vibration.
+
+    Raises:
+        InvalidValueError: If the state is no single Equilibrium with lengths, of exact or elastic cables; if a
+            frequency is negative, or so high that a cable would hold more than a hundred thousand waves.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), pose)
+        >>> still, moving = sl.dynamic_stiffness(plan.state, [0.0, 4.0])[:, 0]
+        >>> print(still[0, 0].real.round(), moving[0, 0].real.round(), "N/m")
+        36202.0 47220.0 N/m
+
+    Source:
+        docs/model.md, section 11.
+    """
+    one_state(state)
+    given = checked(frequency, "frequency", "Hz", low=0.0)
+    if given.ndim > 1:
+        raise InvalidValueError("frequency", f"of shape {given.shape}", "one frequency or a list", "Flatten it.")
+    optional(damping, Damping, "damping")
+    check_lengths(state)
+    cables = state.cables.shape[-1]
+    check_memory(f"{given.size:,} frequencies", _BYTES * given.size * cables, "Take them in parts.")
+    found = moving_stiffness(strings_of(state), given.reshape(-1), damping)
+    found += cable_slopes(state).blocks
+    return locked(found if given.ndim else found[0])
+
+
+def one_state(state: Equilibrium) -> Equilibrium:
+    """A single equilibrium, as it is.
+
+    Args:
+        state: What was given.
+
+    Returns:
+        The state.
+
+    Raises:
+        InvalidValueError: If it is none, or a batch.
+    """
+    if instance(state, Equilibrium, "state").pose.shape:
+        step = "Take the poses one by one, state[i]; frequency_map takes many."
+        raise InvalidValueError("state", f"a batch of {len(state)}", "a single equilibrium", step)
+    check_model(state)
+    return state
+
+
+def check_lengths(state: Equilibrium) -> None:
+    """Refuse a state at which nothing hangs.
+
+    Args:
+        state: A single equilibrium.
+
+    Raises:
+        InvalidValueError: If it has no lengths, as that of a pose that is not feasible.
+    """
+    if np.isnan(state.unstrained_length).any():
+        raise InvalidValueError(
+            "state", "one without lengths", "a state that was solved", "See the status of the plan."
+        )
+
+
+def check_model(state: Equilibrium) -> None:
+    """Refuse what has no vibrations of its own: shallow models' forces have no energy, straight cables no stretch.
+
+    Args:
+        state: An equilibrium.
+
+    Raises:
+        InvalidValueError: If its cables are neither exact nor elastic.
+    """
+    model = state.cables.model
+    if model.code not in (codes.CATENARY, codes.ELASTIC):
+        step = "Solve the pose with Catenary(), the default."
+        raise InvalidValueError("the state's cable model", type(model).__name__, "Catenary, Elastic", step)
+
+
+def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
+    """What is added to the stiffness at rest of the cables of one state.
+
+    Args:
+        strings: Of one state, with a leading axis 1.
+        frequency: [Hz], shape (F,).
+        damping: What takes energy out, or None.
+
+    Returns:
+        Shape (F, m, 3, 3) [N/m], world axes; NaN for cables that are not taut.
+
+    Raises:
+        InvalidValueError: If a frequency is too high.
+    """
+    waves = waves_of(frequency, damping)
+    kind = np.float64 if damping is None else np.complex128
+    m = strings.table.shape[1]
+    found = np.full((1, frequency.size, m, collocation.FOUND), np.nan, dtype=kind)
+    taut = np.flatnonzero(strings.taut[0])
+    part = np.empty((1, frequency.size, taut.size, collocation.FOUND), dtype=kind)
+    counts = np.empty((*part.shape[:-1], 2), dtype=np.int64)
+    room = np.empty(collocation.ROOM, dtype=kind)
+    real = waves if damping is not None else np.ascontiguousarray(waves.real)
+    dynamic_stiffnesses(np.ascontiguousarray(strings.table[:, taut]), real, EXACT, room, part, counts)
+    check_counts(counts, frequency)
+    found[:, :, taut] = part
+    return in_world(found[0], strings.axes[0])
+
+
+def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
+    """Refuse a frequency for which a cable has too many elements, or none that does.
+
+    Args:
+        counts: As kernels fill them, shape (1, F, m, 2).
+        frequency: [Hz], shape (F,).
+
+    Raises:
+        InvalidValueError: If there are too many.
+        SaglineError: If there is none.
+    """
+    high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
+    if high.size:
+        value = f"{frequency[high[0]]:g} Hz, which would cut a cable into more than {collocation.MOST_ELEMENTS:,} waves"
+        raise InvalidValueError("frequency", value, "a lower one", "Give one nearer to the robot's own.")
+    if (lost := np.flatnonzero((counts < 0).any(axis=(0, 2, 3)))).size:
+        text = f"at {frequency[lost[0]]:g} Hz a cable has no elements whose joints are clear of its nodes"
+        raise SaglineError(f"{text}. Ask for another frequency, and report the robot and its pose.")
+
+
+def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
+    """Stiffness in the planes of cables, and normal to them, in the world.
+
+    Args:
+        found: XX, XZ, ZZ, YY, shape (F, m, FOUND).
+        axes: Of the cables, shape (m, 3, 3).
+
+    Returns:
+        Shape (F, m, 3, 3).
+    """
+    xx, xz, zz, yy = np.moveaxis(found, -1, 0)[..., None, None]
+    level, normal, up = np.moveaxis(axes, 1, 0)
+    across = level[:, :, None] * up[:, None, :]
+    return np.asarray(
+        xx * (level[:, :, None] * level[:, None, :])
+        + xz * (across + np.swapaxes(across, -1, -2))
+        + zz * (up[:, :, None] * up[:, None, :])
+        + yy * (normal[:, :, None] * normal[:, None, :]),
+        dtype=np.complex128,
+    )
+
+
+def waves_of(frequency: Array, damping: Damping | None) -> Complex:
+    """Frequencies as kernels take them, with what takes energy out.
+
+    Args:
+        frequency: [Hz], shape (F,).
+        damping: What does, or None.
+
+    Returns:
+        Shape (1, F, WAVE_COLUMNS).
+    """
+    omega = 2.0 * np.pi * frequency
+    waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)
+    waves[0, :, collocation.OMEGA], waves[0, :, collocation.SQUARE] = omega, omega**2
+    waves[0, :, collocation.DRAG] = 0.0 if damping is None else 1j * omega * damping.air_damping
+    waves[0, :, collocation.ACROSS] = 1.0 / _loss(damping)
+    stretch = 1.0 if damping is None else 1.0 + 1j * omega * damping.loss_time
+    waves[0, :, collocation.ALONG] = waves[0, :, collocation.ACROSS] / stretch
+    return waves
+
+
+def _loss(damping: Damping | None) -> complex:
+    """What the modal damping makes of all stiffness."""
+    return 1.0 if damping is None else 1.0 + 2j * damping.modal_damping

@@ -1,0 +1,220 @@
+"""Derivatives of the flexibility of hanging cables by force, length and material: third order of their energy."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.core.arrays import Array, Flags
+from sagline.robot.equilibrium import Equilibrium
+
+_SMOOTH = 0.1  # of u = w L/(N_A + N_B): up to there twelve points integrate to the last digit
+_POINTS, _SHARES = (0.5 * np.array(values) for values in np.polynomial.legendre.leggauss(12))
+_ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
+
+
+class Flexibility(NamedTuple):
+    """Derivatives of the flexibility of every cable, a symmetric matrix [m/N], in world axes.
+
+    Attributes:
+        by_force: By the force on the platform end, symmetric in all three axes [m/N^2], shape (..., m, 3, 3, 3).
+        by_length: By the unstrained length, which enters at the frame end [1/N], shape (..., m, 3, 3).
+        by_density: By the linear density [m^2/(N kg)], shape (..., m, 3, 3).
+        by_stiffness: By the axial stiffness [m/N^2], shape (..., m, 3, 3).
+        stretch: Integral of t t^T/EA ds, t the tangent: the part that is stretch [m/N], shape (..., m, 3, 3).
+    """
+
+    by_force: Array
+    by_length: Array
+    by_density: Array
+    by_stiffness: Array
+    stretch: Array
+
+
+class _Hung(NamedTuple):
+    """Cables in their planes, fields of shape (..., m).
+
+    Attributes:
+        h: Horizontal force [N].
+        a: Vertical force at the frame end [N].
+        b: Vertical force at the platform end [N].
+        size_a: Tension at the frame end [N].
+        size_b: Tension at the platform end [N].
+        weight: A length [N/m].
+        length: [m].
+    """
+
+    h: Array
+    a: Array
+    b: Array
+    size_a: Array
+    size_b: Array
+    weight: Array
+    length: Array
+
+    @property
+    def product(self) -> Array:
+        return self.size_a * self.size_b
+
+    @property
+    def slope(self) -> Array:
+        """(N_B - N_A)/(w L)."""
+        return (self.a + self.b) / (self.size_a + self.size_b)
+
+    @property
+    def smooth(self) -> Flags:
+        """Whether the force hardly changes along the cable."""
+        return self.weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
+
+
+def flexibility(state: Equilibrium, force: Array) -> Flexibility:
+    """How the flexibility of hanging cables changes, from where they leave the frame to their platform ends.
+
+    Args:
+        state: A state of exact or weightless cables, single or N.
+        force: On their platform ends, world axes [N], shape (..., m, 3).
+
+    Returns:
+        The derivatives: zero for a cable without force, not finite for one that hangs folded.
+    """
+    cables = state.cables
+    length = cables.unstrained_length
+    stiffness = np.broadcast_to(cables.cable.axial_stiffness, length.shape)
+    gravity = 0.0 if cables.model.weightless else cables.gravity
+    weight = gravity * np.broadcast_to(cables.cable.linear_density, length.shape)
+    level, vertical = cables.horizontal_tension, cables.vertical_force
+    below = vertical - weight * length
+    hung = _Hung(level, below, vertical, np.hypot(level, below), np.hypot(level, vertical), weight, length)
+    axes = _axes(force)
+    slack = (hung.size_b == 0.0) & (weight == 0.0)
+    with np.errstate(all="ignore"):
+        by_force, by_weight, outer = _by_force(hung), _by_weight(hung), _outer(hung)
+        by_length = _turning(level, below, hung.size_a) + (np.eye(3) / stiffness[..., None, None])
+
+    def world(matrix: Array) -> Array:
+        held = np.where(slack[..., None, None], 0.0, matrix)
+        turned: Array = np.swapaxes(axes, -1, -2) @ held @ axes
+        return turned
+
+    by_force = np.where(slack[..., None, None, None], 0.0, by_force)
+    return Flexibility(
+        by_force=np.einsum("...abc,...ai,...bj,...ck->...ijk", by_force, axes, axes, axes, optimize=True),
+        by_length=world(by_length),
+        by_density=gravity * world(by_weight),
+        by_stiffness=world(np.eye(3) * (-length / stiffness**2)[..., None, None]),
+        stretch=world(outer / stiffness[..., None, None]),
+    )
+
+
+def _axes(force: Array) -> Array:
+    """Directions along a cable's span, across it and up, as rows, (..., m, 3, 3); any where the force is vertical."""
+    level = np.hypot(force[..., 0], force[..., 1])
+    vertical = level == 0.0
+    x = np.where(vertical, 1.0, force[..., 0]) / np.where(vertical, 1.0, level)
+    y = np.where(vertical, 0.0, force[..., 1]) / np.where(vertical, 1.0, level)
+    axes = np.zeros((*force.shape, 3))
+    axes[..., _ALONG, 0], axes[..., _ALONG, 1] = x, y
+    axes[..., _ACROSS, 0], axes[..., _ACROSS, 1] = -y, x
+    axes[..., _UP, 2] = 1.0
+    return axes
+
+
+def _turning(h: Array, v: Array, size: Array) -> Array:
+    """(1 - t t^T)/N where the force is (h, 0, v), shape (..., 3, 3)."""
+    force = np.stack((h, np.zeros_like(h), v), axis=-1)
+    unit = force / size[..., None]
+    found: Array = (np.eye(3) - unit[..., :, None] * unit[..., None, :]) / size[..., None, None]
+    return found
+
+
+def _by_force(hung: _Hung) -> Array:
+    """Integral of dC/df, (..., 3, 3, 3)."""
+    h, a, b, product = hung.h, hung.a, hung.b, hung.product
+    sine_a, sine_b = a / hung.size_a, b / hung.size_b
+    turned = _turned(hung)
+    lifted = -hung.length * hung.slope / product
+    cubes = (hung.size_a**2 + product + hung.size_b**2) / product**3
+    steep = hung.length * hung.slope * cubes  # -(N_B^-3 - N_A^-3)/w
+    mean = 0.5 * hung.length * (hung.size_a**-3 + hung.size_b**-3)
+    return _symmetric(
+        {
+            (_ALONG, _ALONG, _ALONG): -turned * (sine_b**2 + sine_b * sine_a + sine_a**2),
+            (_ALONG, _ALONG, _UP): lifted + h**2 * steep,
+            (_ALONG, _UP, _UP): -h * (mean - 0.5 * (a + b) * steep),
+            (_UP, _UP, _UP): -(h**2) * steep,
+            (_ALONG, _ACROSS, _ACROSS): -turned,
+            (_ACROSS, _ACROSS, _UP): lifted,
+        }
+    )
+
+
+def _turned(hung: _Hung) -> Array:
+    """Integral of h/N^3, (sine_b - sine_a)/(h w), written so that it does not cancel."""
+    cosine = (hung.h**2 + hung.a * hung.b) / hung.product
+    near = hung.length / hung.product * hung.h * (1.0 / hung.size_a + 1.0 / hung.size_b) / (1.0 + cosine)
+    far = (hung.b / hung.size_b - hung.a / hung.size_a) / (hung.h * hung.weight)
+    return np.where(cosine > 0.0, near, far)
+
+
+def _by_weight(hung: _Hung) -> Array:
+    """Derivative by the weight a length at fixed force on the platform end, (..., 3, 3)."""
+    h, product = hung.h, hung.product
+    lifted = -hung.length * hung.slope / product
+    turned = _turned(hung)
+    across = 2.0 * np.arctanh(hung.weight * hung.length / (hung.size_a + hung.size_b)) / hung.weight
+    whole = _plane_of(across - h * turned, across, h * lifted, h * turned)  # the part of the flexibility without EA
+    force = np.stack((h, np.zeros_like(h), hung.b), axis=-1)
+    # that part is homogeneous in force and weight, of degree -1
+    steep = -(whole + np.einsum("...abc,...c->...ab", _by_force(hung), force)) / hung.weight[..., None, None]
+    size, h, v, below = _points(hung)
+    drop = -v / size**3
+    even = _plane_of(
+        drop * (1.0 - 3.0 * (h / size) ** 2),
+        drop,
+        -h / size**3 * (1.0 - 3.0 * (v / size) ** 2),
+        3.0 * drop * (h / size) ** 2,
+    )
+    return _chosen(hung, -np.einsum("...p,...pab->...ab", below * hung.length[..., None] * _SHARES, even), steep)
+
+
+def _outer(hung: _Hung) -> Array:
+    """Integral of t t^T, (..., 3, 3)."""
+    none, length = np.zeros_like(hung.h), hung.length
+    turned = np.arctan2(hung.h * hung.weight * length, hung.h**2 + hung.a * hung.b)
+    level = hung.h * turned / hung.weight
+    mixed = hung.h * np.log(hung.size_b / hung.size_a) / hung.weight
+    steep = _plane_of(level, none, mixed, length - level)
+    size, h, v, _ = _points(hung)
+    even = _plane_of((h / size) ** 2, np.zeros_like(v), h * v / size**2, (v / size) ** 2)
+    return _chosen(hung, np.einsum("...p,...pab->...ab", length[..., None] * _SHARES, even), steep)
+
+
+def _points(hung: _Hung) -> tuple[Array, Array, Array, Array]:
+    """Tension, horizontal and vertical force at points of integration, and the length below them, (..., P)."""
+    below = (0.5 - _POINTS) * hung.length[..., None]
+    v = hung.b[..., None] - hung.weight[..., None] * below
+    h = np.broadcast_to(hung.h[..., None], v.shape)
+    return np.hypot(h, v), h, v, below
+
+
+def _chosen(hung: _Hung, even: Array, steep: Array) -> Array:
+    return np.where(hung.smooth[..., None, None], even, steep)
+
+
+def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:
+    """Matrices (..., 3, 3) without coupling between the plane and across it."""
+    whole = np.zeros((*along.shape, 3, 3))
+    whole[..., _ALONG, _ALONG], whole[..., _ACROSS, _ACROSS], whole[..., _UP, _UP] = along, across, up
+    whole[..., _ALONG, _UP] = whole[..., _UP, _ALONG] = mixed
+    return whole
+
+
+def _symmetric(parts: dict[tuple[int, int, int], Array]) -> Array:
+    """A tensor that is symmetric in all three axes, from one of each of its elements that are equal."""
+    whole = np.zeros((*next(iter(parts.values())).shape, 3, 3, 3))
+    for place, values in parts.items():
+        for turned in permutations(place):
+            whole[..., turned[0], turned[1], turned[2]] = values
+    return whole

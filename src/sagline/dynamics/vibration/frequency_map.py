@@ -1,0 +1,179 @@
+"""Lowest frequency and peak receptance of a robot over many poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.core.arguments import callback, instance, optional
+from sagline.core.arrays import Array, Codes, locked, number
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.progress import Progress, blocks
+from sagline.core.results import Result, Saved
+from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model
+from sagline.dynamics.vibration.receptance import Answer, coupled, strongest, summed
+from sagline.dynamics.vibration.robot_modes import Found, Setting, cable_shares, loss, massless, modes_of, setting_of
+from sagline.dynamics.vibration.vibration import VibrationStatus
+from sagline.kinematics.inverse import inverse
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.stiffness import compliance_of
+from sagline.tension.method import TensionMethod
+from sagline.tension.methods import Closest
+
+BLOCK: Final = 16  # poses at once: a twentieth of a second, after which an interrupt is heard
+_CLOSEST: Final = Closest()
+_ONE_PERCENT: Final = Damping(modal_damping=0.01)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrequencyMap(Result, Saved):
+    """Result of `frequency_map` at N poses.
+
+    Numbers are NaN where the status is neither SOLVED nor FOLDED; frequencies also where no mode lies below up_to.
+
+    Attributes:
+        robot: The robot.
+        pose: The poses, a batch of N.
+        up_to: Frequency below which modes are found [Hz].
+        damping: What takes energy out.
+        status: Codes of `VibrationStatus`, shape (N,).
+        frequency: Lowest, with cable mass [Hz], shape (N,).
+        massless_frequency: Lowest of the platform on cables whose mass does not swing [Hz], shape (N,).
+        platform_share: Of the lowest mode with cable mass, shape (N,).
+        peak: Strongest answer, at rest or near a mode below up_to: displacement of the center of mass for a force on
+            it, in the direction that it answers to most, as of `frequency_response` [m/N], shape (N,); infinite
+            without damping.
+        peak_frequency: Where that is [Hz], shape (N,).
+    """
+
+    robot: Robot
+    pose: Pose
+    up_to: float
+    damping: Damping
+    status: Codes
+    frequency: Array
+    massless_frequency: Array
+    platform_share: Array
+    peak: Array
+    peak_frequency: Array
+
+
+def frequency_map(
+    robot: Robot,
+    poses: Pose,
+    *,
+    up_to: float,
+    tension: TensionMethod = _CLOSEST,
+    damping: Damping | None = _ONE_PERCENT,
+    progress: Progress | None = None,
+) -> FrequencyMap:
+    """Lowest frequency and strongest answer of a robot at many poses, cables with mass.
+
+    Each pose as by `vibration`: all modes below up_to, their number proved by the exact count.
+
+    Args:
+        robot: The robot.
+        poses: A batch of N.
+        up_to: Frequency below which modes are wanted [Hz], > 0.
+        tension: How the load is shared among redundant cables, as in `inverse`.
+        damping: What takes energy out, for the strongest answer; a modal damping of 1 % unless told otherwise; None:
+            nothing.
+        progress: Called after every few poses: how many are done, of how many.
+
+    Returns:
+        FrequencyMap.
+
+    Raises:
+        InvalidValueError: If an argument is none of its kind, up_to is not positive, or too many modes lie below it.
+        SaglineError: If modes and count disagree; the message names the pose.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> poses = sl.Pose.from_euler([[0, 0, 2], [3, 2, 2]], 0, 0, 0)
+        >>> found = sl.frequency_map(sl.load_robot("cogiro"), poses, up_to=5.0)
+        >>> print(found.frequency.round(2), "Hz with cable mass")
+        [3.7  2.25] Hz with cable mass
+        >>> print(found.massless_frequency.round(2), "Hz massless")
+        [3.85 4.19] Hz massless
+
+    Source:
+        docs/model.md, section 11.
+    """
+    instance(robot, Robot, "robot")
+    if not instance(poses, Pose, "poses").shape:
+        raise InvalidValueError("poses", "a single pose", "a batch of them", "For one pose use vibration.")
+    limit = number(up_to, "up_to", "Hz", above=0.0)
+    known = optional(damping, Damping, "damping") or Damping()
+    told = callback(progress, "progress")
+    state = inverse(robot, poses, tension=tension).state
+    check_model(state)
+    status = np.full(len(poses), VibrationStatus.NO_LENGTHS, dtype=np.int8)
+    found = np.full((len(_Row._fields), len(poses)), np.nan)
+    for part in blocks(len(poses), BLOCK, told):
+        own = state[part]
+        setting = setting_of(own)
+        for k in range(len(own)):
+            index = part.start + k
+            status[index], lowest = _status(setting, k)
+            if status[index] not in (VibrationStatus.SOLVED, VibrationStatus.FOLDED):
+                continue
+            try:
+                found[:, index] = _row(own, setting, k, limit, known)
+            except SaglineError as error:
+                raise _at_pose(index, error) from None
+            found[1, index] = lowest
+    return FrequencyMap(robot, poses, limit, known, locked(status), *(locked(row) for row in found))
+
+
+class _Row(NamedTuple):
+    """Numbers of one pose, as in `FrequencyMap`."""
+
+    frequency: float
+    massless_frequency: float
+    platform_share: float
+    peak: float
+    peak_frequency: float
+
+
+def _status(setting: Setting, row: int) -> tuple[VibrationStatus, float]:
+    """And the lowest frequency on massless cables [Hz]."""
+    if np.isnan(setting.stiffness[row]).any():
+        return VibrationStatus.NO_LENGTHS, np.nan
+    frequency, leaving = massless(setting, row)
+    if leaving.shape[1]:
+        return VibrationStatus.UNSTABLE, np.nan
+    taut = setting.strings.taut[row].all()
+    return VibrationStatus.SOLVED if taut else VibrationStatus.FOLDED, float(frequency[0])
+
+
+def _row(state: Equilibrium, setting: Setting, row: int, up_to: float, damping: Damping) -> _Row:
+    freedom = setting.freedom
+    rest = compliance_of(freedom, setting.stiffness[row])[:3, :3]
+    found = modes_of(setting, row, up_to)
+    if not found.number:
+        return _Row(np.nan, np.nan, np.nan, float(np.linalg.norm(rest, 2)), 0.0)
+    first = found.platform[:, 0]
+    answer = summed(found, rest, damping.modal_damping)
+    if damping.loss_time > 0.0 or damping.air_damping > 0.0:
+        slopes = cable_slopes(state[row])
+        answer = coupled(Answer(setting.at(row), slopes.matrix, slopes.blocks, damping), up_to)
+    peak, at = strongest(answer, found.frequency, _ratios(state, setting, row, found, damping), damping)
+    return _Row(float(found.frequency[0]), np.nan, float(first @ setting.mass[row] @ first), peak, at)
+
+
+def _ratios(state: Equilibrium, setting: Setting, row: int, found: Found, damping: Damping) -> Array:
+    shares = cable_shares(setting, row, found) if damping.air_damping > 0.0 else np.zeros((0, found.number))
+    density = state.one_robot.cables.linear_density[: len(shares)]
+    return loss(density, found, shares, damping)
+
+
+def _at_pose(index: int, error: SaglineError) -> SaglineError:
+    if isinstance(error, InvalidValueError):
+        return InvalidValueError(f"pose {index}: {error.item}", error.value, error.allowed, error.next_step)
+    return SaglineError(f"pose {index}: {error}")

@@ -1,0 +1,191 @@
+"""Sensitivities of natural frequencies to lengths, cable data, mass, inertia, pose and wrench."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sagline.cables.models import Catenary, Elastic
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, Flags, Indices, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
+from sagline.dynamics.vibration.dynamic_stiffness import check_lengths
+from sagline.dynamics.vibration.flexibility import Flexibility, flexibility
+from sagline.dynamics.vibration.mode_sensitivities import (
+    Rest,
+    Slopes,
+    Swings,
+    cables_of_state,
+    rest_of,
+    slopes_of,
+    swings_of,
+)
+from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.stiffness import modes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrequencySlopes(Result):
+    """Result of `frequency_slopes`: derivatives of K frequencies, the platform settling in its new equilibrium.
+
+    All else is held: the lengths off the drums, the wrench. Where the lengths are to follow a pose, by a way of
+    sharing, add length_sensitivity times what they change by.
+
+    Frequencies that are one frequency have no derivative each: where a datum grows they part, by what stands in their
+    rows, ascending; where it shrinks the same apart from the sign. The mean over them has their mean as derivative.
+
+    Attributes:
+        state: The state.
+        cable_mass: Whether the cables' mass swings; if not, the frequencies are massless ones.
+        frequency: [Hz], shape (K,).
+        group: Which frequencies are one: those of the same number, shape (K,).
+        length_sensitivity: By the length of each cable, shape (K, m) [Hz/m].
+        density_sensitivity: By the linear density of each cable, its weight included, shape (K, m) [Hz m/kg].
+        stiffness_sensitivity: By the axial stiffness of each cable, shape (K, m) [Hz/N].
+        mass_sensitivity: By the mass, its weight included, the inertia held, shape (K,) [Hz/kg].
+        inertia_sensitivity: By the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]: the sum over its elements
+            times a symmetric change.
+        pose_sensitivity: By (displacement of the center of mass, rotation vector), world axes, at fixed lengths, the
+            wrench being what holds the platform there, shape (K, 6) [Hz/m, Hz/rad].
+        wrench_sensitivity: By the wrench about the center of mass, world axes, shape (K, 6) [Hz/N, Hz/(N m)].
+    """
+
+    state: Equilibrium
+    cable_mass: bool
+    frequency: Array
+    group: Indices
+    length_sensitivity: Array
+    density_sensitivity: Array
+    stiffness_sensitivity: Array
+    mass_sensitivity: Array
+    inertia_sensitivity: Array
+    pose_sensitivity: Array
+    wrench_sensitivity: Array
+
+
+def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> FrequencySlopes:
+    """How every natural frequency follows what the robot is made of and how it is held; all analytic.
+
+    Args:
+        state: An equilibrium, a single one, for the massless frequencies, those of `modes`; or a vibration, for those
+            with cable mass. Cables are exact or weightless ones that hang from their anchors.
+        together: Relative difference up to which neighboring frequencies count as one.
+
+    Returns:
+        FrequencySlopes; NaN where a frequency is none.
+
+    Raises:
+        InvalidValueError: If the state is neither (of a plan: plan.state), a batch, one without lengths, of shallow
+            cables, or of cables with something behind them; if the vibration was not solved.
+
+    Examples:
+        Which cable to stiffen for a higher first frequency, massless, and how a heavier platform lowers it:
+
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> slopes = sl.frequency_slopes(plan.state)
+        >>> print(slopes.stiffness_sensitivity[0].argmax())
+        5
+        >>> print(f"{slopes.mass_sensitivity[0]:.4f} Hz/kg")
+        -0.0196 Hz/kg
+
+    Source:
+        docs/model.md, section 11.
+    """
+    together = number(together, "together", "", low=0.0)
+    if isinstance(state, Vibration):
+        return _with_cable_mass(state, together)
+    rest = _rest(instance(state, Equilibrium, "state"))
+    found, flexible = modes(state), flexibility(state, rest.slopes.force)
+    groups = list(_groups(found.frequency, together))
+    swings = (_massless(rest, flexible, found.shape[:, k], _square(found.frequency[k])) for k in groups)
+    return _result(state, False, found.frequency, groups, [slopes_of(rest, one) for one in swings])
+
+
+def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
+    if vibration.status is not VibrationStatus.SOLVED:
+        told = f"one whose status is {vibration.status.name}"
+        raise InvalidValueError("state", told, "a vibration that was solved", "Take the state itself, massless.")
+    rest = _rest(vibration.state)
+    cables, groups = cables_of_state(rest), list(_groups(vibration.frequency, together))
+    slopes = [slopes_of(rest, swings_of(rest, cables, vibration.frequency[group])) for group in groups]
+    return _result(vibration.state, True, vibration.frequency, groups, slopes)
+
+
+def _rest(state: Equilibrium) -> Rest:
+    if state.pose.shape:
+        raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", "Take one of them: state[0].")
+    model = state.cables.model
+    if not isinstance(model, Catenary | Elastic):
+        value, allowed = f"one of cables of {type(model).__name__}", "of Catenary or Elastic, which have an energy"
+        raise InvalidValueError("state", value, allowed, "Solve it with model=Catenary().")
+    if state.contact is not None:
+        value, allowed = "one of cables with something behind them", "cables that hang from their frame anchors"
+        raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
+    check_lengths(state)
+    return rest_of(state)
+
+
+def _groups(frequency: Array, together: float) -> Iterator[Indices]:
+    """Indices of neighbors that count as one frequency; the frequencies ascend."""
+    apart = ~(np.diff(frequency) <= together * frequency[1:])
+    borders = [0, *(np.flatnonzero(apart) + 1).tolist(), len(frequency)]
+    for first, last in pairwise(borders):
+        if last > first:
+            yield np.arange(first, last)
+
+
+def _square(frequency: Array) -> float:
+    return float((2.0 * np.pi * frequency.mean()) ** 2)
+
+
+def _massless(rest: Rest, flexible: Flexibility, motion: Array, square: float) -> Swings:
+    """Modes in which the force is the same all along a cable."""
+    ends = motion[:3].T + np.cross(motion[3:].T, rest.slopes.levers[:, None])
+    force = ends @ np.swapaxes(rest.slopes.blocks, -1, -2)
+    data = np.stack((flexible.by_length, flexible.by_density, flexible.by_stiffness))
+    return Swings(
+        motion,
+        square,
+        force,
+        np.einsum("mai,mbj,mijc->mabc", force, force, flexible.by_force, optimize=True),
+        np.einsum("mai,mbj,pmij->pmab", force, force, data, optimize=True),
+    )
+
+
+def _result(
+    state: Equilibrium, cable_mass: bool, frequency: Array, groups: list[Indices], slopes: list[Slopes]
+) -> FrequencySlopes:
+    def rows(forms: list[Array], *shape: int) -> Array:
+        parts = (_parting(form, frequency[group]) for form, group in zip(forms, groups, strict=True))
+        return locked(np.concatenate((np.empty((0, *shape)), *parts)))
+
+    m = state.one_robot.cable_count
+    return FrequencySlopes(
+        state=state,
+        cable_mass=cable_mass,
+        frequency=frequency,
+        group=locked(np.repeat(np.arange(len(groups)), np.array([len(group) for group in groups], dtype=int))),
+        length_sensitivity=rows([one.datum[0] for one in slopes], m),
+        density_sensitivity=rows([one.datum[1] for one in slopes], m),
+        stiffness_sensitivity=rows([one.datum[2] for one in slopes], m),
+        mass_sensitivity=rows([one.mass for one in slopes]),
+        inertia_sensitivity=rows([one.inertia for one in slopes], 3, 3),
+        pose_sensitivity=rows([one.pose for one in slopes], 6),
+        wrench_sensitivity=rows([one.wrench for one in slopes], 6),
+    )
+
+
+def _parting(form: Array, frequency: Array) -> Array:
+    """Derivatives of the frequencies of a group from those of their square, (..., g, g) to (g, ...)."""
+    known: Flags = np.asarray(np.isfinite(form).all(axis=(-1, -2)))
+    squares = np.linalg.eigvalsh(np.where(known[..., None, None], form, 0.0))
+    squares = np.where(known[..., None], squares, np.nan)
+    slopes: Array = np.moveaxis(squares, -1, 0) / (8.0 * np.pi**2 * frequency.mean())
+    return slopes

@@ -1,0 +1,263 @@
+"""The robot about a state as a linear system, for control design: A, B, C, D with names and units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import Array, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.dynamics.vibration.flexibility import flexibility
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
+from sagline.statics.stiffness import mass_matrix, modes
+
+if TYPE_CHECKING:
+    from scipy.signal import StateSpace
+
+Inputs: TypeAlias = Literal["lengths", "speeds"]
+
+_TINY = 1e-300
+_MOTIONS = (*(f"displacement {axis}" for axis in "xyz"), *(f"rotation {axis}" for axis in "xyz"))
+_MOTION_UNITS = ("m",) * 3 + ("rad",) * 3
+_WRENCHES = (*(f"force {axis}" for axis in "xyz"), *(f"moment {axis}" for axis in "xyz"))
+_WRENCH_UNITS = ("N",) * 3 + ("N m",) * 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearized(Result):
+    """Result of `linearized`: dx/dt = A x + B u, y = C x + D u, all deviations from a state; massless cables.
+
+    Motions are (displacement of the center of mass, rotation vector), wrenches act on the platform about its center of
+    mass; both in world axes. n is the number of free motions, m that of cables.
+
+    Attributes:
+        state: The state.
+        damping: What takes energy out.
+        A: Shape (X, X); X = 2 n, or 2 n + m with winch speeds as inputs.
+        B: Shape (X, m + 6).
+        C: Shape (6 + 2 m, X).
+        D: Shape (6 + 2 m, m + 6).
+        state_names: Of the X states.
+        input_names: Lengths of the cables off the drums, or their rates, then the wrench.
+        input_units: Of these.
+        output_names: Motion of the platform, tensions at the frame ends, lengths off the drums.
+        output_units: Of these.
+    """
+
+    state: Equilibrium
+    damping: Damping
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    state_names: tuple[str, ...]
+    input_names: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_names: tuple[str, ...]
+    output_units: tuple[str, ...]
+
+    @property
+    def poles(self) -> Any:
+        """Eigenvalues of A [rad/s], complex, shape (X,): i omega of the massless modes where nothing damps them."""
+        return locked(np.linalg.eigvals(self.A).astype(complex))
+
+    def state_space(self) -> StateSpace:
+        """The same as SciPy's, for its simulations, responses and controller design.
+
+        Returns:
+            A `scipy.signal.StateSpace`.
+        """
+        from scipy.signal import StateSpace  # takes a while to load
+
+        return StateSpace(self.A, self.B, self.C, self.D)
+
+
+class _Matrices(NamedTuple):
+    """A, B, C, D."""
+
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+
+
+class _Loss(NamedTuple):
+    """What a loss of the cables' stretch adds.
+
+    Attributes:
+        by_motion: Wrench of the cables against a velocity of the platform, shape (6, 6).
+        by_speed: The same for the rates of the lengths, shape (6, m).
+        tension_by_motion: Tension at the frame ends for a velocity of the platform, shape (m, 6).
+        tension_by_speed: The same for the rate of the cable's own length, shape (m,).
+    """
+
+    by_motion: Array
+    by_speed: Array
+    tension_by_motion: Array
+    tension_by_speed: Array
+
+
+def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Inputs = "lengths") -> Linearized:
+    """The robot about a state as a linear system, from winches and wrench to pose, tensions and lengths.
+
+    The cables have no mass of their own here: what is above the first string frequency is not the robot's (see
+    `vibration`). At rest the gains are the compliance and the sensitivities of `stiffness`, the poles are `modes`.
+
+    Args:
+        state: An equilibrium, a single one, from `inverse` or `forward`. An unstable one gives poles that grow.
+        damping: `loss_time` of the hanging cables' stretch, to first order in it, and `modal_damping`; none by default.
+        inputs: What the winches give: "lengths" off the drums, or "speeds", their rates, where lengths are states.
+
+    Returns:
+        The system.
+
+    Raises:
+        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state), a batch, or one without lengths; for
+            `air_damping`, which acts on cables with mass; for `loss_time` with "lengths" as inputs: tensions then
+            follow the speeds of the winches.
+
+    Examples:
+        Where 1 mm of cable 0, wound in, leaves the platform in the end:
+
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> plan = sl.inverse(sl.load_robot("cogiro"), sl.Pose((1.0, 0.5, 1.5), np.eye(3)))
+        >>> system = sl.linearized(plan.state, sl.Damping(modal_damping=0.01))
+        >>> gain = system.D - system.C @ np.linalg.solve(system.A, system.B)
+        >>> print(f"{system.output_names[2]} {1e3 * -1e-3 * gain[2, 0]:.3f} mm")
+        displacement z 0.303 mm
+
+    Source:
+        docs/model.md, section 11.
+    """
+    damping = Damping() if damping is None else instance(damping, Damping, "damping")
+    choice(inputs, "inputs", ("lengths", "speeds"))
+    _check(state, damping, inputs)
+    return _system(state, damping, inputs)
+
+
+def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
+    if instance(state, Equilibrium, "state").pose.shape:
+        raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", "Take one of them: state[0].")
+    if damping.air_damping:
+        value = f"{damping.air_damping:g} N s/m^2"
+        raise InvalidValueError("air_damping", value, "0, for cables without mass", "See vibration, or leave it out.")
+    if not damping.loss_time:
+        return
+    item, value = "loss_time", f"{damping.loss_time:g} s"
+    if state.contact is not None:
+        allowed, step = "0 where cables run over pulleys or have dead cable", "Give modal_damping instead."
+        raise InvalidValueError(item, value, allowed, step)
+    if inputs == "lengths":
+        allowed = '0 with inputs="lengths", at whose steps tensions would be infinite'
+        raise InvalidValueError(item, value, allowed, 'Take inputs="speeds", or give modal_damping.')
+
+
+def _system(state: Equilibrium, damping: Damping, inputs: Inputs) -> Linearized:
+    found = _driven_by_speeds(state, damping)
+    n, m = len(state.one_robot.freedom), state.one_robot.cable_count
+    free = [f"motion {k}" for k in range(n)]
+    lengths = tuple(f"length {k}" for k in range(m))
+    winches, unit = tuple(f"speed {k}" for k in range(m)), "m/s"
+    states = (*free, *(f"rate of {name}" for name in free), *lengths)
+    if inputs == "lengths":
+        found, states, winches, unit = _driven_by_lengths(found, 2 * n), states[: 2 * n], lengths, "m"
+    A, B, C, D = (locked(matrix) for matrix in found)
+    return Linearized(
+        state,
+        damping,
+        A,
+        B,
+        C,
+        D,
+        state_names=states,
+        input_names=(*winches, *_WRENCHES),
+        input_units=((unit,) * m + _WRENCH_UNITS),
+        output_names=(*_MOTIONS, *(f"tension {k}" for k in range(m)), *lengths),
+        output_units=(*_MOTION_UNITS, *("N",) * m, *("m",) * m),
+    )
+
+
+def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
+    """States are the free motions, their rates, and the lengths."""
+    robot, slopes = state.one_robot, _solved_slopes(state)
+    freedom, n, m = robot.freedom, len(robot.freedom), robot.cable_count
+    freed = np.linalg.inv(freedom @ mass_matrix(state) @ freedom.T) @ freedom  # from wrench to acceleration
+    tension, loss = tension_slopes(state, slopes), _loss(state, slopes, damping.loss_time)
+    drag = loss.by_motion + _modal_drag(state, damping.modal_damping)
+    size, outputs = 2 * n + m, 6 + 2 * m
+    place, speed, length, tensions = slice(0, n), slice(n, 2 * n), slice(2 * n, None), slice(6, 6 + m)
+    A, B = np.zeros((size, size)), np.zeros((size, m + 6))
+    C, D = np.zeros((outputs, size)), np.zeros((outputs, m + 6))
+    A[place, speed] = np.eye(n)
+    A[speed, place] = -freed @ slopes.matrix @ freedom.T
+    A[speed, speed] = -freed @ drag @ freedom.T
+    A[speed, length] = -freed @ on_platform(slopes.by_length, slopes.levers)
+    B[speed, :m], B[speed, m:] = -freed @ loss.by_speed, freed
+    B[length, :m] = np.eye(m)
+    C[:6, place] = freedom.T
+    C[tensions, place] = tension.by_motion @ freedom.T
+    C[tensions, speed] = loss.tension_by_motion @ freedom.T
+    C[tensions, length] = np.diag(tension.by_length)
+    C[6 + m :, length] = np.eye(m)
+    D[tensions, :m] = np.diag(loss.tension_by_speed)
+    return _Matrices(A, B, C, D)
+
+
+def _driven_by_lengths(found: _Matrices, size: int) -> _Matrices:
+    """The lengths as inputs, where nothing follows their rates."""
+    A, B, C, D = found
+    m = len(A) - size
+    return _Matrices(
+        A[:size, :size],
+        np.concatenate((A[:size, size:], B[:size, m:]), axis=1),
+        C[:, :size],
+        np.concatenate((C[:, size:], D[:, m:]), axis=1),
+    )
+
+
+def _solved_slopes(state: Equilibrium) -> CableSlopes:
+    slopes = cable_slopes(state)
+    if np.isfinite(slopes.matrix).all():
+        return slopes
+    step = "See the status of the plan; straight cables have no stiffness: take another model."
+    raise InvalidValueError("state", "one without lengths or stiffness", "a state that was solved", step)
+
+
+def _loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> _Loss:
+    """What a loss of the stretch does, to first order: K(omega) = K + i omega eta K S K, S the part that is stretch."""
+    m = state.one_robot.cable_count
+    if not loss_time:
+        return _Loss(np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m))
+    follows = loss_time * slopes.blocks @ flexibility(state, slopes.force).stretch
+    per_motion = follows @ slopes.blocks  # N s/m, of the platform ends
+    per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # what is wound off need not stretch
+    if not np.isfinite(per_motion).all():
+        step = "Give modal_damping instead, or tighten the cable."
+        raise InvalidValueError("state", "one with a folded cable", "cables that stretch, for loss_time", step)
+    unit = np.eye(6)
+    ends = unit[:, :3] + np.cross(unit[:, 3:], slopes.levers[:, None, :])
+    forces = ends @ np.swapaxes(per_motion, -1, -2)
+    by_motion = np.stack([on_platform(forces[:, k], slopes.levers).sum(axis=-1) for k in range(6)], axis=-1)
+    at_frame = slopes.force - np.array([0.0, 0.0, 1.0]) * state.cables.cable_weight[..., None]
+    direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
+    return _Loss(
+        by_motion,
+        on_platform(per_speed, slopes.levers),
+        np.einsum("ia,ika->ik", direction, forces),
+        np.einsum("ia,ia->i", direction, per_speed),
+    )
+
+
+def _modal_drag(state: Equilibrium, ratio: float) -> Array:
+    """Drag on the platform that damps every massless mode by the same ratio, shape (6, 6); unstable ones by nothing."""
+    found, mass = modes(state), mass_matrix(state)
+    momenta = mass @ found.shape
+    drag: Array = momenta * (2.0 * ratio * 2.0 * np.pi * np.nan_to_num(found.frequency)) @ momenta.T
+    return drag

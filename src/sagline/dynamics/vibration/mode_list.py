@@ -1,0 +1,183 @@
+"""List of modes for reading, and displacements of cables without inertia."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.core.arrays import Array
+from sagline.dynamics.vibration.flexibility import flexibility
+from sagline.dynamics.vibration.vibration import Vibration
+from sagline.kernels.dynamics import string as columns
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.stiffness import Modes, modes
+from sagline.statics.strings import Strings, strings_of
+
+_TINY = np.finfo(float).tiny
+
+
+def end_motions(state: Equilibrium, shape: Array) -> Array:
+    """Displacement of the platform ends in motions of the platform.
+
+    Args:
+        state: A single state.
+        shape: Motions (displacement of the center of mass, rotation vector), one a column, shape (6, n).
+
+    Returns:
+        Shape (m, 3, n).
+    """
+    robot = state.one_robot
+    levers = state.pose.transform(robot.platform_anchors) - state.pose.transform(robot.center_of_mass)
+    turned = np.cross(shape[3:].T, levers[:, None])  # (m, n, 3)
+    return np.asarray(shape[:3] + np.swapaxes(turned, 1, 2))
+
+
+def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:
+    """Damping ratio that the loss in the cables' stretch gives each massless mode, to first order.
+
+    Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
+    hanging and behind their exits; the rest is in what they sag and swivel.
+
+    Args:
+        state: A single state.
+        platform: Its modes.
+        loss_time: Eta of the stretch [s].
+
+    Returns:
+        Shape (n,).
+
+    Source:
+        docs/model.md, section 11.
+    """
+    omega = 2.0 * np.pi * platform.frequency
+    if loss_time == 0.0:
+        return np.zeros_like(omega)
+    slopes, strings = cable_slopes(state), strings_of(state)
+    taut = strings.taut[0]
+    behind = _behind(strings)
+    compliance = flexibility(state, slopes.force).stretch + behind[:, :, None] * behind[:, None, :]
+    force = slopes.blocks @ end_motions(state, platform.shape)
+    energy = np.einsum("min,mij,mjn->n", force[taut], compliance[taut], force[taut])
+    return np.asarray(0.5 * omega * loss_time * energy / omega**2)
+
+
+def following(state: Equilibrium, ends: Array, count: int) -> Array:
+    """Displacement of the cables that follow their platform ends without inertia, to first order.
+
+    Args:
+        state: A single state.
+        ends: Displacement of the platform ends, shape (m, 3).
+        count: Points at equal steps of unstrained length, from where the cable leaves the frame to its platform end.
+
+    Returns:
+        Shape (m, count, 3); zero at a frame end that does not give way.
+    """
+    middles = (np.arange(count - 1) + 0.5) / (count - 1)
+    tangent, sag, stretch = _along(state, middles)
+    outer = tangent[..., :, None] * tangent[..., None, :]
+    slope = stretch[:, None, None, None] * outer + sag[..., None, None] * (np.eye(3) - outer)
+    strings = strings_of(state)
+    behind, normal = _behind(strings), strings.axes[0, :, 1]
+    swivels = strings.table[0, :, columns.BEHIND_Y, None, None] * normal[:, :, None] * normal[:, None, :]
+    exits = behind[:, :, None] * behind[:, None, :] + swivels
+    summed = exits[:, None] + np.concatenate((np.zeros_like(slope[:, :1]), np.cumsum(slope, axis=1) / len(middles)), 1)
+    force = np.linalg.solve(summed[:, -1], ends[..., None])
+    return np.asarray((summed @ force[:, None])[..., 0])
+
+
+def _behind(strings: Strings) -> Array:
+    """Direction in which what is behind each cable's exit gives way [sqrt(m/N)], world axes, (m, 3)."""
+    table, axes = strings.table[0], strings.axes[0]
+    return np.asarray(table[:, columns.BEHIND_X, None] * axes[:, 0] + table[:, columns.BEHIND_Z, None] * axes[:, 2])
+
+
+def _along(state: Equilibrium, place: Array) -> tuple[Array, Array, Array]:
+    """Unit tangents (m, s, 3) at shares of the length (s,), the length over what holds it across, and over EA.
+
+    Across its tangent a cable gives way by L (1/N + 1/EA), along it by L/EA [m/N].
+    """
+    cables, robot = state.cables, state.one_robot
+    length = cables.unstrained_length[:, None]
+    weight = np.zeros_like(length) if cables.model.weightless else cables.cable_weight[:, None]
+    up = cables.vertical_force[:, None] - weight * (1.0 - place)
+    along = np.broadcast_to(cables.horizontal_tension[:, None], up.shape)
+    run = (state.pose.transform(robot.platform_anchors) - state.exit_point)[:, :2]
+    level = run / np.maximum(np.linalg.norm(run, axis=1, keepdims=True), _TINY)
+    force = np.concatenate((along[..., None] * level[:, None], up[..., None]), axis=-1)
+    size = np.linalg.norm(force, axis=-1)
+    stretch = cables.unstrained_length / np.broadcast_to(cables.cable.axial_stiffness, cables.shape)
+    return force / size[..., None], length / size + stretch[:, None], stretch
+
+
+WITH_MASS, MASSLESS = "with cable mass", "massless"
+
+
+class ListedMode(NamedTuple):
+    """One mode.
+
+    Attributes:
+        number: From 1 on, among those of its kind.
+        kind: "with cable mass" or "massless".
+        frequency: [Hz].
+        platform_share: Share of the kinetic energy that is the platform's.
+        cable: The cable that has the largest share; None where no cable has any.
+        cable_share: Its share.
+        loss: Damping ratio.
+    """
+
+    number: int
+    kind: str
+    frequency: float
+    platform_share: float
+    cable: int | None
+    cable_share: float
+    loss: float
+
+    @property
+    def name(self) -> str:
+        """What it is asked for by: "1", "massless 1"."""
+        return f"{self.number}" if self.kind == WITH_MASS else f"{MASSLESS} {self.number}"
+
+    @property
+    def swings(self) -> str:
+        """What has the largest part in it, in words."""
+        if self.cable is None or self.platform_share >= self.cable_share:
+            return "platform"
+        return f"cable {self.cable}"
+
+
+def listed_modes(vibration: Vibration) -> list[ListedMode]:
+    """All modes with cable mass, then the massless ones, each ascending."""
+    most = np.argmax(vibration.cable_share, axis=0) if vibration.frequency.size else ()
+    swinging = [
+        ListedMode(
+            k + 1,
+            WITH_MASS,
+            float(vibration.frequency[k]),
+            float(vibration.platform_share[k]),
+            int(cable),
+            float(vibration.cable_share[cable, k]),
+            float(vibration.loss[k]),
+        )
+        for k, cable in enumerate(most)
+    ]
+    damping, platform = vibration.damping, modes(vibration.state)
+    losses = damping.modal_damping + stretch_losses(vibration.state, platform, damping.loss_time)
+    return swinging + [
+        ListedMode(k + 1, MASSLESS, float(frequency), 1.0, None, 0.0, float(losses[k]))
+        for k, frequency in enumerate(platform.frequency)
+        if np.isfinite(frequency)
+    ]
+
+
+def successors(vibration: Vibration) -> Array:
+    """For each massless mode the share of its motion that is found in each mode with cable mass, shape (n, K).
+
+    A share is the square of the mass-weighted product of both motions of the platform; over all modes, those beyond
+    `up_to` included, the shares of a massless mode sum to less than 1 by what the cables keep.
+    """
+    massless = modes(vibration.state).shape
+    mass = np.linalg.pinv(massless @ massless.T)
+    return np.asarray((massless.T @ mass @ vibration.shape) ** 2)

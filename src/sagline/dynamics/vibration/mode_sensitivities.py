@@ -1,0 +1,360 @@
+"""Sensitivities of squared angular frequencies, from the mode shapes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.core.arrays import Array
+from sagline.kernels.dynamics.string import SMOOTH, TINY
+from sagline.kernels.dynamics.transfer import INTEGRALS, NODES, STAGES, WEIGHTS
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.slopes import CableSlopes, cable_slopes
+from sagline.statics.stiffness import mass_matrix, stiffness
+
+
+class Rest(NamedTuple):
+    """A state, and how it settles.
+
+    Attributes:
+        state: The state, a single one.
+        slopes: Of its cables.
+        by_datum: Force on the platform ends by length, linear density and axial stiffness, shape (3, m, 3).
+        settling: Motion by each of the same, shape (3, 6, m).
+        compliance: Shape (6, 6).
+        mass: Of the platform, shape (6, 6).
+    """
+
+    state: Equilibrium
+    slopes: CableSlopes
+    by_datum: Array
+    settling: Array
+    compliance: Array
+    mass: Array
+
+
+class Swings(NamedTuple):
+    """Some modes of one frequency, g of them: the forms of what cables change by, for each two of them.
+
+    Attributes:
+        motion: Of the platform, unit modal mass, shape (6, g).
+        square: Of the angular frequency [1/s^2].
+        end_force: Of the cables on their platform ends, shape (m, g, 3).
+        by_force: Integral of f^T dC f by the force at rest on the platform end, shape (m, g, g, 3).
+        by_datum: The same by length, linear density (with that of mu u^2) and axial stiffness, shape (3, m, g, g).
+    """
+
+    motion: Array
+    square: float
+    end_force: Array
+    by_force: Array
+    by_datum: Array
+
+
+class Slopes(NamedTuple):
+    """Forms whose eigenvalues are derivatives of the square of the frequency, each (..., g, g).
+
+    Attributes:
+        datum: By length, linear density and axial stiffness of each cable, shape (3, m, g, g).
+        pose: By motions at fixed lengths, shape (6, g, g).
+        wrench: Shape (6, g, g).
+        mass: Shape (g, g).
+        inertia: Shape (3, 3, g, g).
+    """
+
+    datum: Array
+    pose: Array
+    wrench: Array
+    mass: Array
+    inertia: Array
+
+
+def rest_of(state: Equilibrium) -> Rest:
+    """What is needed of a state.
+
+    Args:
+        state: A single one, of exact or weightless cables.
+
+    Returns:
+        Rest.
+    """
+    slopes, known = cable_slopes(state), stiffness(state)
+    return Rest(
+        state,
+        slopes,
+        np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness)),
+        np.stack((known.length_sensitivity, known.density_sensitivity, known.stiffness_sensitivity)),
+        known.compliance,
+        mass_matrix(state),
+    )
+
+
+def slopes_of(rest: Rest, swings: Swings) -> Slopes:
+    """How the square of a frequency follows everything, the platform settling in its new equilibrium.
+
+    Args:
+        rest: The state.
+        swings: The modes that have the frequency.
+
+    Returns:
+        Slopes.
+    """
+    robot, pose = rest.state.one_robot, _by_pose(rest, swings)
+    turns = rest.state.pose.matrix.T @ swings.motion[3:]
+    spins = np.einsum("ia,jb->ijab", turns, turns)
+    moved = swings.motion[:3]
+    own = -np.einsum("mabc,pmc->pmab", swings.by_force, rest.by_datum) - swings.by_datum
+    own = own + lever_form(swings.motion[3:], rest.slopes.levers, rest.by_datum)
+    sink = -robot.gravity * rest.compliance[:, 2]
+    return Slopes(
+        datum=own + np.einsum("kab,pkm->pmab", pose, rest.settling),
+        pose=pose,
+        wrench=np.einsum("kab,kj->jab", pose, rest.compliance),
+        mass=np.einsum("kab,k->ab", pose, sink) - swings.square * moved.T @ moved,
+        inertia=-0.5 * swings.square * (spins + np.swapaxes(spins, -1, -2)),
+    )
+
+
+def _by_pose(rest: Rest, swings: Swings) -> Array:
+    """By motions of the platform in its pattern at fixed lengths, (6, g, g)."""
+    slopes, turns = rest.slopes, swings.motion[3:]
+    unit = np.eye(6)
+    moved = np.cross(unit[:, None, 3:], slopes.levers)  # levers turn
+    forces = np.einsum("mij,kmj->kmi", slopes.blocks, unit[:, None, :3] + moved)
+    form = -np.einsum("mabc,kmc->kab", swings.by_force, forces)
+    onto = np.cross(turns.T[:, None, None], moved)  # of mode b, by motion k, of cable m
+    pulled = np.einsum("mai,bkmi->kab", swings.end_force, onto)
+    form += pulled + np.swapaxes(pulled, -1, -2)
+    form += (
+        lever_form(swings.motion[3:], moved, slopes.force) + lever_form(swings.motion[3:], slopes.levers, forces)
+    ).sum(axis=1)
+    inertia = rest.mass[3:, 3:]
+    for k, cross in enumerate(_cross_matrices()):
+        form[3 + k] -= swings.square * turns.T @ (cross @ inertia - inertia @ cross) @ turns
+    freedom = rest.state.one_robot.freedom
+    kept: Array = np.einsum("kj,jab->kab", freedom.T @ freedom, form)
+    return kept
+
+
+def lever_form(turns: Array, levers: Array, force: Array) -> Array:
+    """What forces on levers resist to rotations: r T^T - r.T, in its symmetric part.
+
+    Args:
+        turns: Rotation vectors, one a column, shape (3, g).
+        levers: To the points of the forces, shape (..., 3).
+        force: On the cables there, shape (..., 3).
+
+    Returns:
+        For each two rotations, shape (..., g, g).
+    """
+    along, pulled = levers @ turns, force @ turns
+    mixed = along[..., :, None] * pulled[..., None, :]
+    pressed = np.sum(levers * force, axis=-1)[..., None, None] * (turns.T @ turns)
+    form: Array = 0.5 * (mixed + np.swapaxes(mixed, -1, -2)) - pressed
+    return form
+
+
+def _cross_matrices() -> Array:
+    """Matrices that take a vector to the cross product of each axis with it, (3, 3, 3)."""
+    return np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), -1, -2)
+
+
+PHASE = 0.45 * np.pi  # of a transverse wave in an element [rad]
+HALVINGS = 40  # of a cable: about a fold elements would become ever shorter
+CLOSE = 1e-5  # relative difference of two frequencies, by which the equations' change is taken
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class Cable(NamedTuple):
+    """A cable at rest: force on its platform end (3,) [N], weight a length, length, EA and density."""
+
+    force: Array
+    weight: float
+    length: float
+    stiffness: float
+    density: float
+
+
+class Waves(NamedTuple):
+    """What a cable does for each component of the force on its frame end, at points along it.
+
+    Attributes:
+        force: In the cable at rest, shape (P, 3) [N].
+        below: Length from the point to the platform end, shape (P,) [m].
+        share: Of the length, shape (P,) [m].
+        moved: Displacement, one component of the force a column, shape (P, 3, 3).
+        pulled: Change of the force, shape (P, 3, 3).
+        end: Both at the platform end, shape (2, 3, 3).
+    """
+
+    force: Array
+    below: Array
+    share: Array
+    moved: Array
+    pulled: Array
+    end: Array
+
+
+def cables_of_state(rest: Rest) -> tuple[Cable, ...]:
+    """The cables of a state, as strings.
+
+    Args:
+        rest: The state.
+
+    Returns:
+        One each.
+    """
+    cables = rest.state.cables
+    gravity = 0.0 if cables.model.weightless else cables.gravity
+    density, stiffness = (
+        np.broadcast_to(field, cables.shape) for field in (cables.cable.linear_density, cables.cable.axial_stiffness)
+    )
+    return tuple(
+        Cable(rest.slopes.force[i], gravity * float(density[i]), length, float(stiffness[i]), float(density[i]))
+        for i, length in enumerate(cables.unstrained_length.tolist())
+    )
+
+
+def swings_of(rest: Rest, cables: tuple[Cable, ...], frequency: Array) -> Swings:
+    """The modes of some neighboring frequencies that count as one.
+
+    Args:
+        rest: The state.
+        cables: Of it.
+        frequency: Of g modes [Hz], as `vibration` has them.
+
+    Returns:
+        Swings, with the mean frequency to the last digits.
+    """
+    omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
+    omega *= 1.0 + _correction(rest, cables, omega, group)  # leaves CLOSE of the error
+    waves = [_waves(cable, omega) for cable in cables]
+    matrix, scale = _equations(rest, waves, omega)
+    vectors = scale[:, None] * np.linalg.svd(matrix)[2][-group:].T
+    freedom = rest.state.one_robot.freedom
+    motion = freedom.T @ vectors[: len(freedom)]
+    pulls = vectors[len(freedom) :].reshape(len(cables), 3, group)
+    mass = motion.T @ rest.mass @ motion
+    for cable, wave, pull in zip(cables, waves, pulls, strict=True):
+        moved = wave.moved @ pull
+        mass = mass + cable.density * np.einsum("p,pia,pib->ab", wave.share, moved, moved)
+    units = np.linalg.inv(np.linalg.cholesky(mass)).T
+    return _forms(rest, cables, waves, motion @ units, pulls @ units, omega)
+
+
+def _correction(rest: Rest, cables: tuple[Cable, ...], omega: float, group: int) -> float:
+    """By what share of it a frequency is off: where the equations have so many solutions, to first order."""
+    matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
+    near = omega * (1.0 + CLOSE)
+    other, _ = _equations(rest, [_waves(cable, near) for cable in cables], near, scale)
+    left, values, right = np.linalg.svd(matrix)
+    left, right = left[:, -group:], right[-group:]
+    change = left.T @ (other - matrix) @ right.T / CLOSE
+    return float(-np.trace(np.linalg.solve(change, np.diag(values[-group:]))) / group)
+
+
+def _equations(rest: Rest, waves: list[Waves], omega: float, scale: Array | None = None) -> tuple[Array, Array]:
+    """Balance of the free motions and ends that meet, (n + 3 m, n + 3 m), and what its columns were multiplied by."""
+    freedom, levers = rest.state.one_robot.freedom, rest.slopes.levers
+    n, unit = len(freedom), np.eye(6)
+    ends = np.swapaxes(unit[:, :3] + np.cross(unit[:, 3:], levers[:, None]), -1, -2)  # (m, 3, 6)
+    matrix = np.zeros((n + 3 * len(waves), n + 3 * len(waves)))
+    held = -(omega**2) * rest.mass
+    held[3:, 3:] += lever_form(np.eye(3), levers, rest.slopes.force).sum(axis=0)
+    matrix[:n, :n] = freedom @ held @ freedom.T
+    for i, wave in enumerate(waves):
+        own = slice(n + 3 * i, n + 3 * i + 3)
+        matrix[:n, own] = freedom @ ends[i].T @ wave.end[1]
+        matrix[own, :n] = ends[i] @ freedom.T
+        matrix[own, own] = -wave.end[0]
+    matrix[:n] /= np.abs(rest.slopes.matrix).max()
+    if scale is None:
+        scale = 1.0 / np.linalg.norm(matrix, axis=0)
+    return matrix * scale, scale
+
+
+def _waves(cable: Cable, omega: float) -> Waves:
+    """What the cable does for unit forces on its frame end, by collocation at Gauss points of its elements."""
+    edges = _edges(cable, omega)
+    size = np.diff(edges)
+    place = edges[:-1, None] + size[:, None] * NODES  # (e, STAGES)
+    below = cable.length - place
+    force = cable.force - cable.weight * below[..., None] * _UP
+    rates = np.zeros((*place.shape, 6, 6))
+    rates[..., :3, 3:] = _flexible(force, cable.stiffness)
+    rates[..., 3:, :3] = -cable.density * omega**2 * np.eye(3)
+    within = np.einsum("e,st,etij->esitj", size, INTEGRALS, rates).reshape(len(size), 6 * STAGES, 6 * STAGES)
+    start = np.tile(np.eye(6), (STAGES, 1))
+    stages = np.linalg.solve(np.eye(6 * STAGES) - within, np.broadcast_to(start, (len(size), *start.shape)))
+    stages = stages.reshape(len(size), STAGES, 6, 6)
+    across = np.eye(6) + np.einsum("e,s,esij,esjk->eik", size, WEIGHTS, rates, stages, optimize=True)
+    at = np.concatenate((np.zeros((3, 3)), np.eye(3)))
+    within_each = np.empty((len(size), STAGES, 6, 3))
+    for e in range(len(size)):
+        within_each[e] = stages[e] @ at
+        at = across[e] @ at
+    found = within_each.reshape(-1, 6, 3)
+    share = (size[:, None] * WEIGHTS).reshape(-1)
+    return Waves(force.reshape(-1, 3), below.reshape(-1), share, found[:, :3], found[:, 3:], at.reshape(2, 3, 3))
+
+
+def _flexible(force: Array, stiffness: float) -> Array:
+    """C where the cable carries a force, (..., 3, 3)."""
+    size = np.linalg.norm(force, axis=-1)[..., None, None]
+    tangent = force[..., :, None] * force[..., None, :] / size**2
+    found: Array = np.eye(3) / stiffness + (np.eye(3) - tangent) / size
+    return found
+
+
+def _edges(cable: Cable, omega: float) -> Array:
+    """Borders of elements that are short against N/w and against a transverse wave."""
+    edges = np.array([0.0, cable.length])
+    for _ in range(HALVINGS):
+        size = np.diff(edges)
+        long = size > _longest(cable, omega, edges[:-1], edges[1:])
+        if not long.any():
+            break
+        edges = np.sort(np.concatenate((edges, edges[:-1][long] + 0.5 * size[long])))
+    return edges
+
+
+def _longest(cable: Cable, omega: float, start: Array, end: Array) -> Array:
+    """Longest elements [m] that parts of a cable allow."""
+    low, high = (cable.force[2] - cable.weight * (cable.length - s) for s in (start, end))
+    least = np.hypot(np.hypot(*cable.force[:2]), np.maximum(np.maximum(low, -high), 0.0)) + TINY
+    slowness = np.sqrt(cable.density * (1.0 / least + 1.0 / cable.stiffness))
+    return np.asarray(np.minimum(SMOOTH * least / (cable.weight + TINY), PHASE / (omega * slowness)))
+
+
+def _forms(
+    rest: Rest, cables: tuple[Cable, ...], waves: list[Waves], motion: Array, pulls: Array, omega: float
+) -> Swings:
+    gravity = 0.0 if rest.state.cables.model.weightless else rest.state.cables.gravity
+    end_force, by_force, by_datum = [], [], []
+    for cable, wave, pull in zip(cables, waves, pulls, strict=True):
+        moved, pulled = wave.moved @ pull, wave.pulled @ pull
+        turned = _turned(wave.force, pulled)
+        shared = np.einsum("p,pabc->abc", wave.share, turned)
+        heavier = -np.einsum("p,pab->ab", wave.share * wave.below, turned[..., 2])
+        swung = np.einsum("p,pia,pib->ab", wave.share, moved, moved)
+        softer = np.einsum("p,pia,pib->ab", wave.share, pulled, pulled)
+        at_frame = _flexible(cable.force - cable.weight * cable.length * _UP, cable.stiffness)
+        entered = pull.T @ at_frame @ pull
+        end_force.append((wave.end[1] @ pull).T)
+        by_force.append(shared)
+        by_datum.append((entered, gravity * heavier + omega**2 * swung, -softer / cable.stiffness**2))
+    data = np.swapaxes(np.array(by_datum), 0, 1)
+    return Swings(motion, omega**2, np.array(end_force), np.array(by_force), data)
+
+
+def _turned(force: Array, pulled: Array) -> Array:
+    """f^T dC f by the force at rest, for each two modes, (P, g, g, 3)."""
+    size = np.linalg.norm(force, axis=-1)[:, None, None]
+    along = np.einsum("pi,pig->pg", force, pulled)
+    both = np.einsum("pia,pib->pab", pulled, pulled)
+    mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # of a, and component of b
+    straight = 3.0 * along[:, :, None] * along[:, None, :] / size**2 - both
+    turned = straight[..., None] * force[:, None, None, :] - mixed - np.swapaxes(mixed, 1, 2)
+    found: Array = turned / size[..., None] ** 3
+    return found

@@ -1,0 +1,198 @@
+"""Frequency response of a platform on cables with mass, and its curves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.core.arguments import choice, instance, optional
+from sagline.core.arrays import Array, checked, locked
+from sagline.core.errors import InvalidValueError
+from sagline.core.memory import check_memory
+from sagline.core.results import Result
+from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_lengths, one_state
+from sagline.dynamics.vibration.receptance import LOWEST, Answer
+from sagline.dynamics.vibration.robot_modes import check_number, massless, modes_below, setting_of
+from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
+from sagline.robot.equilibrium import Equilibrium
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.stiffness import modes, stiffness
+
+CHECKS: Final = 8  # frequencies at which the answer is compared with the exact one
+_BYTES: Final = 20_000.0  # a frequency
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrequencyResponse(Result):
+    """Result of `frequency_response` at F frequencies.
+
+    Motions are (displacement of the center of mass [m], rotation vector [rad]), wrenches (force [N], moment [N m])
+    about it, world axes, both complex amplitudes of what goes with exp(i omega t).
+
+    Attributes:
+        state: The state, a single one.
+        damping: What takes energy out.
+        frequency: [Hz], shape (F,).
+        compliance: Motion by wrench with cable mass, shape (F, 6, 6) [m/N, rad/N, ...]; zero in motions that the
+            robot's pattern does not have.
+        massless_compliance: The same on cables whose mass does not swing, of the same shape.
+        checked_frequency: Those at which the compliance was compared with the exact one [Hz], shape (C,).
+        deviation: By how much it is off there, of the exact one's norm, shape (C,).
+    """
+
+    state: Equilibrium
+    damping: Damping
+    frequency: Array
+    compliance: Complex
+    massless_compliance: Complex
+    checked_frequency: Array
+    deviation: Array
+
+
+def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> FrequencyResponse:
+    """Motion of the platform for an oscillating wrench, cables with mass; and on massless cables, to compare.
+
+    From the modes of every cable with its ends held; at some of the frequencies the exact stiffness of the cables is
+    taken too, and the deviation told.
+
+    Args:
+        state: An equilibrium, a single one.
+        frequency: [Hz], >= 0, shape (F,).
+        damping: What takes energy out; None: nothing, the answer then is infinite at the natural frequencies. Its
+            modal_damping is a loss factor twice as large of all stiffness, as in `dynamic_stiffness`.
+
+    Returns:
+        FrequencyResponse.
+
+    Raises:
+        InvalidValueError: If the state is no single Equilibrium with lengths, of exact or elastic cables; if a
+            frequency is negative, or more than 2,000 modes lie below it.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> state = sl.inverse(sl.load_robot("cogiro"), pose).state
+        >>> damping = sl.Damping(modal_damping=0.01)
+        >>> found = sl.frequency_response(state, [0.0, 4.4], damping)
+        >>> for compliance in found.compliance, found.massless_compliance:
+        ...     print((1e6 * np.abs(compliance[:, 0, 0])).round(1), "um/N")
+        [4.  5.4] um/N
+        [4. 6.] um/N
+
+    Source:
+        docs/model.md, section 11.
+    """
+    one_state(state)
+    given = checked(frequency, "frequency", "Hz", low=0.0)
+    if given.ndim != 1 or not given.size:
+        raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give one or more.")
+    check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Take them in parts.")
+    known = optional(damping, Damping, "damping") or Damping()
+    setting = setting_of(state)
+    check_lengths(state)
+    check_number(modes_below(setting, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
+    if massless(setting, 0)[1].shape[1]:
+        step = "Simulate it; vibration() names the directions in which it leaves."
+        raise InvalidValueError("state", "an unstable equilibrium", "a stable one, which has an answer", step)
+    slopes = cable_slopes(state)
+    answer = Answer(setting, slopes.matrix, slopes.blocks, known)
+    compliance, still = answer.by_modes(given, answer.held(float(given.max())))
+    some = np.unique(np.linspace(0, given.size - 1, CHECKS).round().astype(np.int64))
+    wanted = answer.exactly(given[some])
+    off = np.linalg.norm(compliance[some] - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))
+    return FrequencyResponse(state, known, given, locked(compliance), locked(still), locked(given[some]), locked(off))
+
+
+MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
+UNITS = {(False, False): "m/N", (False, True): "1/N", (True, False): "1/N", (True, True): "rad/(N m)"}
+SAMPLES = 900  # evenly in the logarithm
+NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # about a peak: the denser the nearer
+BESIDE = 0.03  # of a peak's frequency: how far these reach
+BELOW = 6.0  # lowest frequency of a mode over that at which the curves begin
+
+
+class ResponseCurves(NamedTuple):
+    """Two answers to the same force.
+
+    Attributes:
+        frequency: [Hz], ascending, shape (F,).
+        with_mass: Amplitude of the motion over that of the force, cables with mass, in `unit`, shape (F,).
+        massless: The same on cables whose mass does not swing, shape (F,).
+        static: The same at rest.
+        unit: Of all of them.
+    """
+
+    frequency: Array
+    with_mass: Array
+    massless: Array
+    static: float
+    unit: str
+
+
+def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
+    """The platform's motion for a force at its center of mass, over frequency, up to where all modes are known.
+
+    Both are of `frequency_response`; air damping, which only swinging cables feel, has no part in the massless one.
+
+    Args:
+        vibration: Of a stable state.
+        force: "x", "y", "z": a force along it; "about x", ...: a moment. World axes.
+        motion: In the same words, the displacement of the center of mass or the rotation; None for that of the force.
+
+    Returns:
+        The curves.
+
+    Raises:
+        InvalidValueError: If the vibration has no modes, or there is no such motion.
+    """
+    state = instance(vibration, Vibration, "vibration").state
+    if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
+        reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
+        raise InvalidValueError("vibration", reason, "a stable state with modes", "Ask for another state, or higher.")
+    _places(force, motion)
+    natural = np.concatenate((vibration.frequency, modes(state).frequency))
+    found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)
+    return drawn_curves(found, force, motion)
+
+
+def drawn_curves(response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
+    """One element of what `frequency_response` found, as far as logarithmic axes can show it.
+
+    Args:
+        response: The response.
+        force: As of `response_curves`.
+        motion: As of `response_curves`.
+
+    Returns:
+        The curves, without what is at 0 Hz or has no end.
+
+    Raises:
+        InvalidValueError: If less than two frequencies are left, or there is no such motion.
+    """
+    row, column = _places(force, motion)
+    answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
+    kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
+    kept = kept[np.argsort(response.frequency[kept], kind="stable")]
+    if len(kept) < 2:
+        step = "Give more, np.geomspace(0.5, 20.0, 500) for instance."
+        raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "two at least", step)
+    static = abs(float(stiffness(response.state).compliance[row, column]))
+    with_mass, massless = (locked(answer[kept]) for answer in answers)
+    return ResponseCurves(locked(response.frequency[kept]), with_mass, massless, static, UNITS[row > 2, column > 2])
+
+
+def _places(force: str, motion: str | None) -> tuple[int, int]:
+    """Row and column of a motion for a force."""
+    column = MOTIONS.index(choice(force, "force", MOTIONS))
+    return column if motion is None else MOTIONS.index(choice(motion, "motion", MOTIONS)), column
+
+
+def _grid(natural: Array, highest: float) -> Array:
+    """Frequencies evenly in the logarithm, and close to each peak."""
+    even = np.geomspace(natural.min() / BELOW, highest, SAMPLES)
+    near = (natural[:, None] * (1.0 + BESIDE * NEAR)).ravel()
+    return np.unique(np.concatenate((even, near[(near > even[0]) & (near < highest)])))

@@ -1,0 +1,354 @@
+"""Modes of a robot whose cables have mass, by component mode synthesis, checked against the exact count."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sagline.core.arrays import Array, Flags
+from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.dynamics.vibration.component_modes import Components, component_modes, stretch
+from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_counts, in_world
+from sagline.kernels.dynamics import collocation
+from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.several import first_of
+from sagline.statics.slopes import cable_slopes
+from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
+from sagline.statics.strings import COUNTING, Strings, strings_of, undamped
+
+KEPT = 1.05  # of the frequency asked for: the cables' modes up to there are unknowns
+LEVELS = 4  # pairs of moments of those above that are matched
+_TINY = 1e-300
+
+
+class Setting(NamedTuple):
+    """What N states are, for their vibrations.
+
+    Attributes:
+        strings: Their cables.
+        ends: Of each cable, what takes a motion of the platform to that of the platform end, shape (N, m, 3, 6).
+        stiffness: Of the platform, symmetric, shape (N, 6, 6).
+        mass: Of the platform, shape (N, 6, 6).
+        freedom: Rows that pick the free motions, shape (n, 6).
+    """
+
+    strings: Strings
+    ends: Array
+    stiffness: Array
+    mass: Array
+    freedom: Array
+
+    def at(self, row: int) -> Setting:
+        """One of them, with a leading axis 1."""
+        part = slice(row, row + 1)
+        strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
+        return Setting(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
+
+
+class Reduced(NamedTuple):
+    """The eigenproblem of one state.
+
+    Attributes:
+        matrix: Symmetric, shape (n + k, n + k): first the platform, then motions of the cables [1/s^2].
+        platform: Its first unknowns to motions of the platform, shape (6, n).
+        driven: The same to what the motions are driven by, shape (k, n).
+        kept: Which components of the cables are motions by themselves, the first of the k, shape (T,).
+        beyond: The others by the last of the k, shape (T - those, b).
+        components: Of the cables.
+    """
+
+    matrix: Array
+    platform: Array
+    driven: Array
+    kept: Flags
+    beyond: Array
+    components: Components
+
+    def amplitudes(self, vectors: Array) -> Array:
+        """Amplitudes of the components beside their motion at rest.
+
+        Args:
+            vectors: Of the eigenproblem, shape (n + k, K).
+
+        Returns:
+            Shape (T, K).
+        """
+        n = self.platform.shape[1]
+        own = vectors[n:] - self.driven @ vectors[:n]
+        found = np.empty((self.kept.size, vectors.shape[1]))
+        count = len(own) - self.beyond.shape[1]
+        found[self.kept] = own[:count]
+        found[~self.kept] = self.beyond @ own[count:]
+        return found
+
+
+def setting_of(state: Equilibrium) -> Setting:
+    """What is needed of an equilibrium.
+
+    Args:
+        state: Single or N of them; arrays have a leading axis in either case.
+
+    Returns:
+        Setting; its stiffness NaN where the state has no lengths.
+    """
+    slopes = cable_slopes(state)
+    matrix = slopes.matrix.reshape(-1, 6, 6)
+    levers = slopes.levers.reshape(len(matrix), -1, 3)
+    ends = np.zeros((*levers.shape, 6))
+    ends[..., :3] = np.eye(3)
+    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # u = q_1 + q_2 x r
+        ends[..., a, 3 + b] = levers[..., c]
+        ends[..., a, 3 + c] = -levers[..., b]
+    return Setting(
+        strings_of(state),
+        ends,
+        0.5 * (matrix + np.swapaxes(matrix, -1, -2)),
+        mass_matrix(state).reshape(-1, 6, 6),
+        first_of(state.robot).freedom,
+    )
+
+
+def reduced(setting: Setting, row: int, up_to: float) -> Reduced:
+    """The eigenproblem of one state for its modes below a frequency.
+
+    The cables' modes a little above it are its unknowns; what those beyond answer to slow motions of the platform is
+    kept in a few motions of all together, which match the first moments (Krylov). With amplitudes counted from the
+    frame the mass is that of the platform, with what these leave of the cables' mass at rest, and one for each.
+
+    Args:
+        setting: Of N states.
+        row: Which of them.
+        up_to: The frequency [Hz].
+
+    Returns:
+        Reduced.
+    """
+    components = component_modes(setting.strings, row, KEPT * up_to)
+    freedom, ends = setting.freedom, setting.ends[row]
+    drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
+    kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
+    beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
+    square, count = components.square[kept], int(kept.sum())
+    drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
+    at_rest = freedom @ (setting.mass[row] + _on_platform(components.still, ends)) @ freedom.T
+    upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
+    driven = drives @ upper
+    pulled = np.concatenate((square[:, None] * driven[:count], slow @ driven[count:]))
+    n = len(freedom)
+    matrix = np.zeros((n + len(driven), n + len(driven)))
+    stiffness = freedom @ setting.stiffness[row] @ freedom.T
+    matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
+    matrix[n:, :n] = -pulled
+    matrix[:n, n:] = -pulled.T
+    np.fill_diagonal(matrix[n : n + count, n : n + count], square)
+    matrix[n + count :, n + count :] = slow
+    return Reduced(matrix, freedom.T @ upper, driven, kept, beyond, components)
+
+
+def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
+    """Motions that stand for many: orthonormal columns of amplitudes, and the stiffness between them."""
+    chain = [drives / square[:, None]]
+    for _ in range(LEVELS - 1):
+        chain.append(chain[-1] / square[:, None])
+    scaled = np.concatenate([one / np.maximum(np.linalg.norm(one, axis=0), _TINY) for one in chain], axis=1)
+    basis = np.linalg.qr(scaled)[0]
+    return basis, basis.T @ (square[:, None] * basis)
+
+
+def massless(setting: Setting, row: int) -> tuple[Array, Array]:
+    """Vibrations of the platform alone, and how it leaves an unstable equilibrium.
+
+    Args:
+        setting: Of N states.
+        row: Which of them.
+
+    Returns:
+        Frequencies as those of `modes` [Hz], shape (n,); motions in which the equilibrium is left, of unit modal mass,
+        one a column, shape (6, d).
+    """
+    freedom = setting.freedom
+    upper = np.linalg.inv(np.linalg.cholesky(freedom @ setting.mass[row] @ freedom.T)).T
+    squares, vectors = np.linalg.eigh(upper.T @ freedom @ setting.stiffness[row] @ freedom.T @ upper)
+    return natural_frequency(squares), freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
+
+
+def dynamic_matrix(setting: Setting, row: int, moving: Array, omega: float) -> Array:
+    """D: what a force on the free motions takes for a vibration, exactly.
+
+    Args:
+        setting: Of N states.
+        row: Which of them.
+        moving: What the cables' vibration adds to their stiffness, world axes, shape (m, 3, 3) [N/m].
+        omega: Angular frequency [rad/s].
+
+    Returns:
+        Shape (n, n).
+    """
+    matrix = setting.stiffness[row] + _on_platform(moving, setting.ends[row]) - omega**2 * setting.mass[row]
+    return np.asarray(setting.freedom @ matrix @ setting.freedom.T)
+
+
+def _on_platform(of_cables: Array, ends: Array) -> Array:
+    """Matrices (m, 3, 3) of platform ends as one of the platform, (6, 6)."""
+    return np.asarray((np.swapaxes(ends, -1, -2) @ of_cables @ ends).sum(axis=0))
+
+
+def modes_below(setting: Setting, row: int, frequency: float) -> int:
+    """Number of modes of the robot with its cables' mass below a frequency.
+
+    By Wittrick and Williams: those that the taut cables have with both ends held, and the negative eigenvalues of what
+    the platform then feels.
+
+    Args:
+        setting: Of N states.
+        row: Which of them.
+        frequency: [Hz], > 0.
+
+    Returns:
+        The number, which is no approximation.
+
+    Raises:
+        InvalidValueError: If the frequency is so high that a cable cannot be cut into its waves.
+    """
+    taut = np.flatnonzero(setting.strings.taut[row])
+    given = np.array([frequency])
+    found = np.empty((1, 1, taut.size, collocation.FOUND))
+    counts = np.empty((1, 1, taut.size, 2), dtype=np.int64)
+    table = np.ascontiguousarray(setting.strings.table[row : row + 1, taut])
+    room = np.empty(collocation.ROOM)
+    dynamic_stiffnesses(table, undamped(given[None]), COUNTING, room, found, counts)
+    check_counts(counts, given)
+    moving = np.zeros((setting.strings.taut.shape[1], 3, 3))
+    moving[taut] = in_world(found[0], setting.strings.axes[row, taut])[0].real
+    return int(counts.sum()) + _negatives(dynamic_matrix(setting, row, moving, 2.0 * np.pi * frequency))
+
+
+def _negatives(matrix: Array) -> int:
+    return int((np.linalg.eigvalsh(matrix) < 0.0).sum())
+
+
+MOST_MODES: Final = 2_000
+SLOW: Final = 1e-2  # of up_to: lower frequencies may be those of motions that nothing holds
+BORDER: Final = 1e-6  # of a frequency, within which the count says on which side of it a mode is
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Modes of one state below a frequency.
+
+    Attributes:
+        frequency: [Hz], shape (K,).
+        platform: Motion of the platform, shape (6, K).
+        ends: Displacements of the platform ends, shape (m, 3, K).
+        number: How many, by the exact count.
+        problem: Whose solutions they are.
+        vectors: Solutions of the problem, shape (n + k, K).
+    """
+
+    frequency: Array
+    platform: Array
+    ends: Array
+    number: int
+    problem: Reduced
+    vectors: Array
+
+    @property
+    def components(self) -> Components:
+        """Of the cables."""
+        return self.problem.components
+
+    @cached_property
+    def amplitudes(self) -> Array:
+        """Of the cables' components beside their motion at rest, shape (T, K)."""
+        return self.problem.amplitudes(self.vectors)
+
+
+def modes_of(setting: Setting, row: int, up_to: float) -> Found:
+    """Modes of one state below a frequency, as many as the exact count has.
+
+    Args:
+        setting: Of N states.
+        row: Which of them; a stable one.
+        up_to: The frequency [Hz].
+
+    Returns:
+        The modes.
+
+    Raises:
+        InvalidValueError: If there are too many.
+        SaglineError: If modes and count disagree.
+    """
+    count = modes_below(setting, row, up_to)
+    check_number(count, up_to, "up_to")
+    problem = reduced(setting, row, up_to)
+    square, vectors = np.linalg.eigh(problem.matrix)
+    frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
+    border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
+    if not border[0] <= count <= border[1]:
+        text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
+        raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
+    if count and frequency[0] < SLOW * up_to:  # at rest the mass of the cables has no part: as many are exactly at 0 Hz
+        frequency[: np.count_nonzero(massless(setting, row)[0] == 0.0)] = 0.0
+    vectors = vectors[:, :count]
+    platform = problem.platform @ vectors[: problem.platform.shape[1]]
+    return Found(frequency[:count], platform, setting.ends[row] @ platform, count, problem, vectors)
+
+
+def check_number(count: int, frequency: float, item: str) -> None:
+    """Refuse more modes than somebody wants to wait for.
+
+    Args:
+        count: How many lie below a frequency.
+        frequency: The frequency [Hz].
+        item: What a message calls it.
+
+    Raises:
+        InvalidValueError: If there are too many.
+    """
+    if count > MOST_MODES:
+        value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
+        raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
+
+
+def cable_shares(setting: Setting, row: int, found: Found) -> Array:
+    """Share of each mode's kinetic energy that is each cable's.
+
+    Args:
+        setting: Of N states.
+        row: Which of them.
+        found: Its modes.
+
+    Returns:
+        Shape (m, K).
+    """
+    parts, ends, own = found.components, found.ends, found.amplitudes
+    shares = np.asarray((ends * (parts.still @ ends)).sum(axis=1))
+    for motions, end, given in parts.planes(ends, own):
+        shares[parts.mesh.taut] += (given * (given + 2.0 * (motions.drive @ end))).sum(axis=1)
+    return shares
+
+
+def loss(density: Array, found: Found, shares: Array, damping: Damping) -> Array:
+    """Damping ratio of each mode, to first order: power lost over that of a critically damped one.
+
+    Args:
+        density: Of the cables [kg/m], shape (m,).
+        found: The modes.
+        shares: Their `cable_shares`.
+        damping: What takes energy out of them.
+
+    Returns:
+        Shape (K,); NaN for a mode without frequency where something is lost.
+    """
+    omega = 2.0 * np.pi * found.frequency
+    lost = np.zeros(omega.size)
+    if damping.air_damping > 0.0:
+        lost += damping.air_damping * (shares / density[:, None]).sum(axis=0)
+    if damping.loss_time > 0.0:
+        lost += damping.loss_time * stretch(found.components, found.ends, found.amplitudes).sum(axis=0)
+    ratio = np.where(lost > 0.0, lost / (2.0 * np.where(omega > 0.0, omega, np.nan)), 0.0)
+    return np.asarray(damping.modal_damping + ratio)

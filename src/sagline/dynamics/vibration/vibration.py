@@ -1,0 +1,294 @@
+"""All modes below a frequency of a robot whose cables have mass, and their excitation by a path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Final
+
+import numpy as np
+
+from sagline.core.arguments import brief, instance, optional
+from sagline.core.arrays import Array, locked, number
+from sagline.core.errors import InvalidValueError
+from sagline.core.results import Result
+from sagline.dynamics.trajectories.segments import Move, moves_of
+from sagline.dynamics.vibration.component_modes import cable_shapes
+from sagline.dynamics.vibration.dynamic_stiffness import Damping, one_state
+from sagline.dynamics.vibration.robot_modes import cable_shares, loss, massless, modes_of, setting_of
+from sagline.motion.path import Path
+from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.robot import Robot
+from sagline.statics.balance import inertial_wrench
+from sagline.statics.stiffness import Modes
+
+
+class VibrationStatus(IntEnum):
+    """Whether a state has linear vibrations."""
+
+    SOLVED = 0
+    UNSTABLE = 1
+    NO_LENGTHS = 2
+    FOLDED = 3
+
+    @property
+    def text(self) -> str:
+        """What it means, and what to do."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    VibrationStatus.SOLVED: "all modes up to the frequency asked for are found",
+    VibrationStatus.UNSTABLE: "the equilibrium is unstable: it leaves in its negative_directions; simulate it",
+    VibrationStatus.NO_LENGTHS: "the pose has no answer: see the status of the plan",
+    VibrationStatus.FOLDED: "a cable hangs folded or slack and has no linear vibration: its index is in slack_cables; "
+    "the modes are those of the others",
+}
+
+
+_NEAR: Final = 3.0  # times: excitations that differ by less both count
+_INSTANTS: Final = 2000  # of a move, where its inertia is taken
+
+
+def most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
+    """The frequencies that a path excites most: one, or two where the second is excited a third as much or more.
+
+    Args:
+        state: A single state.
+        frequency: Of its modes [Hz], shape (K,).
+        shape: Motions of the platform in them, of unit modal mass, one a column, shape (6, K).
+        path: A path from rest to rest; of several moves, the one that excites a mode most counts.
+
+    Returns:
+        Frequencies [Hz], shape (1,) or (2,), the most excited first.
+
+    Raises:
+        InvalidValueError: If no mode has a frequency, or the path is in motion at an end or does not move.
+    """
+    moves = [move for move in moves_of(instance(path, Path, "path")) if move.curve is not None]
+    known = np.flatnonzero(frequency > 0.0)
+    if not (moves and known.size):
+        item, value = ("path", "without motion") if not moves else ("modes", "without a frequency")
+        raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Take another path, or state.")
+    if np.isnan(frequency).any():
+        step = "Take another: its platform falls."
+        raise InvalidValueError("modes", "of an unstable state", "of a stable one", step)
+    frequency, shape = frequency[known], shape[:, known]
+    excited = np.max([excitation(state.one_robot, move, frequency, shape) for move in moves], axis=0)
+    order = np.argsort(-excited, kind="stable")[:2]
+    return locked(frequency[order[excited[order] * _NEAR >= excited[order[0]]]])
+
+
+def excitation(robot: Robot, move: Move, frequency: Array, shape: Array) -> Array:
+    """How much a move excites each mode, and the mode moves the platform.
+
+    Args:
+        robot: The robot.
+        move: From rest to rest.
+        frequency: Of the modes [Hz], shape (K,).
+        shape: Motions of the platform in them, of unit modal mass, one a column, shape (6, K).
+
+    Returns:
+        |phi . M d| |phi| |A(w)|/w of each, shape (K,).
+    """
+    time = np.linspace(0.0, move.duration, _INSTANTS + 1)
+    assert move.curve is not None
+    motion = move.rates(time)
+    jet = move.curve.at(motion[0])
+    twist, twist_rate, _ = jet.twists(motion)
+    force = inertial_wrench(robot, jet.pose, twist, twist_rate) @ shape  # of each mode over time
+    turning = 2.0 * np.pi * frequency
+    transform = np.trapezoid(force * np.exp(-1j * np.outer(time, turning)), time, axis=0)
+    seen: Array = np.abs(transform) * np.linalg.norm(shape, axis=0) / turning
+    return seen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Vibration(Result):
+    """Result of `vibration`: all modes below a frequency, of the platform and of the strings that its cables are.
+
+    Modes have unit modal mass, so that shapes are in m/sqrt(kg); K is their number.
+
+    Attributes:
+        state: The state, a single one.
+        up_to: Frequency below which all modes are found [Hz].
+        damping: What takes energy out of them.
+        status: Whether the state has linear vibrations.
+        frequency: Of the modes with cable mass [Hz], ascending, shape (K,).
+        shape: Motion of the platform (displacement of the center of mass, rotation vector, world axes), one mode a
+            column, shape (6, K) [m/sqrt(kg), rad/(sqrt(kg) m)].
+        platform_share: Share of the kinetic energy that is the platform's, shape (K,).
+        cable_share: Share of it that is each cable's, shape (m, K); with platform_share they sum to 1.
+        cable_shape: Displacement of the cables at equally spaced material points from frame to platform end, world
+            axes, shape (K, m, P, 3) [m/sqrt(kg)].
+        loss: Damping ratio of each mode, to first order in the damping, shape (K,).
+        massless_frequency: Of the platform on cables whose mass does not swing [Hz], as in `modes`, shape (n,).
+        count: How many modes there are below up_to by the exact count, which needs no mode: K where it is complete.
+        negative_directions: Motions in which the platform leaves an unstable equilibrium, one a column, shape (6, d);
+            no columns where it is stable.
+        slack_cables: Indices of the cables that have no linear vibration.
+    """
+
+    state: Equilibrium
+    up_to: float
+    damping: Damping
+    status: VibrationStatus
+    frequency: Array
+    shape: Array
+    platform_share: Array
+    cable_share: Array
+    cable_shape: Array
+    loss: Array
+    massless_frequency: Array
+    count: int
+    negative_directions: Array
+    slack_cables: tuple[int, ...]
+
+    @property
+    def complete(self) -> bool:
+        """Whether none is missing: as many modes as the exact count has."""
+        return self.status is VibrationStatus.SOLVED and self.count == self.frequency.size
+
+    def to_shape(self, path: Path) -> Array:
+        """The frequencies that a path excites most, for a shaper: see `sagline.to_shape`.
+
+        Args:
+            path: A path from rest to rest, best one that ends where the modes were taken.
+
+        Returns:
+            Frequencies [Hz], shape (1,) or (2,), the most excited first.
+
+        Raises:
+            InvalidValueError: As `sagline.to_shape`.
+        """
+        return most_excited(self.state, self.frequency, self.shape, path)
+
+
+POINTS: Final = 41  # of a cable's shape
+
+
+def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = None) -> Vibration:
+    """All modes below a frequency of a robot whose cables have mass.
+
+    A cable is a string: besides the platform on its cables, each of them rings, about its catenary, in its plane and
+    out of it. None is missing: the number of modes is compared with an exact count that needs no mode.
+
+    Args:
+        state: An equilibrium, a single one, from `inverse` or `forward`.
+        up_to: Frequency below which modes are wanted [Hz], > 0.
+        damping: What takes energy out of the vibration, for `loss`; None: nothing.
+
+    Returns:
+        Vibration. Its status tells of an unstable equilibrium, and of cables that hang folded or slack: these have no
+        linear vibration, and the modes are those of all else.
+
+    Raises:
+        InvalidValueError: If the state is no single Equilibrium, of exact or elastic cables; if up_to is not positive,
+            or more than 2,000 modes lie below it.
+        SaglineError: If modes and count disagree.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> pose = sl.Pose((1.0, 0.5, 1.5), np.eye(3))
+        >>> state = sl.inverse(sl.load_robot("cogiro"), pose).state
+        >>> found = sl.vibration(state, up_to=5.0)
+        >>> print(found.frequency[:3].round(3), "Hz with cable mass")
+        [3.018 3.031 3.159] Hz with cable mass
+        >>> print(found.massless_frequency[0].round(3), "Hz massless")
+        4.382 Hz massless
+
+    Source:
+        docs/model.md, section 11.
+    """
+    one_state(state)
+    limit = number(up_to, "up_to", "Hz", above=0.0)
+    given = optional(damping, Damping, "damping") or Damping()
+    setting = setting_of(state)
+    slack = tuple(int(i) for i in np.flatnonzero(~setting.strings.taut[0]))
+    known: dict[str, Any] = {
+        "state": state,
+        "up_to": limit,
+        "damping": given,
+        "massless_frequency": locked(np.full(len(setting.freedom), np.nan)),
+        "slack_cables": slack,
+    }
+    if np.isnan(setting.stiffness).any():
+        return _nothing(known | {"slack_cables": ()}, VibrationStatus.NO_LENGTHS, np.empty((6, 0)))
+    frequency, leaving = massless(setting, 0)
+    known["massless_frequency"] = locked(frequency)
+    if leaving.shape[1]:
+        return _nothing(known, VibrationStatus.UNSTABLE, leaving)
+    found = modes_of(setting, 0, limit)
+    shares = cable_shares(setting, 0, found)
+    return Vibration(
+        **known,
+        status=VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED,
+        frequency=locked(found.frequency),
+        shape=locked(found.platform),
+        platform_share=locked(1.0 - shares.sum(axis=0)),
+        cable_share=locked(shares),
+        cable_shape=locked(cable_shapes(found.components, found.ends, found.amplitudes, POINTS)),
+        loss=locked(loss(state.one_robot.cables.linear_density, found, shares, given)),
+        count=found.number,
+        negative_directions=locked(leaving),
+    )
+
+
+def _nothing(known: dict[str, Any], status: VibrationStatus, leaving: Array) -> Vibration:
+    """The answer without modes."""
+    cables = known["state"].cables.shape[-1]
+    return Vibration(
+        **known,
+        status=status,
+        frequency=locked(np.empty(0)),
+        shape=locked(np.empty((6, 0))),
+        platform_share=locked(np.empty(0)),
+        cable_share=locked(np.empty((cables, 0))),
+        cable_shape=locked(np.empty((0, cables, POINTS, 3))),
+        loss=locked(np.empty(0)),
+        count=0,
+        negative_directions=locked(leaving),
+    )
+
+
+def to_shape(modes: Modes | Vibration, path: Path) -> Array:
+    """The frequencies that a path excites most: one, or two where the second is excited a third as much or more.
+
+    A mode is excited by its share of the platform's inertia on the way, at its own frequency, and it is seen by how
+    much it moves the platform: the larger |phi . M d| |phi| |A(w)|/w, phi its shape, d the direction of the way, A the
+    Fourier transform of the acceleration along it. This measure is plausible, not proved: it finds what to shape, not
+    how much is left.
+
+    Args:
+        modes: Of the robot at a single state, best the one where the path ends: `modes(plan.state[-1])`, without the
+            mass of the cables, or `vibration(plan.state[-1])`, with it.
+        path: A path from rest to rest; of several moves, the one that excites a mode most counts.
+
+    Returns:
+        Frequencies [Hz], shape (1,) or (2,), the most excited first.
+
+    Raises:
+        InvalidValueError: If the modes are of several states, no mode has a frequency, or the path is in motion at an
+            end or does not move.
+
+    Source:
+        docs/howto/without-vibration.md.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-suspended")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (3, 0, 1.5)], durations=2.0)
+        >>> plan = sl.inverse(robot, path, tension=sl.MinimumNorm())
+        >>> print(sl.to_shape(sl.modes(plan.state[-1]), path).round(2), "Hz")
+        [2.75 1.84] Hz
+    """
+    given: object = modes
+    if not isinstance(given, Modes | Vibration):
+        step = "Make them: modes(plan.state[-1]), or vibration(plan.state[-1])."
+        raise InvalidValueError("modes", brief(given), "a Modes or a Vibration", step)
+    state = modes.state
+    if state.pose.shape:
+        value = f"of {len(state.pose)} states"
+        raise InvalidValueError("modes", value, "of a single state", "Take those of the last: modes(plan.state[-1]).")
+    return most_excited(state, modes.frequency, modes.shape, path)

@@ -1,0 +1,47 @@
+"""What damping takes out of cables: as cables with mass lose it, and as the tensions that are told of say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sagline as sl
+from sagline.dynamics.simulation.simulate import Integrator
+from tests.dynamics.let_go import LIFT, beside
+from tests.tiers import extended
+
+LOSS = sl.Damping(loss_time=1e-3)
+PULLEY, DEAD = sl.Winch(0.05), sl.Winch(dead_cable=3.0)
+
+
+@extended
+@pytest.mark.parametrize("behind", [None, PULLEY, DEAD, sl.Winch(0.05, dead_cable=3.0)])
+def test_cables_without_mass_lose_what_light_ones_with_mass_lose_while_they_are_wound_in(behind: sl.Winch) -> None:
+    robot = sl.load_robot("article-suspended")
+    rope = robot.cables.replace(linear_density=0.1 * robot.cables.linear_density)  # heavy ones lose more in waves
+    robot = robot.replace(winches=behind, cables=rope)
+    path = sl.septic_path([(0, 0, 1.0), (0, 0, 2.5)], durations=1.5, rate=500.0)
+    plan = sl.inverse(robot, path, tension=LIFT)
+    massless, lumped = (
+        sl.simulate(plan, duration=2.0, damping=LOSS, cable_mass=mass, nodes=10).energy.lost[-1]
+        for mass in ("none", "lumped")
+    )
+    assert massless == pytest.approx(lumped, rel=0.015)
+
+
+@pytest.mark.parametrize("integrator", ["splitting", "runge-kutta"])
+def test_tensions_are_those_that_move_the_platform_damping_included(
+    integrator: Integrator,
+) -> None:
+    robot, step = sl.load_robot("article-suspended"), 1e-4
+    state, lengths = beside(robot, (0.5, 0.3, 1.5), np.array([0.004, -0.003, 0.0033]), sl.Elastic())
+    run = sl.simulate(
+        state, unstrained_length=lengths, duration=0.1, step=step, record=step, damping=LOSS, integrator=integrator
+    )
+    rotation = run.pose.matrix
+    chords = robot.frame_anchors - (run.pose.position[:, None] + robot.platform_anchors @ np.swapaxes(rotation, 1, 2))
+    along = chords / np.linalg.norm(chords, axis=2, keepdims=True)
+    pulled = np.einsum("nm,nmc->nc", run.tensions, along) - [0.0, 0.0, robot.mass * robot.gravity]
+    moved = robot.mass * (run.twist[2:, :3] - run.twist[:-2, :3]) / (2.0 * step)
+    off = np.abs(pulled[1:-1] - moved).max()
+    assert off < 1e-3
