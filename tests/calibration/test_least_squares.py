@@ -6,7 +6,7 @@ from scipy.optimize import least_squares
 
 import sagline as sl
 from sagline.calibration.calibrate import active_sensors, readings_table
-from sagline.calibration.least_squares import evaluate_step, moved, solve
+from sagline.calibration.least_squares import evaluate_step, predict_state, solve
 from sagline.calibration.log import load_cells_of
 from sagline.calibration.parameters import external, parameters_of, robot_with
 from sagline.calibration.problem import Fit, Log, Problem, State, machine_at, reported_lengths, start_of
@@ -154,7 +154,7 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
     before = State(problem.prior, machine_at(problem, problem.prior), lengths, reference.pose_rows(pose))
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
     after, part = machine_at(problem, problem.prior + step), slice(0, len(lengths))
-    found, starts = moved(problem, before, None, step, after, reported_lengths(problem, after, part), part)
+    found, starts = predict_state(problem, before, None, step, after, reported_lengths(problem, after, part), part)
     rest = sl.forward(after.robot, found, sl.Pose.from_quaternion(starts[:, :3], starts[:, 3:]), model)
     assert rest.stable.all()
     ended = reference.pose_rows(rest.pose)

@@ -1,6 +1,5 @@
 """What went wrong at a pose: on synthetic logs in which something did."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -79,7 +78,7 @@ def test_a_load_cell_that_read_100_n_too_much() -> None:
     assert log.load_cells is not None
     cells = log.load_cells.copy()
     cells[17, 3] += 100.0
-    found = outliers(replace(log, load_cells=cells), truth())
+    found = outliers(log.replace(load_cells=cells), truth())
     assert [(one.row, one.cable, one.quantity) for one in found] == [(17, 3, "load cell")]
     assert abs(found[0].size - 100.0) < 25.0
 
@@ -90,7 +89,7 @@ def test_a_position_that_was_misread() -> None:
     assert log.position is not None
     position = log.position.copy()
     position[8] += [0.012, 0.0, -0.009]
-    found = outliers(replace(log, position=position), true)
+    found = outliers(log.replace(position=position), true)
     assert [(one.row, one.cable, one.quantity) for one in found] == [(8, None, "position")]
     assert abs(found[0].size - 0.015) < 0.003
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.calibration.parameters import offset_with, parameters_of, robot_with
-from sagline.calibration.result import known_of, moved_at
+from sagline.calibration.result import motion_slopes
 from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of, pose_rows
 from tests.calibration.synthetic import log_of, true_robot, with_drums
@@ -214,8 +214,8 @@ def test_the_same_robot_moves_otherwise_by_its_stiffness_where_counts_were_read(
     parameters = parameters_of(robot, ["axial_stiffness"], sensors, counted=counted)
     plan = sl.inverse(robot, commanded("drums")[0])
     lengths = np.asarray(plan.state.unstrained_length)[None]
-    known = known_of(robot, sl.Catenary(), parameters, np.eye(len(parameters.names)), sensors)
-    moved = moved_at(known, pose_rows(plan.state.pose), lengths).by_values[0, :3]
+    by_values, _ = motion_slopes(robot, sl.Catenary(), parameters, pose_rows(plan.state.pose), lengths)
+    moved = by_values[0, :3]
     believed = counts_of(robot, lengths)
     for k, value in enumerate(parameters.prior):
         ends = []

@@ -1,24 +1,25 @@
-"""What follows from the last state of a search: covariance, residuals, and whether to believe them."""
+"""The result of a search: covariance, residuals, status and provenance."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
+from scipy.special import chdtr, chdtrc
 
-from sagline.calibration.findings import CalibrationStatus, CrossValidation, Omission, Outlier
+from sagline.calibration.findings import CalibrationStatus, CrossValidation, Omission
 from sagline.calibration.identifiability import OPEN, append_rows, gauge_of
-from sagline.calibration.least_squares import QUANTILE, above, below, exceeded_with, whitened_at
+from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_at
 from sagline.calibration.observations import BLOCK
 from sagline.calibration.outliers import misfitting, outliers_in
 from sagline.calibration.parameters import KINDS, Parameters, external
 from sagline.calibration.problem import Fit, Problem, reported_lengths
 from sagline.calibration.result import Calibration
-from sagline.calibration.search import Found
+from sagline.calibration.search import SearchResult
 from sagline.calibration.weak_identifiability import cannot_tell_apart
-from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.core.arrays import Array, Indices, locked
 from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 from sagline.robot.provenance import Provenance
@@ -33,7 +34,7 @@ LITTLE: Final = 1e-6  # of a direction: a number that has so little of it is tol
 
 def evaluate(
     problem: Problem,
-    found: Found,
+    found: SearchResult,
     rows: Indices,
     left_out: Mapping[Omission, Indices],
     source: str,
@@ -51,36 +52,37 @@ def evaluate(
     """
     fit, kept, parameters = found.fit, found.kept, problem.parameters
     numbers, machine, normal = fit.state.numbers, fit.state.machine, fit.normal
-    residuals, triangle = said_by_all(problem, fit)
-    values, machines = external(parameters, numbers), (machine.robot, machine.sensors)
-    gauge = gauge_of(triangle, parameters, values, *machines)
-    covariance, told = covariance_of(problem, triangle, machine.slopes)
-    judged = _judged(problem, found, told)
-    gone = dict(left_out)
-    for reason, which in found.left_out.items():
-        gone[reason] = locked(rows[which])
+    residuals, triangle = final_readings(problem, fit)
+    values = external(parameters, numbers)
+    gauge = gauge_of(triangle, parameters, values, machine.robot, machine.sensors)
+    covariance, rank = covariance_of(problem, triangle, machine.slopes)
+    whole, missed = kept & (normal.weights == 1.0), problem.missed(numbers)
+    chi_squared = float(normal.squares[whole].sum() + missed @ missed)
+    freedoms = int(normal.readings[whole].sum()) + int(np.isfinite(problem.prior_deviation).sum()) - rank
+    status = _status(found, chi_squared, freedoms)
+    bad = misfitting(np.where(kept, normal.squares, np.nan), normal.readings)
     poses = fit.state.poses[kept]
     date, errors = datetime.now(UTC).date().isoformat(), np.sqrt(np.diagonal(covariance))
-    made = provenance_of(parameters, errors, judged.status, source, date)
+    provenance = provenance_of(parameters, errors, status, source, date)
     return Calibration(
-        robot=machine.robot.replace(calibration=made),
+        robot=machine.robot.replace(calibration=provenance),
         before=problem.robot,
         sensors=machine.sensors,
         length_offset=locked(machine.offset),
-        status=judged.status,
+        status=status,
         parameters=parameters,
         values=locked(values),
         covariance=locked(covariance),
-        chi_squared=judged.chi_squared,
-        degrees_of_freedom=judged.free,
+        chi_squared=chi_squared,
+        degrees_of_freedom=freedoms,
         rows=locked(rows[kept]),
-        left_out=gone,
+        left_out={**left_out, **{reason: locked(rows[which]) for reason, which in found.left_out.items()}},
         poses=Pose._adopt(locked(poses[:, :3].copy()), locked(poses[:, 3:].copy())),
         unstrained_length=locked(fit.state.lengths[kept]),
         residuals=locked(residuals[kept]),
         chi_squared_of_pose=locked(normal.squares[kept]),
         weights=locked(normal.weights[kept]),
-        outliers=_outliers(problem, fit, kept, rows),
+        outliers=outliers_in(problem, fit.state, bad, rows[bad], count=int(kept.sum())),
         gauge=gauge,
         cannot_tell_apart=cannot_tell_apart(triangle, parameters, gauge),
         cross_validation=validation,
@@ -91,65 +93,41 @@ def evaluate(
     )
 
 
-def _outliers(problem: Problem, fit: Fit, kept: Flags, rows: Indices) -> tuple[Outlier, ...]:
-    """What went wrong at poses that do not fit."""
-    bad = misfitting(np.where(kept, fit.normal.squares, np.nan), fit.normal.readings)
-    return outliers_in(problem, fit.state, bad, rows[bad], count=int(kept.sum()))
-
-
-class Judged(NamedTuple):
-    """Whether to believe a calibration: its status, sum of squares, and what that is to be compared with."""
-
-    status: CalibrationStatus
-    chi_squared: float
-    free: int
-
-
-def _judged(problem: Problem, found: Found, told: int) -> Judged:
-    """Judge a search by the poses that count whole, of which `told` combinations of the numbers are found."""
-    fit, kept, normal = found.fit, found.kept, found.fit.normal
-    missed = problem.missed(fit.state.numbers)
-    whole = kept & (normal.weights == 1.0)
-    chi_squared = float(normal.squares[whole].sum() + missed @ missed)
-    free = int(normal.readings[whole].sum()) + int(np.isfinite(problem.prior_deviation).sum()) - told
-    if not fit.converged:
-        return Judged(CalibrationStatus.NOT_CONVERGED, chi_squared, free)
-    doubt = _is_doubtful(chi_squared, free, normal.readings[whole], robust=bool((normal.weights[kept] < 1.0).any()))
+def _status(found: SearchResult, chi_squared: float, freedoms: int) -> CalibrationStatus:
+    """Whether to believe a search, by the poses of full weight."""
+    kept, weights = found.kept, found.fit.normal.weights
+    if not found.fit.converged:
+        return CalibrationStatus.NOT_CONVERGED
+    readings, reduced = found.fit.normal.readings[kept & (weights == 1.0)], bool((weights[kept] < 1.0).any())
     elsewhere = len(found.left_out.get(Omission.OTHER_EQUILIBRIUM, ()))
-    odd = np.count_nonzero(kept & (normal.weights < ODD_WEIGHT)) + elsewhere
+    odd = np.count_nonzero(kept & (weights < ODD_WEIGHT)) + elsewhere
+    doubt = _is_doubtful(chi_squared, freedoms, readings, robust=reduced)
     doubt = doubt or bool(odd > ODD * (np.count_nonzero(kept) + elsewhere))
-    return Judged(CalibrationStatus.DOUBTFUL if doubt else CalibrationStatus.FOUND, chi_squared, free)
+    return CalibrationStatus.DOUBTFUL if doubt else CalibrationStatus.FOUND
 
 
-class Said(NamedTuple):
-    """What all readings say at the end.
+def final_readings(problem: Problem, fit: Fit) -> tuple[Array, Array]:
+    """Residuals and slopes of all readings at the end of a search.
 
-    Attributes:
-        residuals: Readings less predictions: lengths, load cells, position, rotation [m, N, m, rad], (N, 2 m + 6); NaN
-            where nothing was read.
-        triangle: Triangular factor of the whitened slopes by what is looked for, poses weighted, (at most P, P).
+    Returns:
+        Readings less predictions: lengths, load cells, position, rotation [m, N, m, rad], (N, 2 m + 6), NaN where
+        nothing was read; and the triangular factor of the whitened slopes by the internal parameters, poses weighted,
+        (at most P, P).
     """
-
-    residuals: Array
-    triangle: Array
-
-
-def said_by_all(problem: Problem, fit: Fit) -> Said:
-    """What all readings say at the end of a search; poses of no weight say nothing."""
-    state, width = fit.state, len(fit.state.numbers)
-    residuals, triangle = [], np.zeros((0, width))
+    state, residuals = fit.state, []
+    triangle = np.zeros((0, len(state.numbers)))
     for part in blocks(len(state.poses), BLOCK):
-        said = reported_lengths(problem, state.machine, part)
-        rows = whitened_at(problem, state, said, part, free_of_noise=True)
-        residuals.append(np.hstack((said - state.lengths[part], rows.residual)))
+        reported = reported_lengths(problem, state.machine, part)
+        rows = whitened_at(problem, state, reported, part, free_of_noise=True)
+        residuals.append(np.hstack((reported - state.lengths[part], rows.residual)))
         triangle = append_rows(triangle, rows.matrix * np.sqrt(fit.normal.weights[part])[:, None, None])
-    return Said(np.concatenate(residuals), triangle)
+    return np.concatenate(residuals), triangle
 
 
 def covariance_of(problem: Problem, triangle: Array, slopes: Array) -> tuple[Array, int]:
-    """Covariance of the values, (P, P), infinite on the diagonal where neither a reading nor a prior tells.
+    """Covariance of the values, (P, P), and its rank.
 
-    And how many combinations of them are told, P where all are.
+    The diagonal is infinite for values with neither observations nor a prior.
 
     Args:
         problem: The problem.
@@ -159,13 +137,13 @@ def covariance_of(problem: Problem, triangle: Array, slopes: Array) -> tuple[Arr
     scale, deviation = problem.scale, problem.prior_deviation
     known = np.where(np.isfinite(deviation), scale / deviation, 0.0)
     _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, np.diag(known)))
-    told = sizes > OPEN * sizes[0]
-    unit = rows[: len(told)][told].T / sizes[told] * (scale * slopes)[:, None]
+    observable = sizes > OPEN * sizes[0]
+    unit = rows[: len(observable)][observable].T / sizes[observable] * (scale * slopes)[:, None]
     covariance: Array = unit @ unit.T
-    lost = rows[np.concatenate((~told, np.ones(len(rows) - len(told), dtype=np.bool_)))]
-    nowhere = np.flatnonzero((np.abs(lost) > LITTLE).any(axis=0))
-    covariance[nowhere, nowhere] = np.inf
-    return covariance, int(np.count_nonzero(told))
+    null = rows[np.concatenate((~observable, np.ones(len(rows) - len(observable), dtype=np.bool_)))]
+    unknown = np.flatnonzero((np.abs(null) > LITTLE).any(axis=0))
+    covariance[unknown, unknown] = np.inf
+    return covariance, int(np.count_nonzero(observable))
 
 
 def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bool) -> bool:
@@ -179,9 +157,9 @@ def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bo
     cut = 0.0
     if robust:
         limit = exceeded_with(1.0 - QUANTILE, readings)
-        cut = float(np.sum(readings * (1.0 - below(limit, readings + 2) / QUANTILE)))
+        cut = float(np.sum(readings * (1.0 - chdtr(readings + 2, limit) / QUANTILE)))
     ratio = chi_squared / max(free - cut, 1.0)
-    rare = min(above(chi_squared + cut, free), below(chi_squared + cut, free)) < 0.5 * DOUBTFUL
+    rare = min(chdtrc(free, chi_squared + cut), chdtr(free, chi_squared + cut)) < 0.5 * DOUBTFUL
     return bool(rare and not 1.0 / TOLERATED < ratio < TOLERATED)
 
 

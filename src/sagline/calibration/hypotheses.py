@@ -209,7 +209,7 @@ class Trial:
 def _fitted(problem: Problem, state: State) -> Evaluated:
     """A few steps of the least squares: a robot that fits is found in half of them, of others only that it does not."""
     begun = evaluate_step(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
-    fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, settled=TOLERANCE)
+    fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, tolerance=TOLERANCE)
     return fit.state, fit.normal
 
 

@@ -1,16 +1,17 @@
-"""The sensors of a calibration: how far each is to be trusted, and where a measuring system stands."""
+"""Logs of a robot's own readings, one row a pose at which it stood, and the accuracy of the sensors."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from attrs import evolve, field, fields, frozen
 from numpy.typing import ArrayLike
 
 from sagline.core.arguments import choice, instance, optional, text
 from sagline.core.arrays import Array, Flags, Indices, checked, exactly, locked
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import given, if_known, rule
 from sagline.core.indices import part_of
 from sagline.core.results import Result, Saved
 from sagline.robot.pose import Pose
@@ -20,7 +21,15 @@ from sagline.robot.unit import unit
 LENGTH_DEVIATION = 5e-4  # m, of a length off a drum that nobody measured: rope on a grooved drum
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+def _world_if_none(frame: Pose | None) -> Pose:
+    return Pose(np.zeros(3), np.eye(3)) if frame is None else frame
+
+
+def _default_if_none(sensors: Sensors | None) -> Sensors:
+    return Sensors() if sensors is None else sensors
+
+
+@frozen(eq=False, weakref_slot=False)
 class Sensors(Result):
     """What measures a robot: standard deviations, and where its measuring system stands.
 
@@ -32,56 +41,40 @@ class Sensors(Result):
         rotation_deviation: Of a measured rotation about each axis [rad], > 0, shape () or (3,); None where rotations
             are not measured.
         frame: Pose of the measuring system in the world: a point that it reads as p is at frame.position +
-            frame.matrix p.
+            frame.matrix p; None is given for the world's own axes.
         target: The point of the platform whose position is measured, platform frame [m], shape (3,).
+
+    Raises:
+        InvalidValueError: If a deviation is not positive, or something is of the wrong kind or shape.
+
+    Examples:
+        >>> import sagline as sl
+        >>> sensors = sl.Sensors(length_deviation=5e-4, tension_deviation=5.0)
+        >>> print(sensors.tension_deviation, sensors.position_deviation)
+        5.0 None
     """
 
-    length_deviation: Array
-    tension_deviation: Array | None
-    position_deviation: Array | None
-    rotation_deviation: Array | None
-    frame: Pose
-    target: Array
+    length_deviation: Array = field(default=LENGTH_DEVIATION, converter=given, metadata=rule("m", above=0.0))
+    tension_deviation: Array | None = field(default=None, converter=if_known, metadata=rule("N", above=0.0))
+    position_deviation: Array | None = field(default=None, converter=if_known, metadata=rule("m", above=0.0))
+    rotation_deviation: Array | None = field(default=None, converter=if_known, metadata=rule("rad", above=0.0))
+    frame: Pose = field(default=None, kw_only=True, converter=_world_if_none)
+    target: Array = field(default=(0.0, 0.0, 0.0), kw_only=True, converter=given)
 
-    def __init__(
-        self,
-        length_deviation: ArrayLike = LENGTH_DEVIATION,
-        tension_deviation: ArrayLike | None = None,
-        position_deviation: ArrayLike | None = None,
-        rotation_deviation: ArrayLike | None = None,
-        *,
-        frame: Pose | None = None,
-        target: ArrayLike = (0.0, 0.0, 0.0),
-    ) -> None:
-        """Check every field once.
-
-        Args:
-            length_deviation: As the attributes.
-            tension_deviation: See the attributes.
-            position_deviation: See the attributes.
-            rotation_deviation: See the attributes.
-            frame: See the attributes; None for the world's own axes.
-            target: See the attributes.
-
-        Raises:
-            InvalidValueError: If a deviation is not positive, or something is of the wrong kind or shape.
-
-        Examples:
-            >>> import sagline as sl
-            >>> sensors = sl.Sensors(length_deviation=5e-4, tension_deviation=5.0)
-            >>> print(sensors.tension_deviation, sensors.position_deviation)
-            5.0 None
-        """
-        values: dict[str, Any] = {
-            "length_deviation": _given(length_deviation, "length_deviation", "m", None),
-            "tension_deviation": _deviation(tension_deviation, "tension_deviation", "N", None),
-            "position_deviation": _deviation(position_deviation, "position_deviation", "m", 3),
-            "rotation_deviation": _deviation(rotation_deviation, "rotation_deviation", "rad", 3),
-            "frame": _single(Pose(np.zeros(3), np.eye(3)) if frame is None else instance(frame, Pose, "frame")),
-            "target": exactly(target, "target", "m", (3,)),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+    def __attrs_post_init__(self) -> None:
+        """Check every field once."""
+        for about in fields(Sensors)[:4]:
+            if (value := getattr(self, about.name)) is not None or about.default is not None:
+                own = checked(value, about.name, **about.metadata)
+                axes = 3 if about.name in ("position_deviation", "rotation_deviation") else None
+                if own.ndim > 1 or (own.ndim == 1 and axes not in (None, own.size)) or own.size == 0:
+                    allowed, step = f"shape () or ({axes or 'm'},)", "Give one number, or one each."
+                    raise InvalidValueError(about.name, f"of shape {own.shape}", allowed, step)
+                object.__setattr__(self, about.name, own)
+        if instance(self.frame, Pose, "frame").shape:
+            value = f"a batch of {len(self.frame)}"
+            raise InvalidValueError("frame", value, "a single pose", "Take one of them: frame[0].")
+        object.__setattr__(self, "target", exactly(self.target, "target", "m", (3,)))
 
     def replace(self, **changes: Any) -> Sensors:
         """Sensors with some fields changed, checked like new ones.
@@ -92,21 +85,21 @@ class Sensors(Result):
         Raises:
             InvalidValueError: If there is no such field, or a value is none the constructor accepts.
         """
-        for field in changes:
-            choice(field, "field", Sensors.__slots__)
-        return replace(self, **changes)
+        for name in changes:
+            choice(name, "field", self.__slots__)
+        return evolve(self, **changes)
+
+    def __reduce__(self) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
+        """Pickle through the constructor, so that loaded sensors are checked and locked too."""
+        return _again, (Sensors, {about.name: getattr(self, about.name) for about in fields(Sensors)})
+
+
+def _again(kind: type[Any], values: dict[str, Any]) -> Any:
+    return kind(**values)
 
 
 def reading_deviations(sensors: Sensors, cables: int) -> Array:
-    """Standard deviations of all that may be read at a pose.
-
-    Args:
-        sensors: The sensors.
-        cables: Number of cables m.
-
-    Returns:
-        Of lengths [m], load cells [N], position [m] and rotation [rad], shape (2 m + 6,); infinite for no sensor.
-    """
+    """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite for no sensor."""
     parts = (
         (sensors.length_deviation, cables),
         (sensors.tension_deviation, cables),
@@ -121,118 +114,79 @@ def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
     return (1.0, 0.0) if robot.winches is None else (robot.winches.load_cell_gain, robot.winches.load_cell_bias)
 
 
-def _deviation(value: ArrayLike | None, item: str, unit: str, count: int | None) -> Array | None:
-    return None if value is None else _given(value, item, unit, count)
-
-
-def _given(value: ArrayLike, item: str, unit: str, count: int | None) -> Array:
-    """A deviation for all, or one each of so many; None: of the cables."""
-    array = checked(value, item, unit, above=0.0)
-    if array.ndim > 1 or (array.ndim == 1 and count not in (None, array.size)) or array.size == 0:
-        allowed = f"shape () or ({'m' if count is None else count},)"
-        raise InvalidValueError(item, f"of shape {array.shape}", allowed, "Give one number, or one each.")
-    return array
-
-
-def _single(pose: Pose) -> Pose:
-    if pose.shape:
-        raise InvalidValueError("frame", f"a batch of {len(pose)}", "a single pose", "Take one of them: frame[0].")
-    return pose
-
-
 _BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "time", "commanded")
 _UNIT = 1e-6  # by how much the length of a quaternion may be off: one printed with seven digits is taken
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+@frozen(eq=False, repr=False, weakref_slot=False)
 class WinchLog(Result, Saved):
     """Readings of a robot that stood still at N poses. NaN stands where a reading is missing.
 
     Attributes:
-        counts: Of the encoders, shape (N, m), or None; either these or lengths are there.
+        counts: Of the encoders, shape (N, m), or None; either these or lengths are there. A row without a count of
+            every cable is left out of a calibration.
         unstrained_length: Lengths off the drums as the machine believes them [m], shape (N, m), or None.
-        load_cells: What the load cells at the frame ends read [N], shape (N, m), NaN for none; or None.
+        load_cells: What the load cells at the frame ends read [N], which may be negative, shape (N, m), NaN for none;
+            or None.
         position: Position of the target in the measuring system's axes [m], shape (N, 3), each coordinate NaN where
             nobody measured it; or None.
         rotation: Of the platform in those axes as unit quaternions, scalar last, shape (N, 4), rows of NaN where nobody
             measured it; or None.
         time: [s], shape (N,), in any order; or None.
         commanded: Poses that were commanded, roughly where the platform stood, N of them; or None.
-        sensors: How far the readings are to be trusted.
+        sensors: How far the readings are to be trusted, with a deviation of all that is read; None is given for
+            `Sensors()`, of lengths alone.
         source: Where they were read.
+
+    Raises:
+        InvalidValueError: If both or none of counts and lengths are given, a field is of the wrong kind or shape or has
+            numbers that no sensor reads, or the sensors do not say how far a reading is to be trusted.
+
+    Examples:
+        >>> import numpy as np
+        >>> import sagline as sl
+        >>> sensors = sl.Sensors(tension_deviation=5.0)
+        >>> lengths = [[3.1, 3.2, 3.3], [3.2, 3.1, 3.4]]
+        >>> cells = [[70.0, 80.0, np.nan], [72.0, 79.0, np.nan]]
+        >>> log = sl.WinchLog(
+        ...     unstrained_length=lengths, load_cells=cells, sensors=sensors
+        ... )
+        >>> print(log)
+        2 rows of 3 cables: lengths, 4 readings of load cells
+        >>> len(log.rows(slice(0, 1)))
+        1
     """
 
-    counts: Array | None
-    unstrained_length: Array | None
-    load_cells: Array | None
-    position: Array | None
-    rotation: Array | None
-    time: Array | None
-    commanded: Pose | None
-    sensors: Sensors
-    source: str
+    counts: Array | None = field(default=None, converter=if_known)
+    unstrained_length: Array | None = field(default=None, converter=if_known)
+    load_cells: Array | None = field(default=None, converter=if_known)
+    position: Array | None = field(default=None, converter=if_known)
+    rotation: Array | None = field(default=None, converter=if_known)
+    time: Array | None = field(default=None, converter=if_known)
+    commanded: Pose | None = None
+    sensors: Sensors = field(default=None, converter=_default_if_none)
+    source: str = ""
 
-    def __init__(
-        self,
-        counts: ArrayLike | None = None,
-        unstrained_length: ArrayLike | None = None,
-        load_cells: ArrayLike | None = None,
-        position: ArrayLike | None = None,
-        rotation: ArrayLike | None = None,
-        time: ArrayLike | None = None,
-        commanded: Pose | None = None,
-        sensors: Sensors | None = None,
-        source: str = "",
-    ) -> None:
-        """Check every field once, and that they fit together.
-
-        Args:
-            counts: As the attributes; a row without a count of every cable is left out of a calibration.
-            unstrained_length: See the attributes.
-            load_cells: See the attributes; what they read may be negative.
-            position: See the attributes.
-            rotation: See the attributes.
-            time: See the attributes.
-            commanded: See the attributes.
-            sensors: With a deviation of all that is read; None for `Sensors()`, of lengths alone.
-            source: See the attributes.
-
-        Raises:
-            InvalidValueError: If both or none of counts and lengths are given, a field is of the wrong kind or shape or
-                has numbers that no sensor reads, or the sensors do not say how far a reading is to be trusted.
-
-        Examples:
-            >>> import numpy as np
-            >>> import sagline as sl
-            >>> sensors = sl.Sensors(tension_deviation=5.0)
-            >>> lengths = [[3.1, 3.2, 3.3], [3.2, 3.1, 3.4]]
-            >>> cells = [[70.0, 80.0, np.nan], [72.0, 79.0, np.nan]]
-            >>> log = sl.WinchLog(
-            ...     unstrained_length=lengths, load_cells=cells, sensors=sensors
-            ... )
-            >>> print(log)
-            2 rows of 3 cables: lengths, 4 readings of load cells
-            >>> len(log.rows(slice(0, 1)))
-            1
-        """
-        name, unit_, given = _lengths_or_counts(counts, unstrained_length)
-        read = _table(given, name, unit_, None, None)
+    def __attrs_post_init__(self) -> None:
+        """Check every field once, and that they fit together."""
+        name, unit_, values = _lengths_or_counts(self.counts, self.unstrained_length)
+        read = _table(values, name, unit_, None, None)
         n, m = read.shape
-        values: dict[str, Any] = {
-            "counts": None,
-            "unstrained_length": None,
-            name: read,
-            "load_cells": None if load_cells is None else _table(load_cells, "load_cells", "N", n, m),
-            "position": None if position is None else _table(position, "position", "m", n, 3),
-            "rotation": None if rotation is None else _quaternions(_table(rotation, "rotation", "", n, 4)),
-            "time": None if time is None else _times(time, n),
-            "commanded": _poses(optional(commanded, Pose, "commanded"), n),
-            "sensors": Sensors() if sensors is None else instance(sensors, Sensors, "sensors"),
-            "source": text(source, "source"),
-        }
-        for attribute, value in values.items():
-            object.__setattr__(self, attribute, value)
+        object.__setattr__(self, name, read)
+        for name, unit_, columns in (("load_cells", "N", m), ("position", "m", 3), ("rotation", "", 4)):
+            if (value := getattr(self, name)) is not None:
+                table = _table(value, name, unit_, n, columns)
+                object.__setattr__(self, name, _quaternions(table) if name == "rotation" else table)
+        if self.time is not None:
+            object.__setattr__(self, "time", _times(self.time, n))
+        _check_poses(optional(self.commanded, Pose, "commanded"), n)
+        instance(self.sensors, Sensors, "sensors")
+        object.__setattr__(self, "source", text(self.source, "source"))
         _check_sensors(self, m)
+
+    def __reduce__(self) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
+        """Pickle through the constructor, so that a loaded log is checked and locked too."""
+        return _again, (WinchLog, {about.name: getattr(self, about.name) for about in fields(WinchLog)})
 
     @property
     def readings(self) -> Array:
@@ -260,7 +214,7 @@ class WinchLog(Result, Saved):
         for values in parts.values():
             if isinstance(values, np.ndarray):
                 locked(values)  # ours: no need for another copy
-        return replace(self, **parts)
+        return evolve(self, **parts)
 
     def replace(self, **changes: Any) -> WinchLog:
         """A log with some fields changed, checked like a new one.
@@ -272,8 +226,8 @@ class WinchLog(Result, Saved):
             InvalidValueError: If there is no such field, or a value is none the constructor accepts.
         """
         for name in changes:
-            choice(name, "field", WinchLog.__slots__)
-        return replace(self, **changes)
+            choice(name, "field", self.__slots__)
+        return evolve(self, **changes)
 
     def __str__(self) -> str:
         """How many rows of what."""
@@ -339,11 +293,10 @@ def _times(value: ArrayLike, rows: int) -> Array:
     return time
 
 
-def _poses(pose: Pose | None, rows: int) -> Pose | None:
+def _check_poses(pose: Pose | None, rows: int) -> None:
     if pose is not None and pose.shape != (rows,):
         value = f"a batch of {len(pose)}" if pose.shape else "a single pose"
         raise InvalidValueError("commanded", value, f"a batch of {rows}", "Give one a row of the log.")
-    return pose
 
 
 def _check_sensors(log: WinchLog, cables: int) -> None:

@@ -1,4 +1,4 @@
-"""A pose of a log explained: the best fit where some lengths or readings are off by anything."""
+"""Outliers: poses that do not fit the rest, and the length, load cell or measured pose that is wrong there."""
 
 from __future__ import annotations
 
@@ -7,25 +7,33 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import gammaln
+from scipy.special import chdtrc, gammaln
 
-from sagline.cables.model import CableModel
 from sagline.calibration.findings import Outlier
-from sagline.calibration.least_squares import above, exceeded_with
-from sagline.calibration.log import Sensors, reading_deviations
+from sagline.calibration.least_squares import exceeded_with
+from sagline.calibration.log import reading_deviations
 from sagline.calibration.observations import NO_LOAD, Reference, misfit_at, reference_of
 from sagline.calibration.problem import Problem, State, reported_lengths
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import Readings
 from sagline.kinematics.forward_rows import solve_rows
-from sagline.robot.robot import Robot
 
-_SETTLED: Final = 1e-3  # of a sum of squares
+CHANCE: Final = 0.01  # of one outlier among all poses of a log that has none
+EXAMINED: Final = 100  # poses, the worst of them: where there are more, the calibration is wrong and not the poses
+_MOST: Final = 3  # things that went wrong at one pose; more is the pose as a whole
+_CLEAR: Final = 3.0  # of the logarithm of the probability: explanations nearer to each other are not told apart
+_REST: Final = 0.1  # of the squares that one thing explains: what the rest of the calibration may be wrong by
+_WORTH: Final = 20.0  # of the same, to first order: how much worse an explanation may be to be looked at closely
+_NONLINEAR: Final = 0.6  # of the same: of what is off by far, the slopes need explain no more to be looked at closely
+_DROP: Final = 500.0  # of chi squared
+_ITERATIONS: Final = 10
+_QUANTITIES: Final = ("length", "load cell", "position", "rotation")
+_TOLERANCE: Final = 1e-3  # of a sum of squares
 _HALVINGS: Final = 6
 
 
 class Suspect(NamedTuple):
-    """What may have gone wrong at a pose.
+    """A possible error at a pose.
 
     Attributes:
         quantity: Of `Outlier`.
@@ -39,11 +47,11 @@ class Suspect(NamedTuple):
 
 
 class SuspectFit(NamedTuple):
-    """A pose, where some things are taken to be off by what fits best.
+    """The fit of a pose with the suspects off by what fits best.
 
     Attributes:
-        squares: Sum of squares that is left.
-        sizes: By how much each thing is off.
+        squares: Remaining sum of squares.
+        sizes: Error of each suspect.
         deviations: The same in standard deviations.
     """
 
@@ -52,86 +60,70 @@ class SuspectFit(NamedTuple):
     deviations: list[float]
 
 
-class PoseReadings(NamedTuple):
-    """A pose of the log.
+class Case(NamedTuple):
+    """One pose of the log.
 
     Attributes:
-        bench: What it is compared with.
+        reference: The robot and its sensors.
         deviation: Of lengths and readings, (2 m + 6,).
-        readings: What was read there, of one row.
-        pose: Where it is, (1, POSE_COLUMNS).
-        lengths: With which true lengths [m], (1, m).
+        readings: Its readings, one row.
+        pose: Its pose row, (1, POSE_COLUMNS).
+        lengths: Its true lengths [m], (1, m).
+        read: Flags of the readings that were read, (m + 6,).
     """
 
-    bench: Reference
+    reference: Reference
     deviation: Array
     readings: Readings
     pose: Array
     lengths: Array
+    read: Flags
+
+    def misses(self) -> tuple[Array, Array]:
+        """Reported less true lengths, and readings less predictions, (2 m + 6,); slopes by length, (m + 6, m)."""
+        residual, by_length = misfit_at(self.reference, self.readings, self.pose, self.lengths)
+        return np.concatenate((self.readings.lengths[0] - self.lengths[0], residual)), by_length
 
 
-class PoseFit(NamedTuple):
-    """A platform at some lengths, beside what was read.
+def fit_suspects(case: Case, taken: Sequence[Suspect], iterations: int) -> SuspectFit:
+    """The best fit of a pose where suspects are off by any amount.
 
-    Attributes:
-        pose: (1, POSE_COLUMNS).
-        lengths: [m], (1, m).
-        residual: Readings less predictions, (m + 6,).
-        by_length: Their slopes, (m + 6, m).
-        squares: Sum of squares of all but what may be off.
-    """
-
-    pose: Array
-    lengths: Array
-    residual: Array
-    by_length: Array
-    squares: float
-
-    @classmethod
-    def of(cls, stand: PoseReadings, counts: Flags, pose: Array, lengths: Array) -> PoseFit:
-        """The platform at a pose."""
-        residual, by_length = misfit_at(stand.bench, stand.readings, pose, lengths)
-        missed = np.concatenate((stand.readings.lengths[0] - lengths[0], residual)) / stand.deviation
-        return cls(pose, lengths, residual, by_length, float(np.sum(missed[counts] ** 2)))
-
-
-def fit_suspects(stand: PoseReadings, taken: Sequence[Suspect], there: Flags, rounds: int) -> SuspectFit:
-    """The best fit of a pose where some lengths and readings are off by anything, as the others are not.
-
-    With one round it is that of the slopes, with more that of the pose itself.
+    With one iteration it is that of the slopes, with more that of the nonlinear model.
     """
     which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
-    counts = np.concatenate((np.ones(stand.lengths.shape[1], dtype=np.bool_), there))
+    counts = np.concatenate((np.ones(case.lengths.shape[1], dtype=np.bool_), case.read))
     counts[which] = False
-    state = PoseFit.of(stand, counts, stand.pose, stand.lengths)
-    fit, wanted = _fitted(stand, state, taken, which, there)
-    for _ in range(rounds - 1):
-        better = _better(stand, state, counts, wanted)
+    fit, wanted, squares = _linear_fit(case, taken, which, counts)
+    for _ in range(iterations - 1):
+        better = _improved(case, counts, wanted, squares)
         if better is None:
             break
-        gained = state.squares - better.squares
-        state = better
-        fit, wanted = _fitted(stand, state, taken, which, there)
-        if gained < _SETTLED:
+        before, case = squares, better
+        fit, wanted, squares = _linear_fit(case, taken, which, counts)
+        if before - squares < _TOLERANCE:
             break
-    return fit if rounds == 1 else fit._replace(squares=state.squares)
+    return fit if iterations == 1 else fit._replace(squares=squares)
 
 
-def _fitted(
-    stand: PoseReadings, state: PoseFit, taken: Sequence[Suspect], which: Indices, there: Flags
-) -> tuple[SuspectFit, Array]:
-    """The best fit by the slopes at a state, and the true lengths that it asks for, (m,)."""
-    m, said = state.lengths.shape[1], stand.readings.lengths[0]
-    slopes, variance = state.by_length[there], stand.deviation[:m] ** 2
-    missed = state.residual[there] - slopes @ (said - state.lengths[0])
-    columns = np.hstack((-slopes, np.eye(m + 6)[there]))[:, which]
-    factor = cho_factor(np.diag(stand.deviation[m:][there] ** 2) + (slopes * variance) @ slopes.T)
+def _squares(case: Case, counts: Flags) -> float:
+    """Sum of squares of what counts."""
+    return float(np.sum((case.misses()[0] / case.deviation)[counts] ** 2))
+
+
+def _linear_fit(case: Case, taken: Sequence[Suspect], which: Indices, counts: Flags) -> tuple[SuspectFit, Array, float]:
+    """The best fit by the slopes, the true lengths that it asks for (m,), and the sum of squares before it."""
+    misses, by_length = case.misses()
+    m, read = case.lengths.shape[1], case.read
+    slopes, variance = by_length[read], case.deviation[:m] ** 2
+    missed = misses[m:][read] - slopes @ misses[:m]
+    columns = np.hstack((-slopes, np.eye(m + 6)[read]))[:, which]
+    factor = cho_factor(np.diag(case.deviation[m:][read] ** 2) + (slopes * variance) @ slopes.T)
     inverse = np.linalg.pinv(columns.T @ cho_solve(factor, columns), hermitian=True)
     off = inverse @ (columns.T @ cho_solve(factor, missed))
     rest = missed - columns @ off
-    slipped = np.zeros(2 * m + 6)
-    slipped[which] = off
-    wanted: Array = said - slipped[:m] + variance * (slopes.T @ cho_solve(factor, rest))
+    errors = np.zeros(2 * m + 6)
+    errors[which] = off
+    wanted: Array = case.readings.lengths[0] - errors[:m] + variance * (slopes.T @ cho_solve(factor, rest))
     sizes, deviations, first = [], [], 0
     for one in taken:
         part = slice(first, first + len(one.which))
@@ -139,37 +131,27 @@ def _fitted(
         sizes.append(float(own[0]) if one.cable is not None else float(np.linalg.norm(own)))
         deviations.append(float(np.sqrt(max(own @ spread @ own, 0.0))))
         first = part.stop
-    return SuspectFit(float(rest @ cho_solve(factor, rest)), sizes, deviations), wanted
+    squares = float(np.sum((misses / case.deviation)[counts] ** 2))
+    return SuspectFit(float(rest @ cho_solve(factor, rest)), sizes, deviations), wanted, squares
 
 
-def _better(stand: PoseReadings, state: PoseFit, counts: Flags, wanted: Array) -> PoseFit | None:
-    """The state on the way to other lengths whose sum of squares is smaller; None if there is none."""
+def _improved(case: Case, counts: Flags, wanted: Array, squares: float) -> Case | None:
+    """The case at lengths on the way to those wanted, with a smaller sum of squares; None if there is none."""
+    reference = case.reference
     for halving in range(_HALVINGS):
-        lengths = state.lengths + 0.5**halving * (wanted - state.lengths)
+        lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
         if (lengths <= 0.0).any():
             continue
-        found = solve_rows(stand.bench.robot, stand.bench.model, locked(lengths), locked(state.pose.copy()), NO_LOAD)
+        found = solve_rows(reference.machine.robot, reference.model, locked(lengths), locked(case.pose.copy()), NO_LOAD)
         if found.stable[0]:
-            new = PoseFit.of(stand, counts, found.poses, lengths)
-            if new.squares < state.squares:
+            new = case._replace(pose=found.poses, lengths=lengths)
+            if _squares(new, counts) < squares:
                 return new
     return None
 
 
-CHANCE: Final = 0.01  # of one outlier among all poses of a log that has none
-EXAMINED: Final = 100  # poses, the worst of them: where there are more, the calibration is wrong and not the poses
-_MOST: Final = 3  # things that went wrong at one pose; more is the pose as a whole
-_CLEAR: Final = 3.0  # of the logarithm of the probability: explanations nearer to each other are not told apart
-_REST: Final = 0.1  # of the squares that one thing explains: what the rest of the calibration may be wrong by
-_WORTH: Final = 20.0  # of the same, to first order: how much worse an explanation may be to be looked at closely
-_BENT: Final = 0.6  # of the same: of what is off by far, the slopes need explain no more to be looked at closely
-_DROP: Final = 500.0  # of chi squared
-_ROUNDS: Final = 10
-_QUANTITIES: Final = ("length", "load cell", "position", "rotation")
-
-
 def misfitting(squares: Array, readings: Indices) -> Indices:
-    """Which poses fit worse than chance lets any of so many, the worst of them where they are many: rising numbers.
+    """Indices, rising, of poses that fit worse than chance lets any of so many; at most `EXAMINED`, the worst.
 
     Args:
         squares: Sum of squares of each pose in standard deviations, (N,); NaN or infinite for one that does not count.
@@ -181,88 +163,57 @@ def misfitting(squares: Array, readings: Indices) -> Indices:
 
 
 def outliers_in(problem: Problem, state: State, which: Indices, rows: Indices, *, count: int) -> tuple[Outlier, ...]:
-    """What went wrong at some poses of a search that do not fit.
-
-    Args:
-        problem: The problem.
-        state: Where the search ended.
-        which: Numbers of the poses, (n,).
-        rows: Of the log, (n,).
-        count: How many poses the whole log has.
-    """
-    log, machine = problem.log, state.machine
-    said = reported_lengths(problem, machine, slice(None))[which]
-    readings = Readings(said, log.cells[which], log.positions[which], log.rotations[which])
-    stands = state.poses[which], state.lengths[which]
-    return outliers_of(machine.robot, problem.model, machine.sensors, readings, *stands, rows, count=count)
-
-
-def outliers_of(
-    robot: Robot,
-    model: CableModel,
-    sensors: Sensors,
-    readings: Readings,
-    poses: Array,
-    lengths: Array,
-    rows: Indices,
-    *,
-    count: int,
-) -> tuple[Outlier, ...]:
-    """What went wrong at poses that do not fit.
+    """Causes of misfit at some poses of a search, in order of the rows.
 
     For every length, load cell and measured position or rotation of a pose: by how much must it be off to explain the
     readings best, the lengths being known as far as their deviation says. What explains most is taken, and then what
     explains most of the rest. Where cables do alike, or nothing explains it, it is the pose as a whole.
 
     Args:
-        robot: The calibrated robot.
-        model: Cable model.
-        sensors: The calibrated sensors.
-        readings: What was read, and what the winches say the lengths are with the calibrated robot, at N poses that
-            do not fit.
-        poses: Where the calibration has the platform, (N, POSE_COLUMNS).
-        lengths: True lengths that it has [m], (N, m).
-        rows: Of the log, (N,).
-        count: How many poses the whole log has.
-
-    Returns:
-        Outliers, in order of the rows.
+        problem: The problem.
+        state: Final state of the search.
+        which: Indices of the poses, (n,).
+        rows: Their rows of the log, (n,).
+        count: Number of poses of the whole log.
     """
-    m = robot.cable_count
-    deviation = reading_deviations(sensors, m)
-    silent = [np.isnan(part) for part in (readings.cells, readings.positions, readings.rotations[:, :3])]
-    there = ~np.concatenate(silent, axis=1) & np.isfinite(deviation[m:])
-    bench = reference_of(robot, model, sensors)
+    log, machine, m = problem.log, state.machine, state.lengths.shape[1]
+    reported = reported_lengths(problem, machine, slice(None))
+    deviation = reading_deviations(machine.sensors, m)
+    read = ~np.isnan(np.hstack((log.cells, log.positions, log.rotations[:, :3]))) & np.isfinite(deviation[m:])
+    reference = reference_of(machine.robot, problem.model, machine.sensors)
     found: list[Outlier] = []
-    for place, row in enumerate(map(int, rows)):
-        one = slice(place, place + 1)
-        stand = PoseReadings(bench, deviation, Readings(*(part[one] for part in readings)), poses[one], lengths[one])
-        found += _outliers_at(stand, row, there[place], count)
+    for k, row in zip(which.tolist(), rows.tolist(), strict=True):
+        one = slice(k, k + 1)
+        readings = Readings(reported[one], log.cells[one], log.positions[one], log.rotations[one])
+        case = Case(reference, deviation, readings, state.poses[one], state.lengths[one], read[k])
+        found += _outliers_at(case, row, count)
     return tuple(found)
 
 
-def _outliers_at(stand: PoseReadings, row: int, there: Flags, count: int) -> list[Outlier]:
-    m = stand.lengths.shape[1]
-    whole = fit_suspects(stand, (), there, 1)
-    suspects = _suspects(m, there)
+def _outliers_at(case: Case, row: int, count: int) -> list[Outlier]:
+    m = case.lengths.shape[1]
+    whole = fit_suspects(case, (), 1)
+    suspects = _suspects(m, case.read)
     taken: list[Suspect] = []
     before = whole.squares
     for _ in range(_MOST):
-        first = [fit_suspects(stand, (*taken, one), there, 1) for one in suspects]
+        first = [fit_suspects(case, (*taken, one), 1) for one in suspects]
         rough = [_rarity(before, fit, one) for fit, one in zip(first, suspects, strict=True)]
         near_best = np.array(rough) < min(rough) + _WORTH
         close = [suspects[k] for k in np.flatnonzero(near_best)]
-        fits = [fit_suspects(stand, (*taken, one), there, _ROUNDS) for one in close]
-        if min(fit.squares for fit in fits) > _limit(there, (*taken, close[0]), count):  # none is right, or far from it
-            likely = ~near_best & (np.array([fit.squares for fit in first]) < _BENT * before)
+        fits = [fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
+        if min(fit.squares for fit in fits) > _limit(
+            case.read, (*taken, close[0]), count
+        ):  # none is right, or far from it
+            likely = ~near_best & (np.array([fit.squares for fit in first]) < _NONLINEAR * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
-            fits += [fit_suspects(stand, (*taken, one), there, _ROUNDS) for one in more]
+            fits += [fit_suspects(case, (*taken, one), _ITERATIONS) for one in more]
             close += more
         rare = [_rarity(before, fit, one) for fit, one in zip(fits, close, strict=True)]
         best = int(np.argmin(rare))
         near = {close[index].quantity for index in range(len(close)) if rare[index] < rare[best] + _CLEAR}
         alone = sum(each < rare[best] + _CLEAR for each in rare) == 1
-        limit = _limit(there, (*taken, close[best]), count)
+        limit = _limit(case.read, (*taken, close[best]), count)
         enough = fits[best].squares <= max(limit, 0.0 if taken else _REST * whole.squares)
         if not alone:
             if enough and not taken and len(near) == 1:  # which of the cables it was, nothing tells
@@ -274,25 +225,25 @@ def _outliers_at(stand: PoseReadings, row: int, there: Flags, count: int) -> lis
         if enough:
             each = zip(taken, fits[best].sizes, fits[best].deviations, strict=True)
             return [Outlier(row, one.cable, one.quantity, size, many) for one, size, many in each]
-    return [_whole(stand, row, whole.squares)]
+    return [_whole(case, row, whole.squares)]
 
 
 def _limit(there: Flags, taken: Sequence[Suspect], count: int) -> float:
-    """What chance lets the worst of so many poses have where so much is off."""
+    """Sum of squares that chance lets the worst of so many poses have, with some suspects taken out."""
     used = sum(len(one.which) for one in taken)
     return float(exceeded_with(CHANCE / count, int(there.sum()) - used))
 
 
 def _rarity(before: float, after: SuspectFit, suspect: Suspect) -> float:
-    """Logarithm of the probability that chance alone would make so much better what is left."""
+    """Logarithm of the probability that chance alone improves the fit so much."""
     half, drop = 0.5 * len(suspect.which), max(before - after.squares, 0.0)
     if drop < _DROP:
-        return float(np.log(above(drop, len(suspect.which))))
+        return float(np.log(chdtrc(len(suspect.which), drop)))
     return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # of its tail, which underflows
 
 
 def _suspects(m: int, there: Flags) -> list[Suspect]:
-    """Everything that may be off by itself."""
+    """All lengths and readings of a pose, as suspects."""
     found = [Suspect("length", cable, np.array([cable])) for cable in range(m)]
     found += [Suspect("load cell", cable, np.array([m + cable])) for cable in range(m) if there[cable]]
     for quantity, first in (("position", m), ("rotation", m + 3)):
@@ -301,13 +252,12 @@ def _suspects(m: int, there: Flags) -> list[Suspect]:
     return found
 
 
-def _whole(stand: PoseReadings, row: int, squares: float) -> Outlier:
+def _whole(case: Case, row: int, squares: float) -> Outlier:
     """The pose as a whole, by the kind of reading that is the farthest off."""
-    m = stand.lengths.shape[1]
-    residual, _ = misfit_at(stand.bench, stand.readings, stand.pose, stand.lengths)
-    off = np.concatenate((stand.readings.lengths[0] - stand.lengths[0], residual))
+    m = case.lengths.shape[1]
+    off, _ = case.misses()
     parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))
-    shares = [float(np.nansum((off[part] / stand.deviation[part]) ** 2)) for part in parts]
+    shares = [float(np.nansum((off[part] / case.deviation[part]) ** 2)) for part in parts]
     worst = int(np.argmax(shares))
     return Outlier(
         row, None, _QUANTITIES[worst], float(np.sqrt(np.nansum(off[parts[worst]] ** 2))), float(np.sqrt(squares))

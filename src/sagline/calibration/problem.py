@@ -1,4 +1,4 @@
-"""What a calibration is asked, and where its search is."""
+"""The estimation problem of a calibration, its initial state, and the states of its search."""
 
 from __future__ import annotations
 
@@ -20,11 +20,13 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-_AT_LEAST_NONE: Final = ("pulley_radius", "dead_cable")  # kinds of which less than nothing is none, and nothing usual
+_PAIRS: Final = 3  # measured points needed to align a measuring system
+_LINE: Final = 1e-3  # of its length: points nearer than that lie on a line
+_NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds for which zero is usual
 
 
 class Log(NamedTuple):
-    """What was read at N poses, NaN where a sensor was silent.
+    """Readings at N poses, NaN where there is none.
 
     Attributes:
         counts: Of the encoders, (N, m), or None.
@@ -42,7 +44,7 @@ class Log(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """A calibration to be done.
+    """The estimation problem.
 
     Attributes:
         robot: As it is believed to be.
@@ -60,26 +62,26 @@ class Problem(NamedTuple):
 
     @property
     def prior(self) -> Array:
-        """What is known beforehand, internally, (P,)."""
+        """Prior of the internal parameters, (P,)."""
         return internal(self.parameters, self.parameters.prior)
 
     @property
     def prior_deviation(self) -> Array:
-        """Its standard deviation, internally, (P,)."""
+        """Its standard deviation, (P,)."""
         known, prior = self.parameters.prior_deviation, self.parameters.prior
         deviation: Array = known / np.where(self.parameters.logarithmic, prior, 1.0)
         return deviation
 
     def missed(self, numbers: Array) -> Array:
-        """By how many of these deviations numbers (P,) are off what is known beforehand, (P,)."""
+        """Distance of internal parameters from their prior, in its standard deviations, (P,)."""
         off: Array = (numbers - self.prior) / self.prior_deviation
         return off
 
     @property
     def scale(self) -> Array:
-        """A unit of each number, internally (P,): its prior deviation, or what is usual of one that nobody gives.
+        """Scale of each internal parameter (P,): the smaller of its prior and its usual deviation.
 
-        The smaller of the two: in wider units sums of squares are rounding where a number is told well.
+        In wider units sums of squares are rounding where a number is well observed.
         """
         usual = np.array([KINDS[name].assumed for name in self.parameters.names])
         unit: Array = np.fmin(self.prior_deviation, usual)
@@ -87,12 +89,12 @@ class Problem(NamedTuple):
 
     @property
     def least(self) -> Array:
-        """The least that each number may be, internally (P,)."""
-        return np.array([0.0 if name in _AT_LEAST_NONE else -np.inf for name in self.parameters.names])
+        """Lower bounds of the internal parameters, (P,)."""
+        return np.array([0.0 if name in _NONNEGATIVE else -np.inf for name in self.parameters.names])
 
 
 class State(NamedTuple):
-    """Where the search is.
+    """A state of the search.
 
     Attributes:
         numbers: What is looked for, internally, (P,).
@@ -108,7 +110,7 @@ class State(NamedTuple):
 
 
 class Normal(NamedTuple):
-    """What the poses say near a state.
+    """Normal equations of all poses at a state.
 
     Attributes:
         matrix: J^T W J of all poses, without the prior, (P, P).
@@ -116,7 +118,7 @@ class Normal(NamedTuple):
         squares: Sum of squares of each pose, infinite where the platform finds no equilibrium, (N,).
         readings: How many readings each pose has, (N,).
         weights: With which the poses count, (N,).
-        rows: All that is said, of a log of one block; None of a longer one, which is looked at anew.
+        rows: Whitened readings of a log of one block; None of a longer one, where they are computed again.
     """
 
     matrix: Array
@@ -128,12 +130,12 @@ class Normal(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """How the search ended.
+    """Result of the least squares.
 
     Attributes:
         state: The last one.
-        normal: What the poses say there.
-        converged: Whether no step promises more.
+        normal: Normal equations there.
+        converged: Whether it met the tolerance.
         iterations: How many steps were taken.
     """
 
@@ -147,7 +149,7 @@ Evaluated = tuple[State, Normal]
 
 
 def machine_at(problem: Problem, numbers: Array) -> Machine:
-    """The robot and its sensors with some numbers (P,), internal ones.
+    """The robot and its sensors with internal parameters (P,).
 
     Raises:
         InvalidValueError: If the robot cannot have them.
@@ -160,59 +162,41 @@ def machine_at(problem: Problem, numbers: Array) -> Machine:
 
 
 def reported_lengths(problem: Problem, machine: Machine, part: slice) -> Array:
-    """The lengths that the winches say [m], (n, m), of some of the poses."""
+    """Lengths reported by the winches [m], (n, m), of some of the poses."""
     log = problem.log
     if log.counts is not None and machine.drums is not None:
         return lengths_at_counts(machine.drums, log.counts[part])
     assert log.lengths is not None
-    said: Array = log.lengths[part] + machine.offset
-    return said
-
-
-_PAIRS = 3  # measured points without which nobody can say where a measuring system stands
-_LINE = 1e-3  # of its length: points no farther off than that lie on a line
+    reported: Array = log.lengths[part] + machine.offset
+    return reported
 
 
 def start_of(problem: Problem, commanded: Pose | None) -> State:
-    """Where to begin: at the priors, the platform where it was commanded or where the lengths that were read put it.
+    """Initial state: the priors, and the platform at commanded poses, or where the reported lengths put it.
 
-    True lengths are those that hold it there with the tensions that were read: a millimeter of a steel cable is 90 N,
-    so that lengths that were read say little of tensions before the anchors are known.
-
-    Args:
-        problem: The problem.
-        commanded: Poses that were commanded, N of them, or None.
-
-    Returns:
-        The state.
+    True lengths are those that hold it there with the measured tensions: a millimeter of a steel cable is 90 N, so that
+    reported lengths say little of tensions before the anchors are known.
     """
     numbers = problem.prior
     machine = machine_at(problem, numbers)
-    said = reported_lengths(problem, machine, slice(None))
-    poses = _poses(problem, machine, said, commanded)
-    lengths = held_lengths(problem, machine, poses, said)
+    reported = reported_lengths(problem, machine, slice(None))
+    poses = _poses(problem, machine, reported, commanded)
+    lengths = held_lengths(problem, machine, poses, reported)
     aligned = _aligned(problem, numbers, poses)
     return State(aligned, machine if aligned is numbers else machine_at(problem, aligned), lengths, poses)
 
 
-def held_lengths(problem: Problem, machine: Machine, poses: Array, said: Array) -> Array:
-    """True lengths with which cables hold the platform at poses as load cells say; those that were read without them.
-
-    Args:
-        problem: The problem.
-        machine: The robot to begin with.
-        poses: Pose rows (N, POSE_COLUMNS).
-        said: Lengths that were read [m], (N, m).
-    """
+def held_lengths(problem: Problem, machine: Machine, poses: Array, reported: Array) -> Array:
+    """Unstrained lengths [m] of cables with the measured tensions at poses; the reported ones without load cells."""
     if problem.sensors.tension_deviation is None:
-        return said.copy()
+        return reported.copy()
     robot, cells = machine.robot, problem.log.cells
     gain, bias = load_cells_of(robot)
     tension = np.maximum((cells - bias) / gain, 0.0)
     read = ~np.isnan(tension)
     usual = np.sum(np.where(read, tension, 0.0), axis=1) / np.maximum(np.count_nonzero(read, axis=1), 1)
     tension = np.where(read, tension, usual[:, None])
-    lengths = np.empty(said.shape)
+    lengths = np.empty(reported.shape)
     starting_lengths(
         problem.model.terms(robot.gravity),
         robot.freedom,
@@ -223,17 +207,17 @@ def held_lengths(problem: Problem, machine: Machine, poses: Array, said: Array) 
         memory_for(robot.cable_count),
         lengths,
     )
-    pulled = np.isfinite(lengths) & np.any(read, axis=1, keepdims=True)
-    return np.where(pulled, lengths, said)
+    held = np.isfinite(lengths) & np.any(read, axis=1, keepdims=True)
+    return np.where(held, lengths, reported)
 
 
-def _poses(problem: Problem, machine: Machine, said: Array, commanded: Pose | None) -> Array:
-    """Pose rows to begin at: measured, else commanded, else where the lengths put the platform."""
+def _poses(problem: Problem, machine: Machine, reported: Array, commanded: Pose | None) -> Array:
+    """Initial pose rows: measured, else commanded, else by forward kinematics of the reported lengths."""
     if commanded is not None:
         poses = np.array(pose_rows(commanded))
-        poses = np.broadcast_to(poses, (len(said), poses.shape[1])).copy()
+        poses = np.broadcast_to(poses, (len(reported), poses.shape[1])).copy()
     else:
-        found = search(machine.robot, problem.model, locked(said.view()), NO_LOAD, None)
+        found = search(machine.robot, problem.model, locked(reported.view()), NO_LOAD, None)
         poses = found.poses.copy()
     if np.any(problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0):
         return poses  # nobody knows yet where the measured points are
@@ -251,10 +235,10 @@ def _poses(problem: Problem, machine: Machine, said: Array, commanded: Pose | No
 
 
 def _aligned(problem: Problem, numbers: Array, poses: Array) -> Array:
-    """The numbers with the measuring system where it reads the poses best, if it is looked for.
+    """The parameters with the measuring system aligned to the poses, if it is unknown.
 
-    Its rotation is the mean of those between the platform's and what was read, or that between measured points; where
-    it can stand nowhere better than where it is believed to be, it stays there.
+    Its rotation is the mean of those between the platform's and the measured ones, or that between measured points;
+    without enough of them it stays as it is.
     """
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:
@@ -277,7 +261,7 @@ def _aligned(problem: Problem, numbers: Array, poses: Array) -> Array:
 
 
 def _spans(points: Array) -> bool:
-    """Whether points (N, 3) lie on no line: those on one say nothing of a turn about it."""
+    """Whether points (N, 3) lie on no line, so that they determine a rotation."""
     if len(points) < _PAIRS:
         return False
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

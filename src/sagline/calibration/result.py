@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,160 +74,40 @@ def _root_of_trace(covariance: Array) -> Array:
     return locked(np.asarray(np.sqrt(np.trace(covariance, axis1=-2, axis2=-1))))
 
 
-MOST = 300  # poses of a log that say what all of them have in common
-_NOTHING = 1e-12  # of the largest slope: what so little follows does not follow
-_OUTSIDE = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # which move no platform
+MOST = 300  # poses of a log from which the motion common to all of them is found
+_NEGLIGIBLE = 1e-12  # of the largest slope: smaller slopes are rounding
+_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # unknowns that move no platform
 
 
-class Known(NamedTuple):
-    """What a calibration knows.
+def motion_slopes(
+    robot: Robot, model: CableModel, parameters: Parameters, poses: Array, lengths: Array
+) -> tuple[Array, Array]:
+    """Slopes of origin and rotation vector [m, rad] at equilibria, by values (N, 6, P) and lengths (N, 6, m)."""
+    m = robot.cable_count
+    by_values, by_length = unwhitened_slopes(robot, model, parameters, Sensors(), poses, lengths)
+    return np.where(np.isin(parameters.names, _WITHOUT_MOTION), 0.0, by_values[:, m:]), by_length[:, m:]
 
-    Attributes:
-        robot: The calibrated robot.
-        model: Cable model.
-        parameters: The unknowns.
-        covariance: Of their values, (P, P).
-        length_deviation: Of the lengths that the winches pay out [m], (m,).
+
+def _common_motions(poses: Array) -> Array:
+    """Slopes of poses by a shift of the world and a rotation about the vertical, (N, 6, 4)."""
+    slopes = np.zeros((len(poses), 6, 4))
+    slopes[:, :3, :3] = np.eye(3)
+    slopes[:, 0, 3], slopes[:, 1, 3] = -poses[:, 1], poses[:, 0]
+    slopes[:, 5, 3] = 1.0
+    return slopes
+
+
+def transformed_covariance(slopes: Array, covariance: Array, negligible: Array | float = 0.0) -> Array:
+    """A covariance (..., P, P) after a linear map (..., k, P).
+
+    Infinite along the diagonal of rows with a slope above `negligible` by a number of infinite variance.
     """
-
-    robot: Robot
-    model: CableModel
-    parameters: Parameters
-    covariance: Array
-    length_deviation: Array
-
-
-class Moved(NamedTuple):
-    """How the platform frame's origin moves and turns, at N equilibria.
-
-    Attributes:
-        by_values: By the values of the parameters, lengths following, (N, 6, P) [m or rad].
-        by_length: By the lengths, (N, 6, m).
-    """
-
-    by_values: Array
-    by_length: Array
-
-
-def known_of(
-    robot: Robot,
-    model: CableModel,
-    parameters: Parameters,
-    covariance: Array,
-    sensors: Sensors,
-) -> Known:
-    """What a calibration knows.
-
-    Args:
-        robot: The calibrated robot.
-        model: Cable model.
-        parameters: The unknowns.
-        covariance: Of their values, (P, P).
-        sensors: What read.
-    """
-    spread = np.broadcast_to(sensors.length_deviation, (robot.cable_count,))
-    return Known(robot, model, parameters, covariance, spread)
-
-
-def moved_at(known: Known, poses: Array, lengths: Array) -> Moved:
-    """How the platform moves at equilibria.
-
-    Args:
-        known: What the calibration knows.
-        poses: Pose rows (N, POSE_COLUMNS).
-        lengths: All cable off the drums there [m], (N, m).
-    """
-    m = known.robot.cable_count
-    slopes = unwhitened_slopes(known.robot, known.model, known.parameters, Sensors(), poses, lengths)
-    outside = np.isin(known.parameters.names, _OUTSIDE)
-    by_values = np.where(outside, 0.0, slopes.by_values[:, m:])
-    return Moved(by_values, slopes.by_length[:, m:])
-
-
-def common_motion(known: Known, poses: Array, lengths: Array) -> Array:
-    """Shift of the world and turn about the vertical that poses have in common, by the values: (4, P) [m and rad].
-
-    Args:
-        known: What the calibration knows.
-        poses: Pose rows of the log, (N, POSE_COLUMNS).
-        lengths: True lengths there [m], (N, m).
-    """
-    chosen = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), MOST)).round().astype(np.int64))
-    by_values = moved_at(known, poses[chosen], lengths[chosen]).by_values[:, :3]
-    there = ~np.isnan(by_values).any(axis=(1, 2))
-    width = by_values.shape[-1]
-    motions = _carried(poses[chosen][there])[:, :3].reshape(-1, 4)
-    return np.asarray(np.linalg.lstsq(motions, by_values[there].reshape(-1, width), rcond=None)[0])
-
-
-def _carried(poses: Array) -> Array:
-    """What a shift of the world and a turn about the vertical do to poses, (N, 6, 4)."""
-    carried = np.zeros((len(poses), 6, 4))
-    carried[:, :3, :3] = np.eye(3)
-    carried[:, 0, 3], carried[:, 1, 3] = -poses[:, 1], poses[:, 0]
-    carried[:, 5, 3] = 1.0
-    return carried
-
-
-def scatter_of(known: Known, moved: Moved) -> Array:
-    """Covariance of origin and rotation vector, the numbers and lengths as wrong as they are known to be, (N, 6, 6).
-
-    Infinite along the diagonal where it follows a number that nothing tells.
-    """
-    lost = np.isinf(np.diagonal(known.covariance))
-    told = np.where(lost[:, None] | lost, 0.0, known.covariance)
-    by_length = moved.by_length * known.length_deviation
-    scatter = moved.by_values @ told @ np.swapaxes(moved.by_values, 1, 2) + by_length @ np.swapaxes(by_length, 1, 2)
-    if lost.any():
-        size = np.abs(moved.by_values).max(axis=(1, 2), keepdims=True)
-        open_rows = (np.abs(moved.by_values[:, :, lost]) > _NOTHING * size).any(axis=2)
-        which, row = np.nonzero(open_rows)
-        scatter[which, row, row] = np.inf
-    return np.asarray(scatter)
-
-
-def expected_at(known: Known, log_poses: Array, log_lengths: Array, pose: Pose) -> tuple[Array, Array]:
-    """Covariances of the pose where a calibrated robot's lengths for a commanded one are paid out.
-
-    Args:
-        known: What the calibration knows.
-        log_poses: Pose rows of the log, (N, POSE_COLUMNS).
-        log_lengths: True lengths there [m], (N, m).
-        pose: Commanded poses.
-
-    Returns:
-        Covariance, and that beside what the log's poses have in common, of shape (..., 6, 6); NaN where the robot
-        cannot hold the pose.
-    """
-    rows = pose_rows(pose)
-    plan = inverse(known.robot, pose, model=known.model)
-    lengths = np.atleast_2d(plan.unstrained_length)
-    whole, own = np.full((2, len(rows), 6, 6), np.nan)
-    there = np.isfinite(lengths).all(axis=1)
-    if there.any():
-        moved = moved_at(known, rows[there], lengths[there])
-        whole[there] = scatter_of(known, moved)
-        common = common_motion(known, log_poses, log_lengths)
-        own[there] = scatter_of(known, moved._replace(by_values=moved.by_values - _carried(rows[there]) @ common))
-    return whole.reshape(*pose.shape, 6, 6), own.reshape(*pose.shape, 6, 6)
-
-
-def about_center(scatter: Array, robot: Robot, pose: Pose) -> Array:
-    """Covariances of the motion of the center of mass of those of the origin's, both (..., 6, 6).
-
-    Infinite along the diagonal of what follows something infinite.
-    """
-    reach = pose.matrix @ robot.center_of_mass
-    carried = np.zeros((*scatter.shape[:-2], 6, 6))
-    carried[...] = np.eye(6)
-    for axis, unit in enumerate(np.eye(3)):
-        carried[..., :3, 3 + axis] = np.cross(unit, reach)
-    lost = np.isinf(np.diagonal(scatter, axis1=-2, axis2=-1))
-    told = np.where(lost[..., :, None] | lost[..., None, :], 0.0, scatter)
-    found = np.asarray(carried @ told @ np.swapaxes(carried, -1, -2))
-    which = np.arange(6)
-    follows = ((carried != 0.0) & lost[..., None, :]).any(axis=-1)
-    found[..., which, which] = np.where(follows, np.inf, found[..., which, which])
+    infinite = np.isinf(np.diagonal(covariance, axis1=-2, axis2=-1))
+    finite = np.where(infinite[..., :, None] | infinite[..., None, :], 0.0, covariance)
+    found = np.asarray(slopes @ finite @ np.swapaxes(slopes, -1, -2))
+    depends = ((np.abs(slopes) > negligible) & infinite[..., None, :]).any(axis=-1)
+    axes = np.arange(slopes.shape[-2])
+    found[..., axes, axes] = np.where(depends, np.inf, found[..., axes, axes])
     return found
 
 
@@ -296,9 +175,15 @@ class Calibration(Findings, Saved):
         Raises:
             InvalidValueError: If it is no pose, or one outside the motions of the robot's pattern.
         """
-        poses, lengths = pose_rows(self.poses), np.atleast_2d(self.unstrained_length)
-        whole, own = expected_at(self._known(), poses, lengths, instance(pose, Pose, "pose"))
-        return PoseError(pose, locked(whole), locked(own))
+        rows, shape = pose_rows(instance(pose, Pose, "pose")), pose.shape
+        lengths = np.atleast_2d(inverse(self.robot, pose, model=self.model).unstrained_length)
+        whole, own = np.full((2, len(rows), 6, 6), np.nan)
+        held = np.isfinite(lengths).all(axis=1)
+        if held.any():
+            by_values, by_length = self._slopes(rows[held], lengths[held])
+            whole[held] = self._covariance(by_values, by_length)
+            own[held] = self._covariance(by_values - _common_motions(rows[held]) @ self._common_motion(), by_length)
+        return PoseError(pose, locked(whole.reshape(*shape, 6, 6)), locked(own.reshape(*shape, 6, 6)))
 
     def forward(self, unstrained_length: ArrayLike, start: Pose | None = None) -> ForwardSolution:
         """Where the platform rests at lengths that the machine believes, with the covariance of that.
@@ -319,14 +204,34 @@ class Calibration(Findings, Saved):
         found = forward(self.robot, lengths, start, self.model)
         rows, shape = np.atleast_2d(found.state.unstrained_length), found.pose.shape
         there = np.isfinite(rows).all(axis=1) & np.atleast_1d(found.stable)
-        scatter = np.full((len(rows), 6, 6), np.nan)
-        known = self._known()
-        scatter[there] = scatter_of(known, moved_at(known, pose_rows(found.pose)[there], rows[there]))
-        covariance = about_center(scatter.reshape(*shape, 6, 6), self.robot, found.pose)
-        return replace(found, covariance=locked(covariance))
+        covariance = np.full((len(rows), 6, 6), np.nan)
+        covariance[there] = self._covariance(*self._slopes(pose_rows(found.pose)[there], rows[there]))
+        reach = np.reshape(found.pose.matrix @ self.robot.center_of_mass, (-1, 3))
+        of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # motion of the center of mass by that of the origin
+        for axis, unit in enumerate(np.eye(3)):
+            of_center[:, :3, 3 + axis] = np.cross(unit, reach)
+        covariance = transformed_covariance(of_center, covariance)
+        return replace(found, covariance=locked(covariance.reshape(*shape, 6, 6)))
 
-    def _known(self) -> Known:
-        return known_of(self.robot, self.model, self.parameters, self.covariance, self.sensors)
+    def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
+        return motion_slopes(self.robot, self.model, self.parameters, poses, lengths)
+
+    def _covariance(self, by_values: Array, by_length: Array) -> Array:
+        """Covariance of origin and rotation vector (N, 6, 6), by that of the values and of the winches' lengths."""
+        size = np.abs(by_values).max(axis=(1, 2), keepdims=True)
+        by_length = by_length * self.sensors.length_deviation
+        known = transformed_covariance(by_values, self.covariance, _NEGLIGIBLE * size)
+        return np.asarray(known + by_length @ np.swapaxes(by_length, 1, 2))
+
+    def _common_motion(self) -> Array:
+        """Shift of the world and rotation about the vertical that the poses of the log share, by the values, (4, P)."""
+        poses = pose_rows(self.poses)
+        part = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), MOST)).round().astype(np.int64))
+        by_values = self._slopes(poses[part], np.atleast_2d(self.unstrained_length)[part])[0][:, :3]
+        there = ~np.isnan(by_values).any(axis=(1, 2))
+        motions = _common_motions(poses[part][there])[:, :3].reshape(-1, 4)
+        right = by_values[there].reshape(-1, by_values.shape[-1])
+        return np.asarray(np.linalg.lstsq(motions, right, rcond=None)[0])
 
     def table(self) -> str:
         """Every number with its standard error, what was there before, and how far it has moved, one a line."""

@@ -36,7 +36,7 @@ FEW: Final = 0.1  # of the poses: where more are elsewhere, it is not that a cab
 FAR: Final = 0.03  # m from where the lengths that were read put it: another equilibrium
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """How the search for all numbers ended.
 
     Attributes:
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 def search_from_priors(
     problem: Problem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
-) -> Found:
+) -> SearchResult:
     """Search from the priors; poses that end elsewhere get a second chance, and are left out if they do not take it.
 
     Args:
@@ -67,23 +67,23 @@ def search_from_priors(
     """
     state = start_of(problem, commanded)
     kept = np.ones(len(state.poses), dtype=np.bool_)
-    begun = evaluate_step(problem, state, None, kept)
+    current = evaluate_step(problem, state, None, kept)
     left_out: dict[Omission, Indices] = {}
-    if (lost := _without_equilibrium(begun)).any():
-        begun = evaluate_step(problem, _restart(problem, state, lost), None, kept)
-    if (lost := _without_equilibrium(begun)).any():
+    if (lost := _without_equilibrium(current)).any():
+        current = evaluate_step(problem, _restart(problem, state, lost), None, kept)
+    if (lost := _without_equilibrium(current)).any():
         left_out[Omission.NO_EQUILIBRIUM] = locked(np.flatnonzero(lost))
         kept &= ~lost
     if not kept.any():
         step = "Correct the lengths, or the robot: its anchors, and the zeros of its lengths."
         raise InvalidValueError("log", "without a pose at which this robot rests", "one at least", step)
-    fit = solve(problem, begun, kept, robust=robust, progress=progress)
-    if (strange := _improbable(fit, kept)).any():
-        begun = evaluate_step(problem, _restart(problem, fit.state, strange), None, kept)
-        if (begun[1].squares[strange] < fit.normal.squares[strange]).any():
-            fit = solve(problem, begun, kept, robust=robust, progress=progress)
-            strange = _improbable(fit, kept)
-        elsewhere = _other_equilibrium(problem, fit.state, strange)
+    fit = solve(problem, current, kept, robust=robust, progress=progress)
+    if (improbable := _improbable(fit, kept)).any():
+        current = evaluate_step(problem, _restart(problem, fit.state, improbable), None, kept)
+        if (current[1].squares[improbable] < fit.normal.squares[improbable]).any():
+            fit = solve(problem, current, kept, robust=robust, progress=progress)
+            improbable = _improbable(fit, kept)
+        elsewhere = _other_equilibrium(problem, fit.state, improbable)
         if robust:
             elsewhere &= ~_single_cable_outliers(problem, fit.state, elsewhere)
         if elsewhere.any():
@@ -92,32 +92,32 @@ def search_from_priors(
             if not kept.any():
                 step = "Check that it is this robot's log, its lengths and load cells, or begin with better anchors."
                 raise InvalidValueError("log", "without a pose at which this robot reads so", "one at least", step)
-            begun = evaluate_step(problem, fit.state, None, kept)
-            fit = solve(problem, begun, kept, robust=robust, progress=progress)
-    return Found(fit, kept, left_out)
+            current = evaluate_step(problem, fit.state, None, kept)
+            fit = solve(problem, current, kept, robust=robust, progress=progress)
+    return SearchResult(fit, kept, left_out)
 
 
-def _without_equilibrium(begun: Evaluated) -> Flags:
+def _without_equilibrium(current: Evaluated) -> Flags:
     """Which poses find no equilibrium, (N,)."""
-    lost: Flags = ~np.isfinite(begun[1].squares)
+    lost: Flags = ~np.isfinite(current[1].squares)
     return lost
 
 
 def _improbable(fit: Fit, kept: Flags) -> Flags:
     """Which poses fit so badly that no noise does it, (N,)."""
     limit = exceeded_with(STRANGE, fit.normal.readings)
-    strange: Flags = kept & (fit.normal.squares > limit)
-    return strange
+    improbable: Flags = kept & (fit.normal.squares > limit)
+    return improbable
 
 
 def _restart(problem: Problem, state: State, which: Flags) -> State:
     """A state in which some poses begin anew, where the lengths that the winches say put the platform."""
     machine = state.machine
-    said = reported_lengths(problem, machine, slice(None))
-    found = search(machine.robot, problem.model, locked(said[which].copy()), NO_LOAD, None)
+    reported = reported_lengths(problem, machine, slice(None))
+    found = search(machine.robot, problem.model, locked(reported[which].copy()), NO_LOAD, None)
     poses, lengths = state.poses.copy(), state.lengths.copy()
     poses[which] = np.where(found.stable[:, None], found.poses, poses[which])
-    lengths[which] = held_lengths(problem, machine, poses, said)[which]
+    lengths[which] = held_lengths(problem, machine, poses, reported)[which]
     return state._replace(poses=poses, lengths=lengths)
 
 
@@ -132,46 +132,15 @@ def _single_cable_outliers(problem: Problem, state: State, which: Flags) -> Flag
 
 def _other_equilibrium(problem: Problem, state: State, which: Flags) -> Flags:
     """Which of some poses are far from where the lengths that the winches say put the platform, (N,)."""
-    said = reported_lengths(problem, state.machine, slice(None))[which]
-    found = search(state.machine.robot, problem.model, locked(said), NO_LOAD, None)
+    reported = reported_lengths(problem, state.machine, slice(None))[which]
+    found = search(state.machine.robot, problem.model, locked(reported), NO_LOAD, None)
     far = which.copy()
     far[which] = np.linalg.norm(found.poses[:, :3] - state.poses[which, :3], axis=1) > FAR
     return far
 
 
-class Missed(NamedTuple):
-    """What was read less what the lengths that were read predict, squares of it summed.
-
-    Attributes:
-        cells: Of load cells [N^2].
-        cell_count: How many of them.
-        positions: Of positions [m^2].
-        position_count: How many of them.
-    """
-
-    cells: float = 0.0
-    cell_count: int = 0
-    positions: float = 0.0
-    position_count: int = 0
-
-    def plus(self, other: Missed) -> Missed:
-        """Both together."""
-        cells, positions = self.cells + other.cells, self.positions + other.positions
-        return Missed(cells, self.cell_count + other.cell_count, positions, self.position_count + other.position_count)
-
-    @property
-    def tension(self) -> float:
-        """Root of the mean square of a load cell [N]."""
-        return float(np.sqrt(self.cells / self.cell_count)) if self.cell_count else np.nan
-
-    @property
-    def position(self) -> float:
-        """Root of the mean square of the distance from a measured position [m]."""
-        return float(np.sqrt(self.positions / self.position_count)) if self.position_count else np.nan
-
-
 def cross_validate(
-    problem: Problem, found: Found, folds: int, *, robust: bool, progress: Progress | None = None
+    problem: Problem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
     """Calibrate without each part of the poses, and predict what was read there by the lengths that were read.
 
@@ -193,46 +162,56 @@ def cross_validate(
     folds = min(folds, len(places))
     if folds < 2:
         return None
-    now, before = Missed(), Missed()
-    drawn = machine_at(problem, problem.prior)
+    now, before = np.zeros((2, 4))
+    nominal = machine_at(problem, problem.prior)
     for part in np.array_split(places, folds):
         left = np.zeros(len(found.kept), dtype=np.bool_)
         left[part] = True
         rest = found.kept & ~left
-        begun = evaluate_step(problem, found.fit.state, None, rest, progress=progress)
-        fit = solve(problem, begun, rest, robust=robust, progress=progress)
+        current = evaluate_step(problem, found.fit.state, None, rest, progress=progress)
+        fit = solve(problem, current, rest, robust=robust, progress=progress)
         whole = slice(int(part[0]), int(part[-1]) + 1)
-        now = now.plus(missed_by(problem, fit.state.machine, found.fit.state.poses, left, whole))
-        before = before.plus(missed_by(problem, drawn, found.fit.state.poses, left, whole))
-    # nobody knew then where the system stood that measured
-    unplaced = (problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0).any()
-    there = np.nan if unplaced else before.position
-    return CrossValidation(folds, now.tension, now.position, before.tension, there)
+        now += prediction_errors(problem, fit.state.machine, found.fit.state.poses, left, whole)
+        before += prediction_errors(problem, nominal, found.fit.state.poses, left, whole)
+    tension, position = _root_mean_squares(now)
+    tension_before, position_before = _root_mean_squares(before)
+    if (problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0).any():
+        position_before = np.nan  # the place of the measuring system was not known then
+    return CrossValidation(folds, tension, position, tension_before, position_before)
 
 
-def missed_by(problem: Problem, machine: Machine, starts: Array, which: Flags, whole: slice) -> Missed:
-    """What a robot's predictions miss at some poses; poses at which it finds no equilibrium are not among them.
+def _root_mean_squares(sums: Array) -> tuple[float, float]:
+    """Root mean squares of load cells [N] and positions [m], NaN for none, of sums by `prediction_errors`."""
+    cells, cell_count, positions, position_count = sums.tolist()
+    tension = float(np.sqrt(cells / cell_count)) if cell_count else np.nan
+    return tension, float(np.sqrt(positions / position_count)) if position_count else np.nan
+
+
+def prediction_errors(problem: Problem, machine: Machine, starts: Array, which: Flags, whole: slice) -> Array:
+    """Squares of the errors of predictions from reported lengths: sum and count of load cells, and of positions, (4,).
+
+    Poses without an equilibrium are not among them.
 
     Args:
         problem: What was read.
         machine: The robot and its sensors.
-        starts: Pose rows near which it stands, (N, POSE_COLUMNS).
+        starts: Pose rows near the equilibria, (N, POSE_COLUMNS).
         which: The poses, (N,).
         whole: Where they are among all.
     """
-    found = Missed()
+    sums = np.zeros(4)
     for own in blocks(whole.stop - whole.start, BLOCK):
         part = slice(whole.start + own.start, whole.start + own.stop)
         try:
-            said = reported_lengths(problem, machine, part)
+            reported = reported_lengths(problem, machine, part)
         except InvalidValueError:  # counts run off drums that are too wrong
             continue
-        there = which[part] & np.isfinite(said).all(axis=1) & (said > 0.0).all(axis=1)
-        asked = locked(np.where(there[:, None], said, np.nan))
+        there = which[part] & np.isfinite(reported).all(axis=1) & (reported > 0.0).all(axis=1)
+        asked = locked(np.where(there[:, None], reported, np.nan))
         solved = solve_rows(machine.robot, problem.model, asked, locked(starts[part].copy()), NO_LOAD)
         there &= solved.stable
         tension = solved.solution(
-            machine.robot, problem.model, np.zeros(6), (len(said),)
+            machine.robot, problem.model, np.zeros(6), (len(reported),)
         ).state.cables.frame_end_tension
         sensors, (gain, bias) = machine.sensors, load_cells_of(machine.robot)
         cells = (problem.log.cells[part] - (gain * tension + bias))[there]
@@ -241,5 +220,5 @@ def missed_by(problem: Problem, machine: Machine, starts: Array, which: Flags, w
         point = solved.poses[there, :3] + turned - sensors.frame.position
         apart = np.linalg.norm(problem.log.positions[part][there] - point @ sensors.frame.matrix, axis=1)
         apart = apart[~np.isnan(apart)]
-        found = found.plus(Missed(float(cells @ cells), cells.size, float(apart @ apart), apart.size))
-    return found
+        sums += [float(cells @ cells), cells.size, float(apart @ apart), apart.size]
+    return sums
