@@ -8,7 +8,7 @@ import pytest
 import sagline as sl
 from sagline import FreeCable
 from sagline.optimization.candidates import Candidates
-from sagline.optimization.rating import planned
+from sagline.optimization.rating import distribute
 from tests.tension.reference import random_poses
 from tests.tiers import extended
 
@@ -24,16 +24,16 @@ def test_what_is_planned_of_tables_is_what_inverse_plans_of_robots(name: str) ->
     lift = sl.FreeAnchors("frame", -0.1, 0.1, along=[0, 0, 1], symmetry="together")
     table = Candidates(robot, [lift]).cables(np.zeros((len(poses), 1)))  # the robot's own
     rows = np.hstack((poses.position, poses.quaternion))
-    found = planned(robot, sl.Catenary(), table, rows, wrench, stiffness=True)
+    tension, sag, stiffness = distribute(robot, sl.Catenary(), table, rows, wrench, stiffness=True)
     plan = sl.inverse(robot, poses, tension=sl.MinimumNorm(), wrench=wrench)
-    held = ~np.isnan(found.tension)
+    held = ~np.isnan(tension)
     assert held.sum() > 5
     assert plan.feasible[held].all()
-    np.testing.assert_allclose(found.tension[held], plan.chord_tension[held].max(axis=1), rtol=1e-14)
-    np.testing.assert_allclose(found.sag[held], plan.state.cables.sag[held].max(axis=1), rtol=1e-12, atol=1e-12)
-    assert found.stiffness is not None
+    np.testing.assert_allclose(tension[held], plan.chord_tension[held].max(axis=1), rtol=1e-14)
+    np.testing.assert_allclose(sag[held], plan.state.cables.sag[held].max(axis=1), rtol=1e-12, atol=1e-12)
+    assert stiffness is not None
     softest = np.linalg.norm(sl.stiffness(plan.state[held]).compliance[:, :3, :3], ord=2, axis=(1, 2))
-    np.testing.assert_allclose(found.stiffness[held], 1.0 / softest, rtol=1e-6)
+    np.testing.assert_allclose(stiffness[held], 1.0 / softest, rtol=1e-6)
 
 
 BOX = sl.WrenchBox(force=[100.0, 100.0, 50.0], moment=10.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -225,7 +226,7 @@ def test_a_disk_that_is_full_loses_nothing(
 def test_without_dask_tasks_are_done_one_after_the_other(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference: dict[str, bytes]
 ) -> None:
-    monkeypatch.setattr(running, "has_dask", lambda: False)
+    monkeypatch.setattr(sweep_folder, "find_spec", lambda name: None if name == "distributed" else find_spec(name))
     folder, told = in_tasks(tmp_path / "sweep", planar(), SIZE), list[str]()
     assert bits(sl.sweep.run(planar(), folder, workers=2, tell=told.append)) == reference
     assert len(told) == 1

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import pytest
 
-from sagline.core.arrays import Array, Indices
+from sagline.core.arrays import Array
+from sagline.workspaces.levels import Details
 from sagline.workspaces.region import Plane, slice_of
 
 
-class Told(NamedTuple):
-    level: Array
-    margin: Array
-    criterion: Indices
-    cable: Indices
-
-
-def places(positions: Array) -> Told:
+def places(positions: Array) -> Details:
     """Numbers by which a position is known again."""
     x, y, z = positions.T
-    return Told(x + 10.0 * y + 100.0 * z, x, np.rint(y).astype(np.int64), np.rint(z).astype(np.int64))
+    indices = (np.rint(y).astype(np.int64), np.rint(z).astype(np.int64), np.zeros(len(x), dtype=np.int64))
+    return Details(x + 10.0 * y + 100.0 * z, x, *indices)
 
 
 @pytest.mark.parametrize("normal", [0, 1, 2])

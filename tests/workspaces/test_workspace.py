@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.workspaces.criterion import Given, Judged, no_cable
+from sagline.workspaces.criterion import Given, Judged
 from sagline.workspaces.space import BY_BOX
 from tests.refusal import refused
 from tests.tiers import extended
@@ -235,7 +235,7 @@ def test_a_region_smaller_than_a_cell_is_found_by_the_search() -> None:
 
         def judge(self, given: Given) -> Judged:
             away = np.linalg.norm(given.pose.position - middle, axis=1)
-            return Judged(radius - away, no_cable(len(given)))
+            return Judged(radius - away)
 
         def scale(self, robot: sl.Robot) -> float:
             return 1.0

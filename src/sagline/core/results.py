@@ -23,6 +23,12 @@ def formats() -> Any:
     return import_module(_FORMATS)
 
 
+def set_fields(target: object, **values: Any) -> None:
+    """Set the fields of a frozen object under construction."""
+    for name, value in values.items():
+        object.__setattr__(target, name, value)
+
+
 class Shown:
     """Something that Jupyter shows with its verdict and a figure; elsewhere it is its ordinary text."""
 

@@ -226,7 +226,7 @@ class Clearances(Result):
             lines.append("  left out:")
             lines += [f"    {line}" for line in self.left_out[:_SHOWN]]
             rest = len(self.left_out) - _SHOWN
-            lines += [f"    and {rest} more" if rest > 0 else ""] if rest > 0 else []
+            lines += [f"    and {rest} more"] if rest > 0 else []
         return "\n".join(lines)
 
     @property
@@ -291,18 +291,12 @@ def clearance(
     things = check_obstacles(obstacles, first_of(robot))
     some = None if from_anchor is None else number(from_anchor, "from_anchor", "m", above=0.0)
     radius = None if cable_radius is None else _radius(cable_radius, first_of(robot).cable_count)
-    form = platform if platform is None or isinstance(platform, Mesh) else instance(platform, Box, "platform")
-    if isinstance(form, Mesh):
-        _check_size(form, first_of(robot))
+    if isinstance(platform, Mesh):
+        _check_size(platform, first_of(robot))
+    elif platform is not None:
+        instance(platform, Box, "platform")
     near = number(precision, "precision", "m", above=0.0)
-    rows = ClearanceRows(
-        robot,
-        things,
-        precision=near,
-        cable_radius=radius,
-        platform=form,
-        from_anchor=some,
-    )
+    rows = ClearanceRows(robot, things, precision=near, cable_radius=radius, platform=platform, from_anchor=some)
     shape = state.pose.shape
     check_memory("clearances", 8.0 * _NUMBERS * prod(shape) * len(rows.pairs.names), "Take the poses in parts.")
     value, low, nearest = (locked(field.reshape(*shape, *field.shape[1:])) for field in rows.distances(state))
@@ -322,15 +316,25 @@ def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
     Raises:
         InvalidValueError: If it is something else, or a mesh is 100 times as large as the robot.
     """
+    found = obstacles_of(given, "obstacles")
+    for one in found:
+        if isinstance(one, Mesh):
+            _check_size(one, robot)
+    return found
+
+
+def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
+    """One obstacle or several, checked, as a tuple.
+
+    Raises:
+        InvalidValueError: If there is something else.
+    """
     some = (given,) if isinstance(given, Obstacle) else given
     several = isinstance(some, Sequence) and not isinstance(some, str)
     wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]
     if wrong:
         step = 'Make them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
-        raise InvalidValueError("obstacles", brief(wrong[0]), "Box, Capsule, Sphere or Mesh, one or several", step)
-    for thing in some:
-        if isinstance(thing, Mesh):
-            _check_size(thing, robot)
+        raise InvalidValueError(item, brief(wrong[0]), "Box, Capsule, Sphere or Mesh, one or several", step)
     return tuple(some)
 
 

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, Flags, Indices, checked, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
-from sagline.core.results import Result
+from sagline.core.results import Result, set_fields
 from sagline.robot.pose import Pose
 
 MOST: Final = 1_000_000  # triangles
@@ -66,9 +66,7 @@ class Mesh(Result):
             value = f"not closed ({wrong} edges of {len(triangles)} triangles lack a neighbor that faces the same way)"
             step = "Close its holes and turn its faces outward in the program that made it."
             raise InvalidValueError(called, f"{value}, {extent_text(corners)}", "a closed surface", step)
-        object.__setattr__(self, "vertices", corners)
-        object.__setattr__(self, "faces", triangles)
-        object.__setattr__(self, "name", called)
+        set_fields(self, vertices=corners, faces=triangles, name=called)
 
     def __str__(self) -> str:
         """Its name, its triangles and its extent."""

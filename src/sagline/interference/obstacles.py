@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from sagline.core.arguments import instance, label
 from sagline.core.arrays import Array, exactly, number
-from sagline.core.results import Result
+from sagline.core.results import Result, set_fields
 from sagline.robot.bounds import bounds
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -58,7 +58,7 @@ class Box(Result):
         Raises:
             InvalidValueError: If an edge is not positive, or orientation is no rotation.
         """
-        _fill(
+        set_fields(
             self,
             size=exactly(size, "size", "m", (3,), above=0.0),
             center=exactly(center, "center", "m", (3,)),
@@ -111,7 +111,7 @@ class Capsule(Result):
         Raises:
             InvalidValueError: If the radius is negative, or an end is no point.
         """
-        _fill(
+        set_fields(
             self,
             start=exactly(start, "start", "m", (3,)),
             end=exactly(end, "end", "m", (3,)),
@@ -155,7 +155,7 @@ class Sphere(Result):
         Raises:
             InvalidValueError: If the radius is negative, or the center is no point.
         """
-        _fill(
+        set_fields(
             self,
             center=exactly(center, "center", "m", (3,)),
             radius=number(radius, "radius", "m", low=0.0),
@@ -166,11 +166,6 @@ class Sphere(Result):
     def bounds(self) -> Array:
         """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
         return np.stack((self.center - self.radius, self.center + self.radius))
-
-
-def _fill(obstacle: object, **values: object) -> None:
-    for name, value in values.items():
-        object.__setattr__(obstacle, name, value)
 
 
 def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:

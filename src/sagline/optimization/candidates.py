@@ -11,6 +11,7 @@ import numpy as np
 from sagline.core.arguments import brief, choice, whole_number
 from sagline.core.arrays import Array, Flags, Indices, number
 from sagline.core.errors import InvalidValueError
+from sagline.core.results import set_fields
 from sagline.kernels import tables
 from sagline.optimization.free import Bound, Free, FreeCable, Part
 from sagline.robot.pose import Pose
@@ -235,14 +236,13 @@ class AnchorErrors:
             >>> print(sl.AnchorErrors(0.01, samples=4).take)
             worst
         """
-        values = {
-            "deviation": number(deviation, "deviation", "m", above=0.0),
-            "samples": whole_number(samples, "samples", 1, MOST_SAMPLES),
-            "take": choice(take, "take", TAKEN),
-            "seed": whole_number(seed, "seed", 0),
-        }
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
+        set_fields(
+            self,
+            deviation=number(deviation, "deviation", "m", above=0.0),
+            samples=whole_number(samples, "samples", 1, MOST_SAMPLES),
+            take=choice(take, "take", TAKEN),
+            seed=whole_number(seed, "seed", 0),
+        )
 
     def added(self, cables: Array) -> Array:
         """Tables of robots whose anchors err.

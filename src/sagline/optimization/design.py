@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Final
 
@@ -13,12 +13,12 @@ from sagline.core.arguments import callback, instance, whole_number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
 from sagline.optimization.candidates import AnchorErrors
-from sagline.optimization.folder import recorded
+from sagline.optimization.folder import open_record
 from sagline.optimization.free import Free
-from sagline.optimization.front import Front, Ledger, Record
+from sagline.optimization.front import Front, Ledger
 from sagline.optimization.goals import Goal
-from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, Request, poses_of, requested
-from sagline.optimization.search import SEARCHES, Task
+from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, poses_of, requested
+from sagline.optimization.search import SEARCHES, Task, latin_hypercube, population_of
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.robot import Robot
@@ -95,20 +95,15 @@ def design(
     places = poses_of(instance(robot, Robot, "robot"), poses, box, grid)
     request = requested(robot, free, goals, wrenches, places, model, inner, robust, optimizer, seed)
     candidates = request.candidates
-    least = request.least_evaluations(len(candidates.parts))
+    dimensions = len(candidates.parts)
+    population = population_of(optimizer, dimensions)
     count = whole_number(evaluations, "evaluations", 1, MOST_EVALUATIONS)
-    if count < least:
-        allowed = f">= {least:,}, two generations of {request.optimizer} for {len(candidates.parts)} free numbers"
+    if count < 2 * population:
+        allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
         raise InvalidValueError("evaluations", f"{count:,}", allowed, "Allow more, or free less.")
     ledger = Ledger(request, candidates, count, progress)  # refuses before anything is written
     point = candidates.units(candidates.start[None])[0]
-    sample = request.sample(len(point))
-    with _record(folder, request) as ledger.record:
+    sample = latin_hypercube(population - 1, dimensions, request.seed)
+    with nullcontext() if folder is None else open_record(folder, request) as ledger.record:
         SEARCHES[request.optimizer](Task(ledger.rate, point, sample, ledger.costs, request.seed, count))
         return ledger.front()
-
-
-def _record(folder: Path | str | None, request: Request) -> AbstractContextManager[Record | None]:
-    if folder is None:
-        return nullcontext()
-    return recorded(folder, request)

@@ -28,6 +28,7 @@ from sagline.core.errors import FileError
 from sagline.files.quantity import plain_number
 from sagline.files.reading import exists, read_text
 from sagline.files.writing import check_file, check_files, create_folder, json_text, try_lock, write_text
+from sagline.optimization.goals import heading
 from sagline.optimization.request import Request
 
 REQUEST, EVALUATIONS = "design.json", "evaluations.csv"
@@ -57,15 +58,15 @@ class DesignFolder:
         Raises:
             FileError: If the disk takes no more; what was there before stays.
         """
-        self.append(_line([repr(float(x)) for x in row]) for row in rows)
+        self.add_lines([repr(float(x)) for x in row] for row in rows)
 
-    def append(self, lines: Iterable[str]) -> None:
-        """Append lines, down to the disk.
+    def add_lines(self, lines: Iterable[list[str]]) -> None:
+        """Append lines of cells and flush them to the disk.
 
         Raises:
             FileError: If the disk takes no more.
         """
-        data = "".join(lines).encode()
+        data = "".join(map(_line, lines)).encode()
         try:
             while data:
                 data = data[os.write(self._handle, data) :]
@@ -76,7 +77,7 @@ class DesignFolder:
 
 
 @contextmanager
-def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
+def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     """The record of a search in a folder, begun or gone on with.
 
     Args:
@@ -92,8 +93,8 @@ def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
     create_folder(place)
-    heads = [*(f"{part.name} [{part.unit}]" if part.unit else part.name for part in request.candidates.parts)]
-    heads += [f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in request.goals]
+    heads = [heading(part.name, part.unit) for part in request.candidates.parts]
+    heads += [heading(goal.kind, goal.unit) for goal in request.goals]
     digest = digest_of(request)
     file = place / EVALUATIONS
     _check_request(place, digest, request)
@@ -108,7 +109,7 @@ def recorded(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
         os.ftruncate(handle, whole)
         record = DesignFolder(file, handle, known)
         if not whole:
-            record.append([_line(heads)])
+            record.add_lines([heads])
         yield record
     finally:
         os.close(handle)

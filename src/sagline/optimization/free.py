@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple, Protocol
+from functools import partial
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from sagline.cables.cable import Cable
 from sagline.core.arguments import brief, choice, instance, integer, label
 from sagline.core.arrays import Array, Indices, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import ByFields
+from sagline.core.results import ByFields, set_fields
 from sagline.kernels import tables
 from sagline.robot.robot import Robot
 
@@ -37,15 +38,16 @@ class Part(NamedTuple):
     choices: int = 0
 
 
-class Bound(Protocol):
-    """A `Free` of a robot: what it has, and how it enters the tables of cables."""
+class Bound(NamedTuple):
+    """A `Free` of a robot.
 
-    @property
-    def parts(self) -> tuple[Part, ...]:
-        """The numbers that may change."""
+    Attributes:
+        parts: The K numbers that may change.
+        write: Changes cable tables (N, m, CABLE_COLUMNS) in place, by the parts' values (N, K).
+    """
 
-    def write(self, cables: Array, values: Array) -> None:
-        """Change cable tables (N, m, CABLE_COLUMNS) in place, by the parts' values (N, K)."""
+    parts: tuple[Part, ...]
+    write: Callable[[Array, Array], None]
 
 
 class Free(ByFields):
@@ -136,9 +138,7 @@ class CableChoice:
             raise InvalidValueError("cable: linear_density", "0 kg/m", "> 0 kg/m", "Give its mass per length.")
         limit = None if tension_max is None else number(tension_max, "tension_max", "N", above=0.0)
         price = None if cost is None else number(cost, "cost", "per m", low=0.0)
-        values: dict[str, Any] = {"name": label(name, "name"), "cable": cable, "cost": price, "tension_max": limit}
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
+        set_fields(self, name=label(name, "name"), cable=cable, cost=price, tension_max=limit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -178,31 +178,21 @@ class FreeCable(Free):
             limits = one.tension_max is None or bool(np.allclose(robot.tension_max, one.tension_max, rtol=SAME))
             if limits and all(np.allclose(mine, its, rtol=SAME, atol=0.0) for mine, its in pairs):
                 part = Part("cable", "", 0.0, float(len(self.catalogue) - 1), float(k), len(self.catalogue))
-                return _Chosen((part,), self.catalogue)
+                return Bound((part,), partial(_write_cables, self.catalogue))
         density, stiffness = own.linear_density[0], own.axial_stiffness[0]
         value = f"{1e3 * density:g} g/m, {stiffness:g} N, up to {robot.tension_max[0]:g} N"
         step = "Add the robot's own cable: the search begins with it."
         raise InvalidValueError(f"{item}: the robot's cable 0", value, "all cables alike, in the catalogue", step)
 
 
-class _Chosen(NamedTuple):
-    """A catalogue."""
-
-    parts: tuple[Part, ...]
-    catalogue: tuple[CableChoice, ...]
-
-    def write(self, cables: Array, values: Array) -> None:
-        """Set the material."""
-        which = values[:, 0].astype(np.int64)
-        density, stiffness = (
-            np.array([getattr(one.cable, name) for one in self.catalogue])
-            for name in ("linear_density", "axial_stiffness")
-        )
-        cables[:, :, tables.DENSITY] = density[which, None]
-        cables[:, :, tables.STIFFNESS] = stiffness[which, None]
-        limits = np.array([np.nan if one.tension_max is None else one.tension_max for one in self.catalogue])
-        given = ~np.isnan(limits[which])
-        cables[given, :, tables.TENSION_MAX] = limits[which][given, None]
+def _write_cables(catalogue: tuple[CableChoice, ...], cables: Array, values: Array) -> None:
+    """Set material and tension limit by the place in the catalogue."""
+    which = values[:, 0].astype(np.int64)
+    for name, column in (("linear_density", tables.DENSITY), ("axial_stiffness", tables.STIFFNESS)):
+        cables[:, :, column] = np.array([getattr(one.cable, name) for one in catalogue])[which, None]
+    limits = np.array([np.nan if one.tension_max is None else one.tension_max for one in catalogue])
+    given = ~np.isnan(limits[which])
+    cables[given, :, tables.TENSION_MAX] = limits[which][given, None]
 
 
 LIMITS: Final = {"tension_min": tables.TENSION_MIN, "tension_max": tables.TENSION_MAX}
@@ -244,9 +234,7 @@ class FreeLimit(Free):
         lower, upper = number(low, "low", "N", low=0.0), number(high, "high", "N", low=0.0)
         check_order(np.array([lower]), np.array([upper]), "N", strictly=True)
         named = () if cables is None else cable_numbers(cables, "cables")
-        values = {"which": choice(which, "which", LIMITS), "low": lower, "high": upper, "cables": named}
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
+        set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=named)
 
     def bound(self, robot: Robot, item: str) -> Bound:
         """What it means for a robot."""
@@ -261,16 +249,8 @@ class FreeLimit(Free):
         if not self.low <= start <= self.high:
             allowed, step = f"{self.low:g} to {self.high:g} N", "Widen the bounds, or correct the robot."
             raise InvalidValueError(f"{item}: the robot's {name}", f"{start:g} N", allowed, step)
-        return _Limited((Part(name, "N", self.low, self.high, start),), LIMITS[self.which], cables)
 
+        def write(tables_of_cables: Array, values: Array) -> None:
+            tables_of_cables[:, cables, LIMITS[self.which]] = values
 
-class _Limited(NamedTuple):
-    """A limit: which column, of which cables."""
-
-    parts: tuple[Part, ...]
-    column: int
-    cables: Indices
-
-    def write(self, cables: Array, values: Array) -> None:
-        """Set it."""
-        cables[:, self.cables, self.column] = values
+        return Bound((Part(name, "N", self.low, self.high, start),), write)

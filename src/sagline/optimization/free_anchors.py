@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import brief, choice
 from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
+from sagline.core.results import set_fields
 from sagline.kernels import tables
 from sagline.optimization.free import Bound, Free, Part, cable_numbers, cables_of_robot, check_order, whose_text
 from sagline.robot.robot import Robot
@@ -164,16 +165,15 @@ class FreeAnchors(Free):
         if not (upper > lower).any():
             raise InvalidValueError("high", "the same as low", "> low in a direction", "Give the anchors some room.")
         free = upper > lower
-        values = {
-            "end": choice(end, "end", ENDS),
-            "low": locked(lower[free]),
-            "high": locked(upper[free]),
-            "along": locked(directions[free]),
-            "cables": () if cables is None else cable_numbers(cables, "cables"),
-            "symmetry": symmetry_of(symmetry),
-        }
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
+        set_fields(
+            self,
+            end=choice(end, "end", ENDS),
+            low=locked(lower[free]),
+            high=locked(upper[free]),
+            along=locked(directions[free]),
+            cables=() if cables is None else cable_numbers(cables, "cables"),
+            symmetry=symmetry_of(symmetry),
+        )
 
     def bound(self, robot: Robot, item: str) -> Bound:
         """What it means for a robot."""
@@ -196,19 +196,12 @@ class FreeAnchors(Free):
         if not parts:
             step = "Leave out the symmetry, or the directions across its planes."
             raise InvalidValueError(f"{item}: symmetry", "one that holds all anchors", "one that lets some move", step)
-        return _Shifted(tuple(parts), np.array(rates))
 
+        def write(tables_of_cables: Array, values: Array) -> None:
+            for k, rate in enumerate(rates):  # sums in a fixed order, whatever the number of candidates
+                tables_of_cables += values[:, k, None, None] * rate
 
-class _Shifted(NamedTuple):
-    """Anchors: what each part adds to the table of cables, per meter."""
-
-    parts: tuple[Part, ...]
-    rates: Array
-
-    def write(self, cables: Array, values: Array) -> None:
-        """Shift them; sums in a fixed order, whatever the number of candidates."""
-        for k, rate in enumerate(self.rates):
-            cables += values[:, k, None, None] * rate
+        return Bound(tuple(parts), write)
 
 
 def _directions(along: ArrayLike) -> Array:

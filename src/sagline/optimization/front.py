@@ -6,7 +6,7 @@ import csv
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from sagline.core.results import Result
 from sagline.files.robot_file import dump_robot
 from sagline.files.writing import atomic_files, create_folder, file_stem
 from sagline.optimization.candidates import Candidates
+from sagline.optimization.folder import DesignFolder
 from sagline.optimization.free import Part
-from sagline.optimization.goals import Goal
+from sagline.optimization.goals import Goal, heading
+from sagline.optimization.rating import Rating
 from sagline.optimization.request import Request
 from sagline.robot.robot import Robot
 
@@ -93,8 +95,8 @@ class Front(Result):
         place = create_folder(file_path(folder, "folder", folder=True))
         robots = self.robots if self.better else ()
         names = [FRONT, *(f"{file_stem(robot.name)}.yaml" for robot in robots)]
-        heads = ["robot", *(f"{goal.kind} [{goal.unit}]" if goal.unit else goal.kind for goal in self.goals)]
-        heads += [f"{part.name} [{part.unit}]" if part.unit else part.name for part in self.parts]
+        heads = ["robot", *(heading(goal.kind, goal.unit) for goal in self.goals)]
+        heads += [heading(part.name, part.unit) for part in self.parts]
         rows = [[self.start.name, *self.start_values.tolist(), *(part.start for part in self.parts)]]
         for robot, goals, values in zip(robots, self.values, self.changed, strict=False):
             rows.append([robot.name, *goals.tolist(), *values.tolist()])
@@ -160,17 +162,6 @@ def _beaten(one: Array, others: Array) -> bool:
 LONGEST: Final = 80  # letters of a robot's name that are kept before what is added
 
 
-class Record(Protocol):
-    """What is known of a search that was begun before, and where it goes on."""
-
-    @property
-    def known(self) -> Array:
-        """Numbers and goals of the candidates that are rated, in their order, shape (K, d + g)."""
-
-    def add(self, rows: Array) -> None:
-        """Keep further ones, shape (N, d + g)."""
-
-
 class Ledger:
     """Rates candidates for an optimizer.
 
@@ -197,9 +188,12 @@ class Ledger:
             InvalidValueError: If a goal says nothing of the first robot.
         """
         self._request, self._candidates = request, candidates
-        self.record: Record | None = None
+        self.record: DesignFolder | None = None
         self._evaluations, self._progress = evaluations, progress
-        self._rating = request.rating(candidates)
+        moving = Candidates(request.robot, request.inner, "inner") if request.inner else None
+        self._rating = Rating(
+            candidates, request.goals, request.wrenches, request.poses, request.model, request.robust, moving
+        )
         self._start = candidates.units(candidates.start[None])[0]
         width = len(candidates.parts)
         self._rows: Array = np.zeros((0, width + len(request.goals)))

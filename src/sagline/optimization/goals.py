@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from sagline.core.arguments import brief, choice
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
+from sagline.core.results import set_fields
 
 
 class Measured(NamedTuple):
@@ -64,6 +65,11 @@ def _least(values: Array) -> Array:
 
 def _largest(values: Array) -> Array:
     return np.asarray(np.nanmax(values, axis=-1, initial=-np.inf))
+
+
+def heading(name: str, unit: str) -> str:
+    """Name and unit of a column: "mean_margin [N]"."""
+    return f"{name} [{unit}]" if unit else name
 
 
 KINDS: Final = MappingProxyType(
@@ -124,14 +130,13 @@ class Goal:
         found = KINDS[choice(kind, "goal", KINDS)]
         if maximize is not None and not isinstance(maximize, bool | np.bool_):
             raise InvalidValueError("maximize", brief(maximize), "True, False or None", "Choose one of them.")
-        values: dict[str, Any] = {
-            "kind": str(kind),
-            "maximize": found.larger_is_better if maximize is None else bool(maximize),
-            "weight": number(weight, "weight", "", above=0.0),
-            "scale": None if scale is None else number(scale, "scale", found.unit, above=0.0),
-        }
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
+        set_fields(
+            self,
+            kind=str(kind),
+            maximize=found.larger_is_better if maximize is None else bool(maximize),
+            weight=number(weight, "weight", "", above=0.0),
+            scale=None if scale is None else number(scale, "scale", found.unit, above=0.0),
+        )
 
     @property
     def unit(self) -> str:

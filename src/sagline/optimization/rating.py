@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 
@@ -34,22 +34,13 @@ from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 BLOCK = 1 << 12  # poses at once: a tenth of a second, after which an interrupt is heard
 
 
-class Planned(NamedTuple):
-    """Of each pose, shape (N,); NaN where there are no tensions.
+def distribute(
+    robot: Robot, model: CableModel, cables: Array, poses: Array, wrench: Array, *, stiffness: bool
+) -> tuple[Array, Array, Array | None]:
+    """Largest tension [N], largest sag [m] and, if asked for, least stiffness [N/m], by the minimum norm.
 
-    Attributes:
-        tension: Largest of the cables [N].
-        sag: Largest of the cables [m].
-        stiffness: Against the force on the center of mass that meets the least [N/m]; None if nobody asked.
-    """
-
-    tension: Array
-    sag: Array
-    stiffness: Array | None
-
-
-def planned(robot: Robot, model: CableModel, cables: Array, poses: Array, wrench: Array, *, stiffness: bool) -> Planned:
-    """Share the load by the minimum norm.
+    Each of shape (N,), NaN where there are no tensions; the stiffness is that of the softest direction of a force on
+    the center of mass.
 
     Args:
         robot: What all candidates share.
@@ -75,7 +66,7 @@ def planned(robot: Robot, model: CableModel, cables: Array, poses: Array, wrench
     tension = found.results[tables.TENSION].max(axis=-1)
     sag = _sag(model, robot.gravity, found.results, cables).max(axis=-1)
     stiff = _stiffness(robot, model, found.results, (cables, poses, load), behind) if stiffness else None
-    return Planned(tension, sag, stiff)
+    return tension, sag, stiff
 
 
 def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Array:
@@ -263,12 +254,9 @@ class Rating:
         if not self._needs & set(AT_POSES):
             return Measured(margin, cost=cost)
         held = np.tile(self._held, shape[0] * shape[1])
-        plan = planned(
-            self._candidates.robot, self._model, each[held], rows[held], self._wrench,
-            stiffness="stiffness" in self._needs,
-        )  # fmt: skip
-        tension, sag = (array.reshape(*shape[:2], -1) for array in (plan.tension, plan.sag))
-        stiffness = None if plan.stiffness is None else plan.stiffness.reshape(*shape[:2], -1)
+        wanted = "stiffness" in self._needs
+        found = distribute(self._candidates.robot, self._model, each[held], rows[held], self._wrench, stiffness=wanted)
+        tension, sag, stiffness = (None if one is None else one.reshape(*shape[:2], -1) for one in found)
         return Measured(margin, tension, sag, stiffness, cost)
 
     def _cost(self, cables: Array, values: Array) -> Array:
@@ -288,9 +276,8 @@ class Rating:
     def _held_at(self, cables: Array) -> Flags:
         """The poses at which a robot has tensions, shape (G,)."""
         each = np.repeat(cables, len(self.rows), axis=0)
-        held = ~np.isnan(
-            planned(self._candidates.robot, self._model, each, self.rows, self._wrench, stiffness=False).tension
-        )
+        found = distribute(self._candidates.robot, self._model, each, self.rows, self._wrench, stiffness=False)
+        held = ~np.isnan(found[0])
         if not held.any():
             value, step = "held at none of the poses", "Choose other poses, wrenches or tension limits."
             raise InvalidValueError(self._candidates.robot.name, value, "one that is held somewhere", step)

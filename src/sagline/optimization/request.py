@@ -16,7 +16,6 @@ from sagline.optimization.candidates import AnchorErrors, Candidates, Solid, fre
 from sagline.optimization.free import Free
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.goals import Goal
-from sagline.optimization.rating import Rating
 from sagline.optimization.search import SEARCHES, latin_hypercube
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
@@ -125,19 +124,6 @@ class Request:
         """The robots that are searched."""
         return Candidates(self.robot, self.free)
 
-    def rating(self, candidates: Candidates) -> Rating:
-        """Who rates them."""
-        moving = Candidates(self.robot, self.inner, "inner") if self.inner else None
-        return Rating(candidates, self.goals, self.wrenches, self.poses, self.model, self.robust, moving)
-
-    def sample(self, dimensions: int) -> Any:
-        """Points that are tried beside the robot itself; as many whatever the number of evaluations."""
-        return latin_hypercube(_population(self.optimizer, dimensions) - 1, dimensions, self.seed)
-
-    def least_evaluations(self, dimensions: int) -> int:
-        """Evaluations of two generations."""
-        return 2 * _population(self.optimizer, dimensions)
-
 
 def requested(
     robot: Any, free: Any, goals: Any, wrenches: Any, poses: Pose, model: Any, inner: Any, robust: Any,
@@ -218,10 +204,3 @@ def _check_platform(request: Request) -> None:
         value = f"inside the platform at pose {int(poses[which, cable])}"
         step = "Narrow low and high, or leave the pose out." if which else "Leave the pose out, or correct the robot."
         raise InvalidValueError(item, value, "outside of it at all poses", step)
-
-
-def _population(optimizer: str, dimensions: int) -> int:
-    """Candidates of the first generation, the robot itself among them."""
-    if optimizer == "cma":
-        return 2 * (4 + int(3.0 * np.log(dimensions)))
-    return max(16, 4 * dimensions) if optimizer == "differential_evolution" else max(24, 4 * dimensions)

@@ -183,3 +183,10 @@ def search_nsga2(task: Task) -> None:
 SEARCHES: Final[MappingProxyType[str, Callable[[Task], None]]] = MappingProxyType(
     {"cma": search_cma, "differential_evolution": search_differential_evolution, "nsga2": search_nsga2}
 )
+
+
+def population_of(optimizer: str, dimensions: int) -> int:
+    """Number of candidates of the first generation, the robot itself among them."""
+    if optimizer == "cma":
+        return 2 * (4 + int(3.0 * np.log(dimensions)))
+    return max(16, 4 * dimensions) if optimizer == "differential_evolution" else max(24, 4 * dimensions)

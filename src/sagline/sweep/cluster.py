@@ -12,11 +12,11 @@ import uuid
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from importlib.util import find_spec
 from itertools import islice
 from typing import Any, Final
 
 from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.sweep.folder import is_installed
 from sagline.sweep.work import task
 
 HERE: Final = "127.0.0.1"  # nobody else is served
@@ -43,11 +43,6 @@ def cores() -> int:
     with suppress(AttributeError):  # not on every system
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def has_dask() -> bool:
-    """Whether Dask's scheduler is installed."""
-    return find_spec("distributed") is not None
 
 
 @contextmanager
@@ -206,7 +201,7 @@ def quiet() -> Iterator[None]:
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", module=rf"({'|'.join((*LOGGERS, 'dask'))})(\.|$)")
-        if has_dask():
+        if is_installed("distributed"):
             import distributed  # noqa: F401 - sets its loggers up, and would undo what follows
         for logger in loggers:
             logger.setLevel(SILENT)

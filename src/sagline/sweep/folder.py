@@ -152,7 +152,7 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
         FileError: If it cannot be made.
         InvalidValueError: If the model or the way of sharing is none of sagline's.
     """
-    check_packages()
+    check_package("zarr", "sweeps")
     texts = [dump_robot(robot) for robot in request.robots]
     options = _options(request)
     attributes = {
@@ -186,7 +186,7 @@ def open_folder(path: Path) -> SweepFolder:
     """
     import zarr
 
-    check_packages()
+    check_package("zarr", "sweeps")
     if not path.is_dir():
         raise FileError(path, "is no folder", CONTENT.give)
     try:
@@ -236,15 +236,20 @@ def check_made_here(folder: SweepFolder) -> None:
         raise FileError(folder.path, f"was begun by {folder.made_by}, and this is {here}", step)
 
 
-def check_packages() -> None:
-    """Say what to install where it is missing.
+def is_installed(package: str) -> bool:
+    """True if an optional package is installed."""
+    return find_spec(package) is not None
+
+
+def check_package(name: str, purpose: str) -> None:
+    """Refuse to go on without an optional package; the message names the command that installs it.
 
     Raises:
-        InvalidValueError: If Zarr is not installed.
+        InvalidValueError: If it is not installed.
     """
-    if find_spec("zarr") is None:
+    if not is_installed(name):
         step = 'Install it: pip install "sagline[sweep]".'
-        raise InvalidValueError("the package zarr", "not installed", "installed, for sweeps", step)
+        raise InvalidValueError(f"the package {name}", "not installed", f"installed, for {purpose}", step)
 
 
 def _options(request: Request) -> dict[str, Any]:

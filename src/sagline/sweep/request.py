@@ -17,7 +17,7 @@ from sagline.core.arguments import brief, choice, instance
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
-from sagline.core.results import Result
+from sagline.core.results import Result, set_fields
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
 from sagline.robot.pose import Pose
@@ -169,18 +169,17 @@ class Request(Result):
         for one in machines:
             kernel_options(without_guides(one, "a sweep", "inverse"), model, method)
             check_reach(one, batch, "poses")
-        values: dict[str, Any] = {
-            "robots": machines,
-            "poses": batch,
-            "wrenches": locked(np.ascontiguousarray(loads)),
-            "quantities": tuple(name for name in QUANTITIES if name in asked),
-            "model": model,
-            "tension": method,
-            "around": load_of(around),
-            "moment_arm": None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0),
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+        set_fields(
+            self,
+            robots=machines,
+            poses=batch,
+            wrenches=locked(np.ascontiguousarray(loads)),
+            quantities=tuple(name for name in QUANTITIES if name in asked),
+            model=model,
+            tension=method,
+            around=load_of(around),
+            moment_arm=None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0),
+        )
 
     @property
     def shape(self) -> tuple[int, int, int]:

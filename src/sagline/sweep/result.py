@@ -20,32 +20,12 @@ from sagline.core.numbers import counted
 from sagline.core.results import Result
 from sagline.files.variables import PARTS
 from sagline.files.writing import try_lock
-from sagline.sweep.folder import GROUP, STEP, SweepFolder, check_packages, open_folder
+from sagline.sweep.folder import GROUP, STEP, SweepFolder, check_package, open_folder
 from sagline.sweep.request import Request, variables_of
 from sagline.sweep.work import Counts
 
 if TYPE_CHECKING:
     from xarray import Dataset
-
-
-def dataset_of(folder: Path, request: Request) -> Dataset:
-    """All variables of a sweep, with labels.
-
-    Args:
-        folder: Where it is.
-        request: What was asked.
-
-    Returns:
-        Data set with the dimensions robot, pose, wrench and cable; nothing is read before it is used.
-    """
-    import xarray
-
-    data: Dataset = xarray.open_zarr(
-        folder / GROUP, chunks=None, consolidated=False, zarr_format=3, mask_and_scale=False
-    )
-    labels = {"robot": [robot.name for robot in request.robots], "cable": list(range(request.cable_count))}
-    labels |= {part: list(PARTS[part]) for part in ("axis", "quaternion_part", "wrench_part")}
-    return data.assign_coords({name: values for name, values in labels.items() if name in data.dims})
 
 
 NAME: Final = "done"
@@ -249,7 +229,15 @@ class Sweep(Result):
     @property
     def field(self) -> Any:
         """All variables with units and labels, as a Dataset of xarray; nothing is read before it is used."""
-        return dataset_of(self.folder, self.request)
+        import xarray
+
+        data: Dataset = xarray.open_zarr(
+            self.folder / GROUP, chunks=None, consolidated=False, zarr_format=3, mask_and_scale=False
+        )
+        request = self.request
+        labels = {"robot": [robot.name for robot in request.robots], "cable": list(range(request.cable_count))}
+        labels |= {part: list(PARTS[part]) for part in ("axis", "quaternion_part", "wrench_part")}
+        return data.assign_coords({name: values for name, values in labels.items() if name in data.dims})
 
 
 def load(folder: os.PathLike[str] | str) -> Sweep:
@@ -266,7 +254,7 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
         InvalidValueError: If Zarr is not installed.
     """
     path = file_path(folder, "folder", folder=True)
-    check_packages()
+    check_package("zarr", "sweeps")
     opened = open_folder(path)
     marks = read_marks(opened)
     seconds = sum(mark.seconds for mark in marks.values())

@@ -13,8 +13,16 @@ from typing import Any, Final
 from sagline.core.arguments import callback, file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.progress import Progress
-from sagline.sweep.cluster import check_address, cores, has_dask, local_workers, remote_workers, spread
-from sagline.sweep.folder import SweepFolder, check_made_here, check_packages, digest_of, make_folder, open_folder
+from sagline.sweep.cluster import check_address, cores, local_workers, remote_workers, spread
+from sagline.sweep.folder import (
+    SweepFolder,
+    check_made_here,
+    check_package,
+    digest_of,
+    is_installed,
+    make_folder,
+    open_folder,
+)
 from sagline.sweep.request import Request
 from sagline.sweep.result import Mark, Marks, Sweep, load, marking
 from sagline.sweep.work import Counts, found_counts, measured_size, task
@@ -73,16 +81,19 @@ def run(
         if workers is not None:
             step = "Leave one of them out."
             raise InvalidValueError("workers", "given with scheduler", "one of the two", step)
-        _check_dask()
-    told, say = callback(progress, "progress"), callback(tell, "tell") or _nothing
-    check_packages()
+        check_package("distributed", "a scheduler")
+    told, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
+    check_package("zarr", "sweeps")
     opened = _made(path, request)
     with marking(opened) as marks:
         waiting = _waiting(opened, marks)
-        clock = _Clock(len(waiting))
+        start, done = 0.0, 0
 
         def finish(number: int, seconds: float, counts: tuple[int, ...]) -> None:
-            marks.add(number, Mark(seconds, Counts(*counts)), clock.left())
+            nonlocal done
+            done += 1
+            left = (time.monotonic() - start) / done * (len(waiting) - done)
+            marks.add(number, Mark(seconds, Counts(*counts)), left)
             if told is not None:
                 told(len(marks.marks), opened.tasks)
 
@@ -90,28 +101,13 @@ def run(
             told(len(marks.marks), opened.tasks)
         job = (str(path.absolute()), opened.digest)
         with _workers(count, scheduler, len(waiting), say) as client:
-            clock.begin()
+            start = time.monotonic()
             if client is not None:
                 spread(client, job, waiting, finish, say)
             else:
                 for number in waiting:
                     finish(number, *task(*job, number))
     return load(path)
-
-
-class _Clock:
-    """Tells how long the rest takes, from how long each task so far took all workers together."""
-
-    def __init__(self, tasks: int) -> None:
-        self._tasks, self._done, self._start = tasks, 0, 0.0
-
-    def begin(self) -> None:
-        self._start = time.monotonic()
-
-    def left(self) -> float:
-        """Another task is done; time for the rest [s]."""
-        self._done += 1
-        return (time.monotonic() - self._start) / self._done * (self._tasks - self._done)
 
 
 def opened_for(path: Path, request: Request) -> SweepFolder:
@@ -166,7 +162,7 @@ def _workers(count: int, scheduler: str | None, tasks: int, tell: Tell) -> Itera
     if scheduler is not None and tasks:
         with remote_workers(scheduler) as client:
             yield client
-    elif count > 1 and tasks > FEW and has_dask():
+    elif count > 1 and tasks > FEW and is_installed("distributed"):
         _check_not_imported()
         with local_workers(min(count, tasks), tell) as client:
             yield client
@@ -180,13 +176,3 @@ def _check_not_imported() -> None:
     """End the worker that imports a script which runs a sweep as it is imported; whoever started it tells why."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)
-
-
-def _check_dask() -> None:
-    if not has_dask():
-        step = 'Install it: pip install "sagline[sweep]".'
-        raise InvalidValueError("the package distributed", "not installed", "installed, for a scheduler", step)
-
-
-def _nothing(text: str) -> None:
-    """Nobody wants to know."""

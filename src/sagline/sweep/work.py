@@ -218,7 +218,7 @@ def _opened(folder: str, digest: str) -> SweepFolder:
 
 
 def found_counts(folder: SweepFolder, number: int) -> Counts | None:
-    """The counts of a task whose chunks are on the disk, whole; None where one is missing or torn."""
+    """Counts of a task whose chunks are whole on the disk; None where one is missing or torn."""
     numbers = folder.read(number)
     return None if numbers is None else counts_of(numbers)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -110,10 +110,10 @@ def boundary(
     open_faces = tuple(name for name, flat in zip(FACES, on_box, strict=True) if flat.any())
     curved = np.flatnonzero(~np.logical_or.reduce(on_box))
     faces = net.faces[curved]
-    between = bulge(counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid)
+    between, errors = bulge(counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid)
     volumes = volumes_of(surface.vertices, surface.faces)
-    volumes[curved] += between.volume
-    volume, error = float(volumes.sum()), float(between.error.sum())
+    volumes[curved] += between
+    volume, error = float(volumes.sum()), float(errors.sum())
     components = components_of(grid, net.inner, net.faces, volumes)
     return Boundary(surface, volume, error, first, components, open_faces, counted.count)
 
@@ -193,20 +193,7 @@ MISSED: Final = 5.0 / 12.0  # of it at most
 FLAT: Final = 1e-6  # of the reach: a distance that adds nothing
 
 
-class Bulge(NamedTuple):
-    """What lies between a net and the boundary.
-
-    Attributes:
-        volume: Over each triangle [m^3], negative where the boundary is within the net, shape (F,).
-        error: By how much that can be wrong [m^3], shape (F,): where the boundary was not found within reach, all that
-            is within it.
-    """
-
-    volume: Array
-    error: Array
-
-
-def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> Bulge:
+def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
     """What lies between a net and the boundary.
 
     Args:
@@ -228,7 +215,7 @@ def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Gri
     distance = distances(level, points, normals, slope, reach[0], reach[1])
     found = ~np.isnan(distance)
     volume = np.where(found, MEAN * area * distance, 0.0)
-    return Bulge(volume, area * np.where(found, MISSED * np.abs(distance), np.maximum(*reach)))
+    return volume, area * np.where(found, MISSED * np.abs(distance), np.maximum(*reach))
 
 
 def distances(level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array) -> Array:

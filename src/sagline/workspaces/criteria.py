@@ -1,4 +1,7 @@
-"""Criteria of a workspace: margin, sag, position error, stiffness, frequency, clearance and frame."""
+"""Criteria of a workspace: margin, sag, position error, stiffness, frequency, clearance and frame.
+
+Where a criterion depends on tensions, these balance the middle load of the wrench set.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,20 @@ from typing import Any, ClassVar, Final
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.core.arguments import brief, instance
-from sagline.core.arrays import Array, locked, number
-from sagline.core.errors import InvalidValueError
-from sagline.interference.clearance import ClearanceRows, check_obstacles
+from sagline.core.arguments import instance
+from sagline.core.arrays import Array, locked
+from sagline.interference.clearance import ClearanceRows, check_obstacles, obstacles_of
 from sagline.interference.pairs import Obstacle
 from sagline.kinematics.confirm import confirm
 from sagline.robot.bounds import bounds
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of, modes
-from sagline.workspaces.criterion import Criterion, Given, Judged, no_cable
+from sagline.workspaces.criterion import Criterion, Given, Judged
+
+_PRECISION: Final = 1e-6  # m: largest jump of the clearance's level from pose to pose
+_CABLE: Final = re.compile(r"cable (\d+)")
+_CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,11 +48,11 @@ class LeastMargin(Criterion):
 
     def __post_init__(self) -> None:
         """Check the limit."""
-        object.__setattr__(self, "limit", number(self.limit, "LeastMargin: limit", "N", low=0.0))
+        self._check_limit(low=0.0)
 
     @property
     def always(self) -> bool:
-        """Without a reserve every workspace has it."""
+        """True without a reserve: every workspace has it."""
         return self.limit == 0.0
 
     def judge(self, given: Given) -> Judged:
@@ -54,7 +60,7 @@ class LeastMargin(Criterion):
         return Judged(locked(given.margin - self.limit), given.cable)
 
     def scale(self, robot: Robot) -> float:
-        """The platform's weight; without gravity the strongest pull of a cable [N]."""
+        """The platform's weight; without gravity the largest tension of a cable [N]."""
         weight = robot.mass * robot.gravity
         if weight > 0.0:
             return weight
@@ -78,16 +84,12 @@ class MaximumSag(Criterion):
 
     def __post_init__(self) -> None:
         """Check the limit."""
-        object.__setattr__(self, "limit", number(self.limit, "MaximumSag: limit", "m", above=0.0))
+        self._check_limit(above=0.0)
 
     def judge(self, given: Given) -> Judged:
-        """What is left up to the limit [m], and the cable that hangs deepest."""
+        """Limit minus largest sag [m], and the cable that sags most."""
         sag = given.state.cables.sag
         return Judged(given.spread(self.limit - sag.max(axis=1)), given.spread_cables(sag.argmax(axis=1)))
-
-    def scale(self, robot: Robot) -> float:
-        """The limit [m]."""
-        return self.limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,21 +114,17 @@ class PositionError(Criterion):
     def __post_init__(self) -> None:
         """Check both."""
         instance(self.model, CableModel, "PositionError: model")
-        object.__setattr__(self, "limit", number(self.limit, "PositionError: limit", "m", above=0.0))
+        self._check_limit(above=0.0)
 
     def __str__(self) -> str:
-        """With the model."""
+        """Title, limit and model."""
         return f"{super(PositionError, self).__str__()} with {type(self.model).__name__}"
 
     def judge(self, given: Given) -> Judged:
-        """What is left up to the limit [m]; NaN where the model has no lengths, or they hold nothing."""
+        """Limit minus position error [m]; NaN where the model has no lengths, or no equilibrium at its lengths."""
         found = confirm(given.planned(self.model))
         error = np.where(found.held, np.linalg.norm(found.position_error, axis=1), np.nan)
-        return Judged(given.spread(self.limit - error), no_cable(len(given)))
-
-    def scale(self, robot: Robot) -> float:
-        """The limit [m]."""
-        return self.limit
+        return Judged(given.spread(self.limit - error))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,41 +146,12 @@ class LeastStiffness(Criterion):
 
     def __post_init__(self) -> None:
         """Check the limit."""
-        object.__setattr__(self, "limit", number(self.limit, "LeastStiffness: limit", "N/m", above=0.0))
+        self._check_limit(above=0.0)
 
     def judge(self, given: Given) -> Judged:
-        """What there is above the limit [N/m]."""
-        freedom = given.robot.freedom
-        found = softest(freedom, cable_slopes(given.state).matrix)
-        return Judged(given.spread(found - self.limit), no_cable(len(given)))
-
-    def scale(self, robot: Robot) -> float:
-        """The limit [N/m]."""
-        return self.limit
-
-
-def softest(freedom: Array, matrix: Array) -> Array:
-    """Force on the center of mass over how far it gives way, in the direction where that is least.
-
-    Args:
-        freedom: Free motions, shape (n, 6).
-        matrix: Stiffness of the platform in world axes, shape (N, 6, 6).
-
-    Returns:
-        [N/m], shape (N,): 0 where nothing holds it, NaN for a matrix with NaN.
-    """
-    lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
-    own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T
-    own = 0.5 * (own + np.swapaxes(own, 1, 2))
-    size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
-    size[size == 0.0] = 1.0
-    balanced = own / (size[:, :, None] * size[:, None, :])  # newtons and newton meters alike
-    stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
-    compliance = compliance_of(freedom, matrix)[:, :3, :3]
-    known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))
-    given = np.where(known[:, None, None], compliance, np.eye(3))
-    largest = np.linalg.eigvalsh(0.5 * (given + np.swapaxes(given, 1, 2)))[:, -1]
-    return np.where(lost, np.nan, np.where(known, 1.0 / largest, 0.0))
+        """Stiffness of the softest direction above the limit [N/m]."""
+        found = _least_stiffness(given.robot.freedom, cable_slopes(given.state).matrix)
+        return Judged(given.spread(found - self.limit))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,21 +172,13 @@ class LeastFrequency(Criterion):
 
     def __post_init__(self) -> None:
         """Check the limit."""
-        object.__setattr__(self, "limit", number(self.limit, "LeastFrequency: limit", "Hz", above=0.0))
+        self._check_limit(above=0.0)
 
     def judge(self, given: Given) -> Judged:
-        """What there is above the limit [Hz]."""
+        """Lowest natural frequency above the limit [Hz]."""
         lowest = modes(given.state).frequency[:, 0]
-        falling = np.isnan(lowest) & given.plan.feasible
-        return Judged(given.spread(np.where(falling, 0.0, lowest) - self.limit), no_cable(len(given)))
-
-    def scale(self, robot: Robot) -> float:
-        """The limit [Hz]."""
-        return self.limit
-
-
-_PRECISION: Final = 1e-6  # m: by no more may the level jump from pose to pose
-_CABLE: Final = re.compile(r"cable (\d+)")
+        unstable = np.isnan(lowest) & given.plan.feasible
+        return Judged(given.spread(np.where(unstable, 0.0, lowest) - self.limit))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -240,41 +201,18 @@ class Clearance(Criterion):
 
     def __post_init__(self) -> None:
         """Check both."""
-        object.__setattr__(self, "limit", number(self.limit, "Clearance: limit", "m", above=0.0))
+        self._check_limit(above=0.0)
         given: Any = self.obstacles
-        several = (given,) if isinstance(given, Obstacle) else given
-        listed = isinstance(several, list | tuple)
-        if wrong := [each for each in several if not isinstance(each, Obstacle)] if listed else [given]:
-            step = 'Make them: Sphere(center, radius), Box(size, center), load_mesh("hall.stl").'
-            allowed = "Box, Capsule, Sphere or Mesh, one or several"
-            raise InvalidValueError("Clearance: obstacles", brief(wrong[0]), allowed, step)
-        object.__setattr__(self, "obstacles", tuple(several))
+        listed = isinstance(given, Obstacle | list | tuple)
+        found = obstacles_of(given if listed else [given], "Clearance: obstacles")
+        object.__setattr__(self, "obstacles", found)
 
     def judge(self, given: Given) -> Judged:
-        """Least distance above the limit [m], and the cable, or the first of two, that is nearest to something."""
-        rows = _rows(given.robot, self.obstacles)
+        """Least distance above the limit [m], and the cable, or the first of two, of the nearest pair."""
+        rows = _clearance_rows(given.robot, self.obstacles)
         value, pair = rows.least(given.state)
         cables = np.array([*map(_cable_of, rows.pairs.names), -1])
         return Judged(given.spread(value - self.limit), given.spread_cables(cables[pair]))
-
-    def scale(self, robot: Robot) -> float:
-        """The limit [m]."""
-        return self.limit
-
-
-@lru_cache(maxsize=4)
-def _rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
-    """What is measured, made ready once for all poses of a robot, after the arguments are checked."""
-    checked = check_obstacles(obstacles, robot)
-    return ClearanceRows(robot, checked, precision=_PRECISION)
-
-
-def _cable_of(pair: tuple[str, str]) -> int:
-    """The first cable of a pair of names; -1 where there is none."""
-    return next((int(found[1]) for name in pair if (found := _CABLE.fullmatch(name))), -1)
-
-
-_CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -294,16 +232,19 @@ class InFrame(Criterion):
 
     def __post_init__(self) -> None:
         """Check the limit."""
-        object.__setattr__(self, "limit", number(self.limit, "InFrame: limit", "m", low=0.0))
+        self._check_limit(low=0.0)
 
     def judge(self, given: Given) -> Judged:
         """Least distance of a corner from the faces, above the limit [m]."""
         robot = given.robot
         low, high = bounds(robot)
         axes = np.arange(3) if robot.plane_normal is None else np.flatnonzero(np.abs(robot.plane_normal) < 0.5)
-        corners = given.pose.transform(_points(robot))[..., axes]
-        room = np.minimum(corners - low[axes], high[axes] - corners).min(axis=(1, 2))
-        return Judged(locked(room - self.limit), no_cable(len(given)))
+        points = robot.platform_anchors
+        if robot.platform_size is not None:
+            points = np.vstack((points, _CORNERS * robot.platform_size))
+        corners = given.pose.transform(points)[..., axes]
+        distance = np.minimum(corners - low[axes], high[axes] - corners).min(axis=(1, 2))
+        return Judged(locked(distance - self.limit))
 
     def scale(self, robot: Robot) -> float:
         """A tenth of the frame's least edge that is not flat [m]."""
@@ -312,8 +253,31 @@ class InFrame(Criterion):
         return 0.1 * float(edges.min(initial=np.inf)) if edges.size else 1.0
 
 
-def _points(robot: Robot) -> Array:
-    """Anchors and corners of the platform in its own frame, shape (k, 3)."""
-    if robot.platform_size is None:
-        return robot.platform_anchors
-    return np.vstack((robot.platform_anchors, _CORNERS * robot.platform_size))
+@lru_cache(maxsize=4)
+def _clearance_rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> ClearanceRows:
+    """Measurement of a robot's clearances, prepared once for all its poses."""
+    return ClearanceRows(robot, check_obstacles(obstacles, robot), precision=_PRECISION)
+
+
+def _cable_of(pair: tuple[str, str]) -> int:
+    """The first cable of a pair of names; -1 where there is none."""
+    return next((int(found[1]) for name in pair if (found := _CABLE.fullmatch(name))), -1)
+
+
+def _least_stiffness(freedom: Array, matrix: Array) -> Array:
+    """Stiffness of the softest direction of a force on the center of mass [N/m], (N,): 0 if unstable, NaN for NaN.
+
+    Free motions (n, 6); stiffness matrices of the platform in world axes (N, 6, 6).
+    """
+    lost = np.asarray(np.isnan(matrix).any(axis=(1, 2)))
+    own = freedom @ np.where(lost[:, None, None], np.eye(6), matrix) @ freedom.T
+    own = 0.5 * (own + np.swapaxes(own, 1, 2))
+    size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
+    size[size == 0.0] = 1.0
+    balanced = own / (size[:, :, None] * size[:, None, :])  # newtons and newton meters alike
+    stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
+    compliance = compliance_of(freedom, matrix)[:, :3, :3]
+    known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))
+    given = np.where(known[:, None, None], compliance, np.eye(3))
+    largest = np.linalg.eigvalsh(0.5 * (given + np.swapaxes(given, 1, 2)))[:, -1]
+    return np.where(lost, np.nan, np.where(known, 1.0 / largest, 0.0))

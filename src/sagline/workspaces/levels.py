@@ -105,16 +105,17 @@ class Levels:
         Returns:
             Details.
         """
-        found = self._empty(len(positions))
-        for part in blocks(len(positions), BLOCK):
-            own = self._block(self.placed(positions[part]))
+        count = len(positions)
+        found = Details(*np.empty((2, count)), *np.full((3, count), -1))
+        for part in blocks(count, BLOCK):
+            own = self._block(self._in_plane(positions[part]))
             for whole, piece in zip(found, own, strict=True):
                 whole[part] = piece
             if self.told is not None:
                 self.told(len(own.level))
         return Details(*map(locked, found))
 
-    def placed(self, positions: Array) -> Array:
+    def _in_plane(self, positions: Array) -> Array:
         """Positions as they count: of a plane, those in it.
 
         Args:
@@ -141,12 +142,8 @@ class Levels:
         Returns:
             Margins [N], shape (N,).
         """
-        rows = np.hstack((self.placed(positions), self.orientations.quaternion[rotation]))
+        rows = np.hstack((self._in_plane(positions), self.orientations.quaternion[rotation]))
         return MarginRows(self.robot, wrenches, self.model, self._moment_arm).rows(rows).value
-
-    def _empty(self, count: int) -> Details:
-        numbers, indices = np.empty((2, count)), np.full((3, count), -1)
-        return Details(*numbers, *indices)
 
     def _block(self, positions: Array) -> Details:
         found = self._turned(positions, 0)
@@ -173,7 +170,8 @@ class Levels:
             lost = np.isnan(judged.value) & (bracket.low >= 0.0)
             value = np.where(lost, -np.inf, judged.value / scale)
             least = value < level  # NaN is not
-            level[least], criterion[least], cable[least] = value[least], index, judged.cable[least]
+            level[least], criterion[least] = value[least], index
+            cable[least] = -1 if judged.cable is None else judged.cable[least]
         return Details(level, bracket.value, criterion, cable, np.full(len(rows), rotation, dtype=np.int64))
 
 

@@ -13,6 +13,7 @@ from sagline.core.arguments import brief, choice
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
+from sagline.core.results import set_fields
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words
@@ -62,15 +63,13 @@ class Orientations:
         quaternion = np.atleast_2d(Pose(np.zeros(3), rotations).quaternion)
         if not len(quaternion):
             raise InvalidValueError("rotations", "an empty set", "at least one rotation", "Give np.eye(3) for level.")
-        object.__setattr__(self, "quaternion", locked(quaternion))
-        object.__setattr__(self, "need", choice(need, "need", _NEEDS))
+        set_fields(self, quaternion=locked(quaternion), need=choice(need, "need", _NEEDS))
 
     @classmethod
     def _of(cls, quaternion: Array, need: Need) -> Orientations:
         """Around quaternions of our own making."""
         made = object.__new__(cls)
-        object.__setattr__(made, "quaternion", locked(quaternion))
-        object.__setattr__(made, "need", need)
+        set_fields(made, quaternion=locked(quaternion), need=need)
         return made
 
     def __len__(self) -> int:

@@ -58,41 +58,45 @@ class Cells(Result):
 
 
 class Prover:
-    """Proofs for rows of boxes, prepared once."""
+    """Proofs for rows of boxes, with everything but the boxes prepared once.
 
-    __slots__ = ("_given", "_room", "_statuses", "axes", "size")
+    Attributes:
+        size: Mean length of a chord, about [m].
+        axes: Axes about which the platform may turn, shape (1 or 3, 3).
+        deadline: Time on the monotonic clock after which no further block is proved [s].
+        tried: Number of boxes that were tried.
+    """
 
     def __init__(
-        self, robot: Robot, wrenches: WrenchSet, model: CableModel, precision: tuple[float, float] = PRECISION
+        self,
+        robot: Robot,
+        wrenches: WrenchSet,
+        model: CableModel,
+        precision: tuple[float, float] = PRECISION,
+        progress: Progress | None = None,
     ) -> None:
-        """Prepare.
-
-        Args:
-            robot: The robot, without pulleys.
-            wrenches: The set of loads.
-            model: Cable model.
-            precision: What the proofs allow for, as in the kernel; another only to show that it is needed.
-        """
+        """Prepare; the robot has no pulleys, and the precision differs from the default only in tests."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
         self._given = (
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
         )  # fmt: skip
-        self.size = 0.5 * float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))  # about a chord [m]
-        self.axes = np.eye(3) if robot.plane_normal is None else robot.plane_normal[None]  # about which it may turn
-        self._room = room_for(robot.cable_count)
+        self.size = 0.5 * float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
+        self.axes = np.eye(3) if robot.plane_normal is None else robot.plane_normal[None]
+        self.deadline, self.tried, self._progress = np.inf, 0, progress
+        self._work = room_for(robot.cable_count)
         self._statuses = np.zeros(robot.cable_count, dtype=np.int8)
 
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
-        """What is proved of boxes of poses: OPEN, PROVED_INSIDE (all poses) or PROVED_OUTSIDE (every pose).
+        """Verdicts of boxes of poses, block by block; OPEN after the deadline.
 
         Args:
-            middle: Of the boxes [m], shape (N, 3).
+            middle: Middles of the boxes [m], shape (N, 3).
             half: Their half edges [m], shape (3,).
             rotations: Rotation vectors at their middles [rad], shape (N, 3); None for level.
             turns: Largest turn away from there [rad], shape () or (N,).
 
         Returns:
-            Codes, shape (N,).
+            Codes of `ProofVerdict`, shape (N,).
         """
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle
@@ -103,102 +107,68 @@ class Prover:
         boxes[:, 10] = turns
         found = np.zeros(len(middle), dtype=np.int8)
         model, limits, robot, loads, precision = self._given
-        prove_boxes(model, limits, robot, loads, locked(boxes), precision, self._room, (found, self._statuses))
-        return found
-
-
-class Search:
-    """What is left to do, and of what.
-
-    Attributes:
-        prover: Of what.
-        deadline: On the monotonic clock, after which nothing more is looked at [s].
-        tried: How many boxes were looked at.
-    """
-
-    __slots__ = ("_told", "deadline", "prover", "tried")
-
-    def __init__(self, prover: Prover, deadline: float, progress: Progress | None = None) -> None:
-        """Begin."""
-        self.prover = prover
-        self.deadline = deadline
-        self.tried = 0
-        self._told = progress
-
-    @property
-    def late(self) -> bool:
-        """Whether the time is over."""
-        return time.monotonic() >= self.deadline
-
-    def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
-        """Those of the prover, block by block, each of which is told; OPEN where the time is over."""
-        verdict = np.zeros(len(middle), dtype=np.int8)
         for first in range(0, len(middle), BLOCK):
-            if first and self.late:
+            if first and self.out_of_time:
                 break
             part = slice(first, first + BLOCK)
-            turned = None if rotations is None else rotations[part]
-            turn = turns if isinstance(turns, float) else turns[part]
-            verdict[part] = self.prover.verdicts(middle[part], half, turned, turn)
-            self.tried += len(middle[part])
-            if self._told is not None:
-                self._told(self.tried, self.tried + max(len(middle) - part.stop, 0))
-        return verdict
+            own = locked(boxes[part])
+            prove_boxes(model, limits, robot, loads, own, precision, self._work, (found[part], self._statuses))
+            self.tried += len(own)
+            if self._progress is not None:
+                self._progress(self.tried, self.tried + max(len(middle) - part.stop, 0))
+        return found
+
+    @property
+    def out_of_time(self) -> bool:
+        """True after the deadline."""
+        return time.monotonic() >= self.deadline
 
 
-def halve(search: Search, box: PoseBox, smallest: float) -> tuple[Cells, int]:
-    """Halve a box breadth-first until all is decided or the time is over.
-
-    Args:
-        search: What proves, and until when.
-        box: The box.
-        smallest: Edge below which cells are not halved [m]; 0 for none.
-
-    Returns:
-        The cells, and how many boxes were tried.
-    """
+def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
+    """Bisect a box breadth-first, down to the smallest edge [m], until all is decided or the time is over."""
     half = 0.5 * (box.high - box.low)
     waiting = (box.low + half)[None]
     done: list[tuple[Array, Array, Codes]] = []
     while True:
-        verdict = _decide(search, waiting, half, box.tilt)
+        verdict = _decide(prover, waiting, half, box.tilt)
         offsets, halved = _children(half)
         is_open = verdict == ProofVerdict.OPEN
         count = int(is_open.sum()) * len(offsets)
-        if search.late or not count or count > MOST_CELLS or len(offsets) == 1 or 2.0 * halved.max() < smallest:
-            done.append(_cells(waiting, half, verdict))
+        if prover.out_of_time or not count or count > MOST_CELLS or len(offsets) == 1 or 2.0 * halved.max() < smallest:
+            done.append((waiting - half, waiting + half, verdict))
             break
-        done.append(_cells(waiting[~is_open], half, verdict[~is_open]))
+        decided = waiting[~is_open]
+        done.append((decided - half, decided + half, verdict[~is_open]))
         waiting = (waiting[is_open][:, None] + offsets).reshape(-1, 3)
         half = halved
     low, high, verdicts = (np.concatenate(arrays) for arrays in zip(*done, strict=True))
-    return Cells(locked(low), locked(high), locked(verdicts)), search.tried
+    return Cells(locked(low), locked(high), locked(verdicts))
 
 
-def _decide(search: Search, middle: Array, half: Array, tilt: float) -> Codes:
-    """What is proved of cells of positions, level or at all tilts up to one.
+def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
+    """Verdicts of cells of positions, level or at all tilts up to one.
 
     Tilts are rotation vectors in a ball, which cubes cover, or of a planar robot along its normal, which pieces do. A
     turn from one cube's middle to any vector in it is no longer than their difference. Outside needs one orientation,
     inside all. Cubes stay larger than the cells, which turn the cables by their size over a chord.
     """
     if tilt == 0.0:
-        return search.verdicts(middle, half)
+        return prover.verdicts(middle, half)
     verdict = np.full(len(middle), ProofVerdict.PROVED_INSIDE, dtype=np.int8)
     cells, vectors = np.arange(len(middle)), np.zeros((len(middle), 3))  # a row for each cube that is open
-    finest, axes = float(np.linalg.norm(half)) / search.prover.size, search.prover.axes
+    finest, axes = float(np.linalg.norm(half)) / prover.size, prover.axes
     for place, parts in enumerate(PARTS):
         turn = tilt if parts == 1 else tilt * np.sqrt(len(axes)) / parts
-        found = search.verdicts(middle[cells], half, vectors, turn)
+        found = prover.verdicts(middle[cells], half, vectors, turn)
         outermost = vectors * np.minimum(tilt / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300), 1.0)[:, None]
         undecided = found == ProofVerdict.OPEN
         at_one = np.zeros_like(found)
-        at_one[undecided] = search.verdicts(middle[cells[undecided]], half, outermost[undecided])
+        at_one[undecided] = prover.verdicts(middle[cells[undecided]], half, outermost[undecided])
         fails = (found == ProofVerdict.PROVED_OUTSIDE) | (at_one == ProofVerdict.PROVED_OUTSIDE)
         verdict[cells[fails]] = ProofVerdict.PROVED_OUTSIDE
         kept = undecided & (verdict[cells] != ProofVerdict.PROVED_OUTSIDE)
         cells, vectors = cells[kept], vectors[kept]
-        if place + 1 == len(PARTS) or turn < finest or search.late:
+        if place + 1 == len(PARTS) or turn < finest or prover.out_of_time:
             break
         cells, vectors = _smaller_cubes(cells, vectors, tilt * axes, parts, PARTS[place + 1])
         if len(cells) > MOST_CELLS:
@@ -227,10 +197,6 @@ def _children(half: Array) -> tuple[Array, Array]:
     halved = np.where(long, 0.5 * half, half)
     steps = [np.array([-1.0, 1.0]) * halved[k] if long[k] else np.zeros(1) for k in range(3)]
     return np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3), halved
-
-
-def _cells(middle: Array, half: Array, verdict: Codes) -> tuple[Array, Array, Codes]:
-    return middle - half, middle + half, verdict
 
 
 def _load_terms(wrenches: WrenchSet, robot: Robot) -> tuple[Any, ...]:
@@ -364,11 +330,19 @@ def prove(
     seconds = number(budget, "budget", "s", above=0.0)
     least = 0.0 if smallest is None else number(smallest, "smallest", "m", above=0.0)
     told = callback(progress, "progress")
-    prover = Prover(robot, load, instance(model, CableModel, "model"))
-    prover.verdicts(box.low[None], np.zeros(3))  # what loading or compiling the kernel takes is not of the budget
-    search = Search(prover, time.monotonic() + seconds, told)
-    cells, tried = halve(search, box, least)
-    return _proof(robot, box, load, model, cells, tried)
+    instance(model, CableModel, "model")
+    # loading or compiling the kernel is not part of the budget
+    Prover(robot, load, model).verdicts(box.low[None], np.zeros(3))
+    prover = Prover(robot, load, model, progress=told)
+    prover.deadline = time.monotonic() + seconds
+    cells = _bisect(prover, box, least)
+    extent = box.high - box.low
+    share = ((cells.high - cells.low)[:, extent > 0.0] / extent[extent > 0.0]).prod(axis=1)
+    kinds = (ProofVerdict.PROVED_INSIDE, ProofVerdict.PROVED_OUTSIDE, ProofVerdict.OPEN)
+    inside, outside, undecided = (float(share[cells.verdict == kind].sum()) for kind in kinds)
+    found = set(cells.verdict.tolist())
+    verdict = ProofVerdict(found.pop()) if len(found) == 1 else ProofVerdict.OPEN
+    return Proof(robot, box, load, model, verdict, inside, outside, undecided, cells, prover.tried)
 
 
 def check_robot(robot: Robot) -> None:
@@ -389,16 +363,3 @@ def check_robot(robot: Robot) -> None:
         radius = f"{robot.winches.pulley_radius[cable]:g} m"
         step = "Prove it of the robot without: robot.replace(winches=None)."
         raise InvalidValueError(f"{robot.name}: pulley_radius[{cable}]", radius, "0 m: proofs know no pulleys", step)
-
-
-def _proof(robot: Robot, box: PoseBox, load: WrenchSet, model: CableModel, cells: Cells, tried: int) -> Proof:
-    extent = box.high - box.low
-    relative = (cells.high - cells.low)[:, extent > 0.0] / extent[extent > 0.0]
-    share = relative.prod(axis=1)
-    inside, outside = (
-        float(share[cells.verdict == kind].sum()) for kind in (ProofVerdict.PROVED_INSIDE, ProofVerdict.PROVED_OUTSIDE)
-    )
-    kinds = set(cells.verdict.tolist())
-    verdict = ProofVerdict(kinds.pop()) if len(kinds) == 1 else ProofVerdict.OPEN
-    undecided = float(share[cells.verdict == ProofVerdict.OPEN].sum())
-    return Proof(robot, box, load, model, verdict, inside, outside, undecided, cells, tried)

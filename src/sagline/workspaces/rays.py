@@ -7,7 +7,7 @@ It is the boundary only of a set that the center sees all of; the boundary of an
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,35 +34,24 @@ FacetLevel = Callable[[Array, Array], Array]
 """Of facets, shape (N, ...), at positions [m], shape (N, 3): the level, shape (N,); nowhere less than that of all."""
 
 
-class Generation(NamedTuple):
-    """Directions that halve the edges of those before them.
-
-    Attributes:
-        directions: Of length 1, shape (K, 3).
-        parents: The two that each lies between, counted through all generations, shape (K, 2); none in the first.
-    """
-
-    directions: Array
-    parents: Indices
-
-
-def generations(divisions: int) -> tuple[list[Generation], Indices]:
+def generations(divisions: int) -> tuple[list[tuple[Array, Indices]], Indices]:
     """Directions spread over the sphere: an octahedron whose edges are halved so often, moved out to length 1.
 
     Args:
         divisions: How often: 4^(divisions + 1) + 2 directions, 4,098 with five.
 
     Returns:
-        The generations of directions, and the triangles between all of them, shape (2 4^divisions 4, 3).
+        Generations: directions of length 1, shape (K, 3), and the two that each lies between, counted through all
+        generations, shape (K, 2), none in the first; and the triangles between all, shape (2 4^divisions 4, 3).
     """
-    found = [Generation(_POLES, np.zeros((0, 2), dtype=np.int64))]
+    found = [(_POLES, np.zeros((0, 2), dtype=np.int64))]
     directions, faces = _POLES, _OCTANTS
     for _ in range(divisions):
         sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         parents, middle = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
         new = directions[parents].sum(axis=1)
         new /= np.linalg.norm(new, axis=1)[:, None]
-        found.append(Generation(new, parents))
+        found.append((new, parents))
         (a, b, c), (ab, bc, ca) = faces.T, len(directions) + middle.reshape(3, -1)
         faces = np.concatenate(
             [np.stack(part, axis=1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]

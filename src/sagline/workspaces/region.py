@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from sagline.robot.bounds import bounds
 from sagline.robot.pose_box import PoseBox
 from sagline.robot.reach import ROUNDING
 from sagline.robot.robot import Robot
+from sagline.workspaces.levels import Details
 
 AXES: Final = "xyz"
 
@@ -168,27 +169,7 @@ class Plane(NamedTuple):
         return places.reshape(-1, 3)
 
 
-class Found(Protocol):
-    """What a function of positions has found at N of them: `Details` of levels, for instance."""
-
-    @property
-    def level(self) -> Array:
-        """>= 0 inside, shape (N,)."""
-
-    @property
-    def margin(self) -> Array:
-        """Signed margin [N], shape (N,)."""
-
-    @property
-    def criterion(self) -> Indices:
-        """Which criterion decides, as an index, shape (N,)."""
-
-    @property
-    def cable(self) -> Indices:
-        """Which cable, -1 where none does, shape (N,)."""
-
-
-Find = Callable[[Array], Found]
+Find = Callable[[Array], Details]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

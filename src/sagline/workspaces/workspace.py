@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -20,7 +20,7 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.methods import MinimumNorm
 from sagline.workspaces.boundary import MOST_CELLS, boundary
 from sagline.workspaces.criteria import LeastMargin
-from sagline.workspaces.criterion import Criterion, check_sharing
+from sagline.workspaces.criterion import Criterion, check_continuous
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.nearest import nearest_to
 from sagline.workspaces.orientations import Orientations, Tilts, orientations_of
@@ -96,7 +96,7 @@ def workspace(
     loads = load_of(wrenches)
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
     levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box))
-    levels.told = None if told is None else _Told(told, region.cells)
+    levels.told = None if told is None else _progress_of(told, region.cells)
     found = boundary(levels, region.low, region.high, region.cells, refine)
     surface, components = found.surface, found.components
     decided = levels.details(surface.vertices)
@@ -127,18 +127,17 @@ def workspace(
     )
 
 
-class _Told:
-    """Tells of poses as they are done; how many there will be is known only about."""
+def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[int], None]:
+    """Report poses as they are done, of about so many: all nodes, and those of cells that the boundary passes."""
+    x, y, z = cells
+    about, done = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x), 0
 
-    def __init__(self, progress: Progress, cells: tuple[int, int, int]) -> None:
-        """So many cells are evaluated at their nodes, and those that the boundary passes through again."""
-        x, y, z = cells
-        self._whole = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x)
-        self._done, self._progress = 0, progress
+    def add(count: int) -> None:
+        nonlocal done
+        done += count
+        progress(done, max(about, done))
 
-    def __call__(self, count: int) -> None:
-        self._done += count
-        self._progress(self._done, max(self._whole, self._done))
+    return add
 
 
 def _checked(
@@ -152,7 +151,7 @@ def _checked(
         raise InvalidValueError("criteria", brief(criteria), "a list of criteria", "Give [MaximumSag(0.05)].")
     for k, one in enumerate(criteria):
         instance(one, Criterion, f"criteria[{k}]").check(robot)
-    check_sharing(tension, criteria)
+    check_continuous(tension, criteria)
     if any(isinstance(one, LeastMargin) for one in criteria):
         return tuple(sorted(criteria, key=lambda one: not isinstance(one, LeastMargin)))
     return LeastMargin(), *criteria

@@ -6,7 +6,6 @@ here is a sum of four kinds, whose support functions add: segments, ellipsoids, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -17,34 +16,7 @@ from sagline.core.arguments import brief
 from sagline.core.arrays import Array, Indices, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.core.results import ByFields
-
-
-def in_words(center: Array, segments: Array, ellipsoids: int, polytopes: Sequence[Array], accelerations: Array) -> str:
-    """A wrench set in a line.
-
-    Args:
-        center: A wrench, shape (6,).
-        segments: Shape (S, 6).
-        ellipsoids: How many.
-        polytopes: Corners of each, shape (c, 6).
-        accelerations: Largest linear and angular one, shape (2,).
-
-    Returns:
-        What it consists of, "±100 N, ±20 N m" for instance.
-    """
-    parts = []
-    if center.any():
-        parts.append(_wrench(center))
-    parts += [_segments(segments)] if segments.any() else []
-    parts += ["an ellipsoid"] * ellipsoids
-    for corners in polytopes:
-        parts.append(f"a polytope of {len(corners)} corners" if len(corners) > 1 else _wrench(corners[0]))
-    linear, angular = accelerations
-    if linear > 0.0 or angular > 0.0:
-        limits = ((linear, "m/s²"), (angular, "rad/s²"))
-        parts.append("accelerations " + ", ".join(f"±{n(size, unit=unit)}" for size, unit in limits if size > 0.0))
-    return " + ".join(parts) or "its weight alone"
+from sagline.core.results import ByFields, set_fields
 
 
 def _wrench(wrench: Array) -> str:
@@ -108,8 +80,15 @@ class WrenchSet(ByFields):
 
     def __str__(self) -> str:
         """What it consists of, in a line."""
-        polytopes = np.split(self.corners, np.cumsum(self.sizes)[:-1]) if len(self.sizes) else ()
-        return in_words(self.center, self.segments, len(self.ellipsoids), polytopes, self.accelerations)
+        parts = [_wrench(self.center)] if self.center.any() else []
+        parts += [_segments(self.segments)] if self.segments.any() else []
+        parts += ["an ellipsoid"] * len(self.ellipsoids)
+        for corners in np.split(self.corners, np.cumsum(self.sizes)[:-1]) if len(self.sizes) else ():
+            parts.append(f"a polytope of {len(corners)} corners" if len(corners) > 1 else _wrench(corners[0]))
+        if self.accelerations.any():
+            limits = zip(self.accelerations, ("m/s²", "rad/s²"), strict=True)
+            parts.append("accelerations " + ", ".join(f"±{n(size, unit=unit)}" for size, unit in limits if size > 0.0))
+        return " + ".join(parts) or "its weight alone"
 
     def __repr__(self) -> str:
         """Its kind, and the line."""
@@ -125,8 +104,7 @@ class WrenchSet(ByFields):
             "sizes": np.zeros(0, dtype=np.int64),
             "accelerations": np.zeros(2),
         }
-        for name, value in {**none, **parts}.items():
-            object.__setattr__(self, name, locked(np.ascontiguousarray(value)))
+        set_fields(self, **{name: locked(np.ascontiguousarray(value)) for name, value in {**none, **parts}.items()})
 
 
 class WrenchBox(WrenchSet):
