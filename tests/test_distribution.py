@@ -28,7 +28,7 @@ EXTRA_PACKAGES = (
     *("pymodbus", "pymoo", "skimage", "snap7", "trimesh", "viser", "zarr", "zstandard"),
 )
 MADE_FOR_EXTRAS = (
-    *("sagline.viewer", "sagline.cli.readings", "sagline.share.log_course"),
+    *("sagline.viewer", "sagline.cli.readings"),
     *("sagline.twin.modbus_servers", "sagline.twin.s7_servers"),
 )
 USED = """
@@ -140,7 +140,7 @@ def test_the_wheel_works_in_an_environment_of_its_own(built: Built, tmp_path: Pa
     place = Path(sysconfig.get_path("purelib", vars={"base": str(tmp_path / "new")}))
     (place / "lent.pth").write_text(f"{sysconfig.get_path('purelib')}\n")
     assets = [name for name in sources(ROOT / "src" / "sagline") if not name.endswith(".py")]
-    assert {"report/page.css", "article/data/table2.csv", "files/scl/sagline_plc.scl", "py.typed"} < set(assets)
+    assert {"present/page.css", "article/data/table2.csv", "files/scl/sagline_plc.scl", "py.typed"} < set(assets)
     # no kernel is asked for: all would be compiled anew, for this place
     count, version, file = run(binaries / "python", "-W", "error", "-c", USED, *assets, folder=tmp_path).split()
     assert (int(count), version) == (16, PROJECT["version"])

@@ -19,7 +19,7 @@ import sagline as sl
 from sagline.cli.examples import example_files
 from sagline.cli.main import app
 from sagline.plc.addresses import addresses_of, groups_at
-from sagline.report.blocks import Chapter
+from sagline.present.page import Chapter
 from tests.abuse.command_lines import LINES, Case, cases, commands
 from tests.effort import least_seconds
 from tests.files.executions import execution
@@ -67,7 +67,7 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     monkeypatch.setattr("sagline.workspaces.nearest._EVALUATIONS", 30)
-    monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
+    monkeypatch.setattr("sagline.article.report.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     for module in ("run", "tension", "track"):
         monkeypatch.setattr(f"sagline.cli.{module}.write_figures", lambda figures, folder: [])
 

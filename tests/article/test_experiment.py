@@ -45,7 +45,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "experiment.md"
 @extended
 def test_the_experiment_in_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One run for all that is to be looked at: it takes as long as everything else here together."""
-    from tests.report import experiment_page
+    from tests.article import experiment_page
 
     whole = in_process()
     a_machine_as_it_was_planned_is_where_it_should_be(whole)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.article.model_errors import MODELS, model_errors
+from sagline.article.models import MODELS, model_errors
 from sagline.article.simulation import ERROR_BAND, Simulation, figures, low_tension_study, simulate
 from tests.article.hanging import length_and_force
 

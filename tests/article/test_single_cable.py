@@ -2,12 +2,17 @@ import numpy as np
 import pytest
 
 from sagline import Cable, InvalidValueError
-from sagline.article.constants import constants, constants_study, published_range, published_sampling
 from sagline.article.feasible_sets import End, feasible_sets
-from sagline.article.fits import fit_factor, fit_line
-from sagline.article.intercept import intercept_studies
-from sagline.article.sag_constant import sag_study, stretch_study
-from sagline.article.sampling import Sampling, article_sampling
+from sagline.article.regressions import (
+    constants,
+    constants_study,
+    intercept_studies,
+    published_range,
+    published_sampling,
+    sag_study,
+    stretch_study,
+)
+from sagline.article.sampling import Sampling, article_sampling, fit_factor, fit_line
 from tests.article.hanging import GRAVITY, end_of, length_and_force
 from tests.refusal import refused
 from tests.tiers import extended

@@ -19,7 +19,7 @@ from sagline.cli.examples import KINDS, example_files
 from sagline.cli.main import app
 from sagline.files.mcap_reader import read_log
 from sagline.files.mcap_writer import Recorder
-from sagline.report.blocks import Chapter
+from sagline.present.page import Chapter
 from tests.abuse.command_lines import commands
 from tests.calibration.made_up import made_up
 from tests.files.executions import execution
@@ -131,7 +131,7 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
     monkeypatch.setattr("sagline.cli.view.view_run", serve_run)
     monkeypatch.setattr("sagline.cli.view.view_calibration", serve_found)
     monkeypatch.setattr("sagline.cli.view_log.view_log", serve_log)
-    monkeypatch.setattr("sagline.report.parts.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
+    monkeypatch.setattr("sagline.article.report.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())

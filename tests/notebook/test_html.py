@@ -17,8 +17,8 @@ from syrupy.assertion import SnapshotAssertion
 
 import sagline as sl
 from sagline.notebook import figures, html
-from sagline.notebook.html import LARGEST
-from sagline.notebook.verdicts import told
+from sagline.notebook.figures import LARGEST
+from sagline.present.summaries import summary_of
 from tests.calibration.made_up import made_up
 from tests.effort import least_seconds
 from tests.plot import made
@@ -97,9 +97,9 @@ def once(name: str) -> str:
 def test_a_page_gets_whole_html_of_reasonable_size_in_reasonable_time(name: str) -> None:
     thing = thing_of(name)
     text = once(name)
-    verdict = told(thing)
+    verdict = summary_of(thing)
     assert verdict is not None
-    assert unescape(re.sub(r"<[^>]+>", "", text)).startswith(f"{verdict.name}: {verdict.verdict}")
+    assert unescape(re.sub(r"<[^>]+>", "", text)).startswith(f"{verdict.title}: {verdict.verdict}")
     assert Balanced(text).open == []
     assert len(text.encode()) < LARGEST + 10_000
     assert ("<svg" in text) == (name in DRAWN)
@@ -109,8 +109,8 @@ def test_a_page_gets_whole_html_of_reasonable_size_in_reasonable_time(name: str)
 
 def test_verdicts(snapshot: SnapshotAssertion) -> None:
     names = ("robot", "plan", "infeasible plan", "plan with gaps", "confirmation", "forward", "workspace")
-    found = {name: told(thing_of(name)) for name in names}
-    assert {name: each and (each.name, each.verdict, each.good) for name, each in found.items()} == snapshot
+    found = {name: summary_of(thing_of(name)) for name in names}
+    assert {name: each and (each.title, each.verdict, each.good) for name, each in found.items()} == snapshot
     said = {name: "\n".join((each.verdict, *each.lines)) for name, each in found.items() if each is not None}
     tension = made.plan().chord_tension
     assert f"{len(PATH)} poses" in said["plan"]
@@ -189,7 +189,7 @@ def test_what_cannot_be_told_has_its_ordinary_text(monkeypatch: pytest.MonkeyPat
     def fails(thing: object) -> None:
         raise RuntimeError("broken")
 
-    monkeypatch.setattr(html, "told", fails)
+    monkeypatch.setattr(html, "summary_of", fails)
     assert made.plan()._repr_html_() is None  # Jupyter shows repr() then
     monkeypatch.undo()
     assert made.plan().state.cables._repr_html_() is None
@@ -200,9 +200,9 @@ def test_what_cannot_be_told_has_its_ordinary_text(monkeypatch: pytest.MonkeyPat
 @extended
 def test_figures_too_large_become_pictures_and_then_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = once("plan")
-    monkeypatch.setattr(html, "LARGEST", len(whole) // 3)
+    monkeypatch.setattr(figures, "LARGEST", len(whole) // 3)
     assert "<svg" not in shown(made.plan())
-    monkeypatch.setattr(html, "LARGEST", 100)
+    monkeypatch.setattr(figures, "LARGEST", 100)
     text = shown(made.plan())
     assert "<svg" not in text
     assert "<img" not in text

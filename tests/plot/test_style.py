@@ -18,7 +18,7 @@ from scipy.optimize import lsq_linear
 
 import sagline as sl
 from sagline import InvalidValueError, plot
-from sagline.plot.names import spread
+from sagline.plot.labels import spread
 from tests.plot import made
 from tests.refusal import refused
 from tests.tiers import extended, wide

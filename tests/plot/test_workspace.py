@@ -14,8 +14,7 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import Front, plot
 from sagline.plot.front import best_until
-from sagline.plot.slice import limit_colors, round_levels
-from sagline.plot.workspace import FAR_SIDE, NEAR_SIDE
+from sagline.plot.workspace import FAR_SIDE, NEAR_SIDE, limit_colors, round_levels
 from tests.kinematics.test_many_robots import planar
 from tests.refusal import refused
 from tests.tiers import extended
@@ -79,7 +78,7 @@ def test_a_plane_of_symmetry_has_regions_rather_than_noise(space: sl.Workspace) 
 
 @extended
 def test_a_plane_is_looked_at_once(space: sl.Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    module = sys.modules["sagline.plot.slice"]
+    module = sys.modules["sagline.plot.workspace"]
     look = Mock(wraps=module.slice_of)
     monkeypatch.setattr(module, "slice_of", look)
     plot.slice(space, "z", at=2.0)

@@ -7,8 +7,8 @@ import pytest
 
 import sagline as sl
 from sagline.share.course import of_plan
+from sagline.share.machine import still
 from sagline.share.page import course_page, robot_page
-from sagline.share.still import still
 
 NAME = """a & b"'><blink></script></title></svg>"""
 

@@ -1,4 +1,4 @@
-"""What a demonstration of an erratum tells."""
+"""An erratum of the article with the numbers that show it."""
 
 from __future__ import annotations
 

@@ -16,26 +16,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+import sagline as sl
+from sagline import control
 from sagline.article.machine import DRUM, ZERO, Errors, machine
 from sagline.article.table2 import Table2, table2
 from sagline.article.ten_poses import HOME
-from sagline.control.controller import Controller
-from sagline.control.execution import Execution, ExecutionStatus
-from sagline.control.link import PERIOD, Sample
-from sagline.control.null_space import null_space
-from sagline.control.recording import Event, EventKind, Recorded
-from sagline.control.states import RefusedError, State
-from sagline.control.tension_loop import TensionSettings
+from sagline.control.link import PERIOD
 from sagline.core.arrays import Array, locked
 from sagline.core.status import Status
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.plan import Plan
-from sagline.motion.path import Path
-from sagline.motion.rest_to_rest import quintic_path
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.twin.machine import Machine
 
 PROTOTYPE: Final = "article-prototype"
 SPEED: Final = 0.06  # m/s of the platform at most: the fastest winch then has 61 mm/s
@@ -53,43 +41,41 @@ class Watch:
     """Looks on: what is to be seen at a stop, and the courses between stops. A `sagline.control.Recorder`."""
 
     def __init__(self, where: Where, tell: Tell | None = None) -> None:
-        """Begin with nothing seen.
-
-        Args:
-            where: The true position.
-            tell: Told how far it is, every second.
-        """
+        """Begin with nothing seen."""
         self.stopped = ""  # nothing stops it
         self.farthest = self.misjudged = 0.0
         self.courses: list[Array] = []
         self.cycles = self.acted = self.stood = 0
         self._where, self._tell, self._expected = where, tell, duration() / PERIOD
-        self._plan: Plan | None = None
+        self._plan: sl.Plan | None = None
         self._begun = False
         self._seen: deque[tuple[Array, ...]] = deque(maxlen=round(LOOK / PERIOD))
         self._before: Array | None = None
 
-    def begins(self, plan: Plan) -> None:
+    def begins(self, plan: sl.Plan) -> None:
         """Take the plan of a leg; the first cycle still tells of the stop before it."""
         self._plan, self._begun = plan, False
 
     def ends(self, status: Status, reason: str) -> None:
         """Leave how it ended to the one who asked for it."""
 
-    def event(self, event: Event) -> None:
+    def event(self, event: control.Event) -> None:
         """Leave events to the controller, which keeps them."""
 
-    def cycle(self, cycle: Recorded) -> None:
+    def cycle(self, cycle: control.Recorded) -> None:
         """Look at a cycle."""
         answer = cycle.answer
-        if not isinstance(answer, Sample) or cycle.state not in (State.MOVING, State.IDLE):
+        if not isinstance(answer, control.Sample) or cycle.state not in (
+            control.State.MOVING,
+            control.State.IDLE,
+        ):
             return
         self.cycles += 1
         if self._tell is not None and self.cycles % round(1.0 / PERIOD) == 0:
             self._tell(min(self.cycles / self._expected, 1.0))
         place = self._where()
         self.misjudged = max(self.misjudged, _apart(place, cycle.position))
-        if cycle.state is State.IDLE:
+        if cycle.state is control.State.IDLE:
             self._stand(place, cycle, answer)
         elif not self._begun:
             self._begun = True
@@ -101,7 +87,7 @@ class Watch:
                     np.concatenate(([cycle.clock], answer.tension, cycle.planned_tension, answer.length + cycle.zero))
                 )
 
-    def _stand(self, place: Array, cycle: Recorded, answer: Sample) -> None:
+    def _stand(self, place: Array, cycle: control.Recorded, answer: control.Sample) -> None:
         """Keep the last second of a stop."""
         self.stood += 1
         self.acted += self._before is not None and bool((cycle.correction != self._before).any())
@@ -115,7 +101,7 @@ class Watch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
-    """What became of it; K points of the courses, m winches.
+    """Result of the experiment: K points of the time series, m winches.
 
     Attributes:
         table: The article's Table 2.
@@ -141,7 +127,7 @@ class Experiment:
     """
 
     table: Table2
-    robot: Robot
+    robot: sl.Robot
     true: Array
     estimated: Array
     tension: Array
@@ -159,7 +145,7 @@ class Experiment:
     farthest: float
     misjudged: float
     acting: float
-    events: tuple[Event, ...]
+    events: tuple[control.Event, ...]
 
     @property
     def error(self) -> Array:
@@ -172,16 +158,8 @@ class Experiment:
         return np.asarray(np.linalg.norm(self.error, axis=1))
 
 
-def pair(robot: Robot, errors: Errors) -> tuple[Robot, Robot]:
-    """A robot that is other than it was planned, and how it was planned, both with what a twin needs.
-
-    Args:
-        robot: As it was planned; it has winches.
-        errors: By how much parameters are off, as of `machine`; drums and the zero of the lengths too.
-
-    Returns:
-        The robot as it is, and as it was planned.
-    """
+def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
+    """A robot that is other than it was planned, and how it was planned, both with what a twin needs."""
     true, nominal = machine(robot, errors), robot
     assert true.winches is not None
     assert robot.winches is not None
@@ -191,18 +169,14 @@ def pair(robot: Robot, errors: Errors) -> tuple[Robot, Robot]:
         true = true.replace(winches=true.winches.replace(drum_radius=radius * (1.0 + 0.01 * errors[DRUM])))
     if errors.get(ZERO):
         assert true.winches is not None
-        zero = inverse(robot, level(HOME)).unstrained_length
+        zero = sl.inverse(robot, level(HOME)).unstrained_length
         nominal = robot.replace(winches=robot.winches.replace(length_zero=zero))
         true = true.replace(winches=true.winches.replace(length_zero=zero + 1e-3 * errors[ZERO]))
     return true, nominal
 
 
-def with_cells(robot: Robot) -> Robot:
-    """A robot whose load cells are off by 2 N, half of them up and half of them down, unless it says how they are.
-
-    Args:
-        robot: The robot as it is; it has winches.
-    """
+def with_cells(robot: sl.Robot) -> sl.Robot:
+    """A robot whose load cells are off by 2 N, half of them up and half of them down, unless it says how they are."""
     winches = robot.winches
     if winches is None or winches.load_cell_bias.any():
         return robot
@@ -211,45 +185,28 @@ def with_cells(robot: Robot) -> Robot:
 
 
 def in_process(
-    true: Robot | None = None,
-    nominal: Robot | None = None,
+    true: sl.Robot | None = None,
+    nominal: sl.Robot | None = None,
     *,
     seed: int = 1,
-    loop: TensionSettings | None = None,
+    loop: control.TensionSettings | None = None,
     tell: Tell | None = None,
 ) -> Experiment:
     """Do the experiment on a twin in this process, whose clock waits for the controller.
-
-    Args:
-        true: The robot as it is, see `with_cells`; None: as it was planned.
-        nominal: As it was planned; None: the prototype.
-        seed: Of the twin's noise and the controller's id.
-        loop: How the tension loop works.
-        tell: Told how far it is, now and then.
-
-    Returns:
-        What became of it.
 
     Raises:
         RefusedError: If the machine does not agree that it is at home, or the experiment ends on the way.
         InvalidValueError: If the true robot lacks data, or does not rest where it should begin.
     """
-    planned = load_robot(PROTOTYPE) if nominal is None else nominal
+    planned = sl.load_robot(PROTOTYPE) if nominal is None else nominal
     real = with_cells(planned if true is None else true)
-    twin = Machine(real, nominal=planned, start=level(HOME), seed=seed)
+    twin = sl.twin.Machine(real, nominal=planned, start=level(HOME), seed=seed)
     watch = Watch(lambda: twin.reading.position, tell)
-    return experiment(Controller(planned, twin.link(), loop=loop, record=watch, seed=seed), watch)
+    return experiment(control.Controller(planned, twin.link(), loop=loop, record=watch, seed=seed), watch)
 
 
-def experiment(controller: Controller, watch: Watch) -> Experiment:
+def experiment(controller: control.Controller, watch: Watch) -> Experiment:
     """Do the experiment.
-
-    Args:
-        controller: Not connected yet.
-        watch: What it records to.
-
-    Returns:
-        What became of it.
 
     Raises:
         RefusedError: If it cannot be connected or homed, or the experiment ends on the way; it says where.
@@ -258,7 +215,7 @@ def experiment(controller: Controller, watch: Watch) -> Experiment:
     controller.connect()
     controller.home(level(HOME))
     _stand(controller, "home")
-    stops, plans, ends = [watch.seen()], list[Plan](), [0.0]
+    stops, plans, ends = [watch.seen()], list[sl.Plan](), [0.0]
     for name, leg in zip([*table2().points, "home"], legs, strict=True):
         first = len(watch.courses)
         done = _executed(controller, leg, name)
@@ -273,39 +230,47 @@ def experiment(controller: Controller, watch: Watch) -> Experiment:
     return _result(controller, watch, stops, plans, np.array(ends))
 
 
-def _executed(controller: Controller, leg: Path, name: str) -> Execution:
-    """What became of a leg, which was gone to its end."""
+def _executed(controller: control.Controller, leg: sl.Path, name: str) -> control.Execution:
+    """The execution of a leg; refused if it did not reach the end."""
     try:
         done = controller.execute(leg)
-    except RefusedError as error:  # a fault while it was planned, which takes its time
-        raise error if controller.state is State.IDLE else _ended(controller, f"before its way to {name}") from None
-    if done.status is not ExecutionStatus.DONE:
-        raise RefusedError(f"the experiment, on its way to {name}", done.reason.rstrip("."), NEXT)
+    except control.RefusedError as error:  # a fault while it was planned, which takes its time
+        raise (
+            error if controller.state is control.State.IDLE else _ended(controller, f"before its way to {name}")
+        ) from None
+    if done.status is not control.ExecutionStatus.DONE:
+        raise control.RefusedError(f"the experiment, on its way to {name}", done.reason.rstrip("."), NEXT)
     return done
 
 
-def _stand(controller: Controller, name: str) -> None:
+def _stand(controller: control.Controller, name: str) -> None:
     """Stop, for as long as the place is measured."""
     for _ in range(round(STOP / PERIOD)):
         controller.cycle()
-        if controller.state is not State.IDLE:
+        if controller.state is not control.State.IDLE:
             raise _ended(controller, f"at {name}")
 
 
-def _ended(controller: Controller, where: str) -> RefusedError:
+def _ended(controller: control.Controller, where: str) -> control.RefusedError:
     """The error of an experiment that a fault has ended."""
-    faults = [event.text for event in controller.events if event.kind is EventKind.FAULT]
+    faults = [event.text for event in controller.events if event.kind is control.EventKind.FAULT]
     reason = faults[-1] if faults else controller.events[-1].text
-    return RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
+    return control.RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
 
 
 def _result(
-    controller: Controller, watch: Watch, stops: Sequence[tuple[Array, ...]], plans: Sequence[Plan], ends: Array
+    controller: control.Controller,
+    watch: Watch,
+    stops: Sequence[tuple[Array, ...]],
+    plans: Sequence[sl.Plan],
+    ends: Array,
 ) -> Experiment:
     m = controller.robot.cable_count
     true, estimated, tension, correction = (np.array(column) for column in zip(*stops[1:], strict=True))
     planned = np.array([plan.state.cables.frame_end_tension[-1] for plan in plans])
-    seen = [null_space(plan.state[-1]).visible @ off for plan, off in zip(plans, tension - planned, strict=True)]
+    seen = [
+        control.null_space(plan.state[-1]).visible @ off for plan, off in zip(plans, tension - planned, strict=True)
+    ]
     rates = [plan.length_rate for plan in plans]
     time, cells, expected, lengths = np.split(np.array(watch.courses), [1, 1 + m, 1 + 2 * m], axis=1)
     return Experiment(
@@ -332,15 +297,15 @@ def _result(
     )
 
 
-def _legs(period: float) -> list[Path]:
+def _legs(period: float) -> list[sl.Path]:
     """The straight ways from point to point, of the fifth order as the article's, with a sample a cycle."""
     places = level(points())
-    return [quintic_path([places[k], places[k + 1]], speed=SPEED, rate=1.0 / period) for k in range(len(places) - 1)]
+    return [sl.quintic_path([places[k], places[k + 1]], speed=SPEED, rate=1.0 / period) for k in range(len(places) - 1)]
 
 
 def duration() -> float:
-    """How long it takes, stops included [s]; home has one before and one after."""
-    path = quintic_path(points(), speed=SPEED, rate=10.0)
+    """Duration of the experiment, stops included [s]; home has one before and one after."""
+    path = sl.quintic_path(points(), speed=SPEED, rate=10.0)
     return float(path.time[-1] - path.time[0]) + STOP * len(points())
 
 
@@ -349,9 +314,9 @@ def points() -> Array:
     return np.vstack((HOME, table2().desired, HOME))
 
 
-def level(position: ArrayLike) -> Pose:
+def level(position: ArrayLike) -> sl.Pose:
     """Poses at positions (..., 3), the platform not turned, as all of the article's."""
-    return Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)
+    return sl.Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)
 
 
 def _apart(one: Array, other: Array) -> float:

@@ -1,4 +1,4 @@
-"""Which parameters, off by how much, explain measured positions; and how well, for how many of them."""
+"""Least-squares fits of parameter errors to measured positions, with their information criterion."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+import sagline as sl
 from sagline.article.machine import Errors, Parameter
 from sagline.core.arrays import Array, Flags
-from sagline.core.errors import InvalidValueError
 
 STEP = 0.01  # of a plausible error, for the slopes
 NEWTON_STEPS = 20
@@ -68,14 +68,6 @@ class Tangent(NamedTuple):
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
     """Fit models to measured positions: least squares within what is plausible, by Gauss-Newton, all at once.
 
-    Args:
-        error_of: Where the platform is for errors of parameters.
-        measured: Actual less desired position [m], shape (N, 3).
-        models: Of each, which parameters may be off.
-
-    Returns:
-        An explanation a model.
-
     Raises:
         InvalidValueError: If a fit does not settle.
     """
@@ -97,7 +89,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
             break
     else:
         names = ", ".join(parameter.name for parameter in models[moving[0]])
-        raise InvalidValueError(
+        raise sl.InvalidValueError(
             f"the fit of {names}",
             f"still moving after {NEWTON_STEPS} steps",
             "fits that settle",
@@ -108,29 +100,12 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
 
 
 def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
-    """All models of one parameter, of two, and so on.
-
-    Args:
-        parameters: To choose from.
-        most: Largest number of parameters in a model.
-
-    Returns:
-        The models, those of fewer parameters first.
-    """
+    """All models of one parameter, of two, and so on."""
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
 
 def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[Tangent]:
-    """Each model about its values, by differences away from the limits.
-
-    Args:
-        error_of: Where the platform is for errors of parameters.
-        models: The models.
-        values: Errors of the parameters of each.
-
-    Returns:
-        A tangent a model.
-    """
+    """Each model about its values, by differences away from the limits."""
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
         high = limits(model)[1]
@@ -160,14 +135,6 @@ def best_within(model: Model, slopes: Array, right: Array) -> Array:
 
 def information(rms: float, count: int, parameters: int) -> float:
     """Akaike's information criterion, corrected for few measurements.
-
-    Args:
-        rms: Root mean square of what a model leaves [m].
-        count: Number of measured coordinates n.
-        parameters: Fitted parameters of the model k; the scatter of the measurements is one more.
-
-    Returns:
-        AICc = n ln(rms^2/1 mm^2) + 2 K + 2 K (K + 1)/(n - K - 1) with K = k + 1.
 
     Source:
         Hurvich and Tsai 1989, Biometrika 76(2), 297-307.
@@ -224,7 +191,7 @@ def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
 
 
 def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
-    """What is left of each pose by the fit to the others, on the tangent at the fit to all [m], root mean square."""
+    """Cross-validation: root mean square residual of each pose by the fit to the others, linearized [m]."""
     right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
     left = [
         right[pose == k] - slopes[pose == k] @ best_within(model, slopes[pose != k], right[pose != k])

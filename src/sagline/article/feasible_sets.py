@@ -1,4 +1,4 @@
-"""Figures 3 to 5: which tensions and lengths put the end of a cable where it is wanted."""
+"""Figures 3 to 5: tensions and lengths that put the end of a cable where it is wanted."""
 
 from __future__ import annotations
 
@@ -7,18 +7,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.article.fits import Line, fit_line
-from sagline.article.sampling import GRAVITY
-from sagline.cables.cable import Cable
-from sagline.cables.models import Catenary
+import sagline as sl
+from sagline.article.drawing import Drawings, axes, legend, shades
+from sagline.article.sampling import ANGLE, GRAVITY, Line, fit_line, simulated_cable
 from sagline.core.arrays import Array
-from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
+from sagline.plot.sheet import BLUE, VERMILLION
+from sagline.present.page import Chapter, Finding, Verdict
 
 CORNERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)])  # of |x| + |z| = 1
+CHORD = 10.0  # m
+TOLERANCES = (0.01, 0.001, 0.0001)  # m
+TENSIONS = np.linspace(10.0, 500.0, 200)  # N
+PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # N
+SHOWN = 2  # of the lengths: the one whose set psi is drawn alone
+LOW_PART = 50.0  # N: below it the article ignores the curve
 
 
 class End(NamedTuple):
-    """Where the platform end of a cable is wanted.
+    """Desired position of the platform end of a cable.
 
     Attributes:
         span: Horizontal distance from the frame end [m].
@@ -50,7 +57,7 @@ class FeasibleSets:
         line: The line pi of least squares through (T_x, T_z): slope a_pi, intercept b_pi [N].
     """
 
-    cable: Cable
+    cable: sl.Cable
     end: End
     tolerance: float
     psi_lengths: Array
@@ -72,23 +79,12 @@ class FeasibleSets:
 
 
 def feasible_sets(
-    cable: Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
+    cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> FeasibleSets:
     """The article's psi and Psi, exactly.
 
     The map from (T, L) to B is one to one at a given L, so the outline of psi is the image of the outline of the
     tolerance, |dx| + |dz| = epsilon_max around B_d, under its inverse: no search is needed.
-
-    Args:
-        cable: Material, a single one.
-        end: B_d.
-        tolerance: epsilon_max [m], > 0.
-        tensions: T_x at which the curve Psi is sampled [N], shape (t,).
-        psi_tensions: T_x of the lengths for which psi is outlined [N], shape (s,).
-        points: Of each outline, a multiple of 4.
-
-    Returns:
-        The sets.
 
     Raises:
         InvalidValueError: If points is no multiple of 4.
@@ -97,8 +93,8 @@ def feasible_sets(
         Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2.
     """
     if points % 4:
-        raise InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
-    model, stretch = Catenary(), end.chord / end.span
+        raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
+    model, stretch = sl.Catenary(), end.chord / end.span
     curve = model.from_tension(cable, end.span, end.rise, tensions * stretch, GRAVITY)
     lengths = model.from_tension(cable, end.span, end.rise, psi_tensions * stretch, GRAVITY).unstrained_length
     outline = np.asarray(end) + tolerance * _diamond(points)
@@ -121,3 +117,141 @@ def _diamond(points: int) -> Array:
     share = np.linspace(0.0, 4.0, points + 1)
     edges = np.arange(5.0)
     return np.stack([np.interp(share, edges, CORNERS[:, k]) for k in range(2)], axis=-1)
+
+
+def feasible_chapter() -> Chapter:
+    """Tensions that reach a point, with a tolerance and without."""
+    end = End(CHORD * float(np.cos(ANGLE)), CHORD * float(np.sin(ANGLE)))
+    studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
+    draw = Drawings("feasible")
+    return Chapter(
+        "feasible-sets",
+        "Feasible tensions of one cable",
+        f"Simulation's cable (Table 1), its platform end {n(CHORD, unit='m')} away at φ = {n(ANGLE, unit='rad')}; our "
+        "choice, the "
+        "article gives none. The map from (T, L) to B is one to one at a given L, so the sets are computed exactly, as "
+        "images of the tolerance, without a search.",
+        (_psi(studies, draw), _curve(studies[0], draw), _line(studies[0], draw)),
+    )
+
+
+def _psi(studies: list[FeasibleSets], draw: Drawings) -> Finding:
+    extents = np.array([np.ptp(study.psi[SHOWN, :, 0]) for study in studies])
+    length = float(studies[0].psi_lengths[SHOWN])
+    figure, ax = axes("$T_x$ [N]", "$T_z$ [N]")
+    for study, color in zip(studies, shades(len(studies)), strict=True):
+        outline = study.psi[SHOWN]
+        ax.plot(outline[:, 0], outline[:, 1], color=color, linewidth=1.3, label=n(1e3 * study.tolerance, unit="mm"))
+    legend(ax, r"tolerance $\epsilon_{max}$")
+    along = np.array(studies[0].end) / CHORD
+    second, bx = axes("along the chord [N]", "across it [N]")
+    middle = studies[-1].psi[SHOWN].mean(axis=0)
+    for study, color in zip(studies[:2], shades(len(studies)), strict=False):
+        away, label = study.psi[SHOWN] - middle, n(1e3 * study.tolerance, unit="mm")
+        bx.plot(away @ along, away @ (-along[1], along[0]), color=color, linewidth=1.3, label=label)
+    bx.set_ylim(-0.2, 0.3)
+    legend(bx, r"tolerance $\epsilon_{max}$")
+    ratio = extents[:-1] / extents[1:]
+    return Finding(
+        key="psi",
+        figures=(3,),
+        title="the set ψ of tensions that reach B_d with one length",
+        statement="Statement 1: for a given L, if ε_max → 0, then |ψ| → 1: the set has a unique tension.",
+        measured=f"With L = {n(length, '.5g', 'm')} the set spans "
+        + ", ".join(f"{n(x, '.3g', 'N')} at {n(1e3 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
+        + f": it shrinks {n(ratio[0], '.3g')} and {n(ratio[1], '.3g')} times when the tolerance does 10 times, to a "
+        "point. It is a sliver along the chord: 1 mm of position is many newtons of a taut cable.",
+        verdict=Verdict.HOLDS,
+        numbers={
+            "unstrained_length_m": length,
+            "tolerance_m": list(TOLERANCES),
+            "extent_N": extents,
+            "times_smaller": ratio,
+        },
+        panels=(
+            draw.panel(figure, f"ψ for L = {n(length, '.5g', 'm')} and three tolerances."),
+            draw.panel(second, "The same sets from their middle, along and across the chord: mind the scales."),
+        ),
+    )
+
+
+def _curve(study: FeasibleSets, draw: Drawings) -> Finding:
+    figure, ax = axes("$T_x$ [N]", "$d = L - D$ [mm]")
+    ax.plot(study.tensions, 1e3 * (study.lengths - CHORD), color=BLUE, linewidth=1.3, label=r"$\Psi$, exact")
+    for k, (length, outline) in enumerate(zip(study.psi_lengths, study.psi, strict=True)):
+        height = np.full(2, 1e3 * (length - CHORD))
+        label = rf"$\psi$, $\epsilon_{{max}}$ = {n(1e3 * study.tolerance, unit='mm')}" if k == 0 else "_"
+        ax.plot([outline[:, 0].min(), outline[:, 0].max()], height, color=VERMILLION, linewidth=2.2, label=label)
+    ax.set_xlim(0.0, TENSIONS[-1])
+    legend(ax)
+    return Finding(
+        key="psi-curve",
+        figures=(4,),
+        title="the set Ψ of all solutions, a curve over L",
+        statement="Collecting all ψ over L gives Ψ; for ε_max → 0 it is a spatial curve.",
+        measured=f"L determines T: d falls from {n(1e3 * (study.lengths[0] - CHORD), '.3g', 'mm')} at "
+        f"{n(TENSIONS[0], '.3g', 'N')} to {n(1e3 * (study.lengths[-1] - CHORD), '.3g', 'mm')} at "
+        f"{n(TENSIONS[-1], '.3g', 'N')}, "
+        "strictly.",
+        verdict=Verdict.HOLDS,
+        numbers={
+            "tension_first_N": TENSIONS[0],
+            "tension_last_N": TENSIONS[-1],
+            "d_first_m": study.lengths[0] - CHORD,
+            "d_last_m": study.lengths[-1] - CHORD,
+            "strictly_falling": bool(np.all(np.diff(study.lengths) < 0.0)),
+        },
+        panels=(draw.panel(figure, "Ψ over T_x, with ψ as segments at six lengths."),),
+    )
+
+
+def _line(study: FeasibleSets, draw: Drawings) -> Finding:
+    line = study.line
+    rest = study.vertical - (line.slope * study.tensions + line.intercept)
+    taut = study.tensions >= LOW_PART
+    from_article = study.vertical - (study.tangent * study.tensions + study.half_weight)
+    figure, ax = axes("$T_x$ [N]", "$T_z$ [N]")
+    ax.plot(study.tensions, study.vertical, color=BLUE, linewidth=2.4, alpha=0.5, label="exact")
+    ax.plot(
+        study.tensions, line.slope * study.tensions + line.intercept, color="black", linewidth=0.9, label=r"line $\pi$"
+    )
+    legend(ax)
+    second, bx = axes("$T_x$ [N]", "away from the line [N]")
+    bx.plot(study.tensions, rest, color=BLUE, linewidth=1.3, label=r"fitted line")
+    bx.plot(study.tensions, from_article, color=VERMILLION, linewidth=1.3, label=r"$\tan\varphi\, T_x + wD/2$")
+    bx.axhline(0.0, color="0.6", linewidth=0.6)
+    legend(bx)
+    return Finding(
+        key="line-pi",
+        figures=(5,),
+        title="the projection of Ψ is the line π",
+        statement="Statement 2, (21): T_z = a_π T_x + b_π, an affine line; (26): a_π = tan β; the nonlinear part is at "
+        "low T_x.",
+        measured=f"R² = {n(line.r_squared, '.8f')}; slope {n(line.slope, '.5f')} against tan φ = "
+        f"{n(study.tangent, '.5f')}; intercept {n(line.intercept, '.4f', 'N')} against wD/2 = "
+        f"{n(study.half_weight, '.4f', 'N')}. Largest distance from the fitted line {n(line.deviation, '.2g', 'N')}. "
+        "With "
+        f"tan φ and wD/2 it is {n(_largest(from_article), '.2g', 'N')} in all and "
+        f"{n(_largest(from_article[taut]), '.2g', 'N')} from {n(LOW_PART, unit='N')} on. Nearly a line, and never "
+        "exactly one.",
+        verdict=Verdict.HOLDS_WITHIN,
+        numbers={
+            "r_squared": line.r_squared,
+            "slope": line.slope,
+            "tangent": study.tangent,
+            "intercept_N": line.intercept,
+            "half_weight_N": study.half_weight,
+            "deviation_N": line.deviation,
+            "deviation_from_tangent_N": _largest(from_article),
+            "taut_from_N": LOW_PART,
+            "taut_deviation_from_tangent_N": _largest(from_article[taut]),
+        },
+        panels=(
+            draw.panel(figure, "The projection of Ψ and the fitted line."),
+            draw.panel(second, "What is left: the exact T_z less the line."),
+        ),
+    )
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max())

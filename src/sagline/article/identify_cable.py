@@ -1,4 +1,4 @@
-"""What a real cable weighs and how stiff it is, from measured lengths and tensions."""
+"""Density and stiffness of a real cable from measured lengths and tensions."""
 
 from __future__ import annotations
 
@@ -23,6 +23,10 @@ TOO_LOOSE = 0.5  # relative standard error from which on a value is not determin
 TOO_CLOSE = 0.95  # correlation from which on two values are not told apart
 ROUNDS = 30  # of the tension at the chord from that at an end
 WEIGHTINGS = 3  # the weights depend on the answer, but little
+_ADVICE = {
+    "linear_density": "measure at lower tensions or longer spans, where the cable sags more",
+    "axial_stiffness": "measure at higher tensions, where it stretches more",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +65,7 @@ class CableFit(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the data do not determine or cannot tell apart; empty where all is well."""
+        """Values that the data do not determine or cannot tell apart; empty if all are determined."""
         found = []
         for name, value, error in zip(self.names, self.values, self.standard_error, strict=True):
             if name != "length_offset" and error > TOO_LOOSE * value:
@@ -77,12 +81,6 @@ class CableFit(Result):
                         "measure over a wider range of tensions"
                     )
         return tuple(found)
-
-
-_ADVICE = {
-    "linear_density": "measure at lower tensions or longer spans, where the cable sags more",
-    "axial_stiffness": "measure at higher tensions, where it stretches more",
-}
 
 
 def identify_cable(

@@ -1,20 +1,58 @@
-"""The cables that the article's empirical study samples."""
+"""The cables that the article's empirical study samples, and its least squares."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sagline.cables.cable import Cable
-from sagline.cables.model import CableState
-from sagline.cables.models import Catenary
+import sagline as sl
 from sagline.core.arrays import Array, checked
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
 ANGLE = 0.754  # rad, of the article's figure 10
 UNSTRETCHABLE = 1e20  # N: strains below the rounding of a length
+
+
+class Line(NamedTuple):
+    """Lines y = slope x + intercept fitted along the last axis.
+
+    Attributes:
+        slope: Shape (...).
+        intercept: Shape (...).
+        r_squared: Share of the variance of y that the line explains, shape (...).
+        deviation: Largest distance of a sample from the line, in the unit of y, shape (...).
+    """
+
+    slope: Array
+    intercept: Array
+    r_squared: Array
+    deviation: Array
+
+
+def fit_line(x: Array, y: Array) -> Line:
+    """The line of least squares through samples along the last axis."""
+    x, y = np.broadcast_arrays(x, y)
+    away_x = x - x.mean(axis=-1, keepdims=True)
+    away_y = y - y.mean(axis=-1, keepdims=True)
+    slope = np.sum(away_x * away_y, axis=-1) / np.sum(away_x**2, axis=-1)
+    rest = away_y - slope[..., None] * away_x
+    explained = 1.0 - np.sum(rest**2, axis=-1) / np.sum(away_y**2, axis=-1)
+    intercept = y.mean(axis=-1) - slope * x.mean(axis=-1)
+    return Line(slope, intercept, explained, np.abs(rest).max(axis=-1))
+
+
+def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
+    """The factor a of least squares in y = a * shape, along one axis.
+
+    Every regression of the article but that of the line is of this form, with the shape 1/T_x^2, D^3,
+    cos^4(phi), rho^2, D or rho.
+    """
+    shape, y = np.broadcast_arrays(shape, y)
+    factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
+    return factor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,29 +96,17 @@ class Sampling:
         stiffness = checked(axial_stiffness, "axial_stiffness", "N", shape=(), above=0.0)
         object.__setattr__(self, "axial_stiffness", float(stiffness))
 
-    def hang(self) -> CableState:
-        """The exact cables.
-
-        Returns:
-            Their states, fields of shape (a, c, r, t).
-        """
+    def hang(self) -> sl.CableState:
+        """The exact cables."""
         angle, chord, density, tension = np.meshgrid(
             self.angles, self.chords, self.densities, self.tensions, indexing="ij"
         )
-        cable = Cable(density, self.axial_stiffness)
+        cable = sl.Cable(density, self.axial_stiffness)
         cosine = np.cos(angle)
-        return Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), tension / cosine, GRAVITY)
+        return sl.Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), tension / cosine, GRAVITY)
 
     def between(self, lowest: float, highest: float) -> Sampling:
-        """The same with as many tensions, evenly spaced between two others.
-
-        Args:
-            lowest: [N].
-            highest: [N].
-
-        Returns:
-            The sampling.
-        """
+        """The same with as many tensions, evenly spaced between two others."""
         tensions = np.linspace(lowest, highest, self.tensions.size)
         return Sampling(self.angles, self.chords, self.densities, tensions, self.axial_stiffness)
 
@@ -91,9 +117,6 @@ def article_sampling() -> Sampling:
     Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
     tensions from 100 N to 10 kN, evenly spaced.
 
-    Returns:
-        The sampling.
-
     Source:
         Gia Luan & Truong Thinh 2020, figures 6 to 15.
     """
@@ -103,3 +126,9 @@ def article_sampling() -> Sampling:
         densities=np.linspace(0.2, 2.0, 10),
         tensions=np.linspace(100.0, 10_000.0, 60),
     )
+
+
+def simulated_cable() -> sl.Cable:
+    """The cable of the article's simulated robots."""
+    cables = sl.load_robot("article-suspended").cables
+    return cables._part(0, cables.linear_density.shape)

@@ -8,23 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sagline.article.model_errors import MODELS
-from sagline.cables.model import CableModel
-from sagline.cables.models import Empirical
+import sagline as sl
+from sagline.article.models import MODELS
 from sagline.core.arrays import Array
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.confirm import Confirmation, confirm
-from sagline.kinematics.inverse import inverse
-from sagline.motion.path import Path
-from sagline.motion.rest_to_rest import article_path
-from sagline.robot.robot import Robot
-from sagline.tension.method import TensionMethod
-from sagline.tension.methods import MinimumNorm
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
 # The article describes (55), closest to the set before, but its figures show cables near their minimum wherever they
 # are not needed and curves that return to where they began: the least norm, in its variable T_x.
-METHOD = MinimumNorm("horizontal")
+METHOD = sl.MinimumNorm("horizontal")
 ERROR_BAND = 6e-3  # m, the article's "(-6, 6) mm"
 
 
@@ -78,27 +69,20 @@ class Simulation:
         mixed: The same of the second configuration.
     """
 
-    path: Path
-    models: tuple[CableModel, ...]
-    suspended: tuple[Confirmation, ...]
-    mixed: tuple[Confirmation, ...]
+    path: sl.Path
+    models: tuple[sl.CableModel, ...]
+    suspended: tuple[sl.Confirmation, ...]
+    mixed: tuple[sl.Confirmation, ...]
 
-    def of(self, kind: type[CableModel]) -> tuple[Confirmation, Confirmation]:
-        """Both robots' runs with one model.
-
-        Args:
-            kind: Class of the model, one of `models`.
-
-        Returns:
-            The run of the suspended robot and that of the mixed one.
-        """
+    def of(self, kind: type[sl.CableModel]) -> tuple[sl.Confirmation, sl.Confirmation]:
+        """Both robots' runs with one model."""
         k = [type(model) for model in self.models].index(kind)
         return self.suspended[k], self.mixed[k]
 
     @property
     def tension_ratio(self) -> float:
         """Highest T_x of the mixed robot over that of the suspended one, with the empirical model."""
-        suspended, mixed = (figures(run) for run in self.of(Empirical))
+        suspended, mixed = (figures(run) for run in self.of(sl.Empirical))
         return mixed.tension_max / suspended.tension_max
 
 
@@ -121,57 +105,35 @@ class LowTension:
     mixed_bound: Figures
 
 
-def simulate(rate: float = 100.0, models: Sequence[CableModel] = MODELS) -> Simulation:
+def simulate(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> Simulation:
     """Plan both robots along the article's path and wind the lengths onto exact cables.
 
     The article's "simple controller", tensions in and lengths out, is the plan; where the platform then is, is the
     equilibrium on exact cables under the same inertia.
 
-    Args:
-        rate: Samples per second [1/s].
-        models: Cable models, which must include `Empirical`.
-
-    Returns:
-        The runs.
-
     Source:
         Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
     """
-    path = article_path(rate)
-    runs = [tuple(_run(load_robot(name), path, model, METHOD) for model in models) for name in ROBOTS]
+    path = sl.article_path(rate)
+    runs = [tuple(_run(sl.load_robot(name), path, model, METHOD) for model in models) for name in ROBOTS]
     suspended, mixed = runs
     return Simulation(path, tuple(models), suspended, mixed)
 
 
 def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:
-    """The empirical model where cables may become slack.
-
-    Args:
-        limits: Lower limits of the chord tension [N], shape (k,).
-        rate: Samples per second [1/s].
-
-    Returns:
-        The study.
-    """
-    path, robots = article_path(rate), [load_robot(name) for name in ROBOTS]
+    """The empirical model where cables may become slack."""
+    path, robots = sl.article_path(rate), [sl.load_robot(name) for name in ROBOTS]
     suspended, mixed = (
-        [figures(_run(robot.replace(tension_min=low), path, Empirical(), METHOD)).axis_error_max for low in limits]
+        [figures(_run(robot.replace(tension_min=low), path, sl.Empirical(), METHOD)).axis_error_max for low in limits]
         for robot in robots
     )
-    bound = MinimumNorm("horizontal", lowest_point_margin=0.0)
-    bounds = [figures(_run(robot.replace(tension_min=0.0), path, Empirical(), bound)) for robot in robots]
+    bound = sl.MinimumNorm("horizontal", lowest_point_margin=0.0)
+    bounds = [figures(_run(robot.replace(tension_min=0.0), path, sl.Empirical(), bound)) for robot in robots]
     return LowTension(np.asarray(limits), np.array(suspended), np.array(mixed), *bounds)
 
 
-def figures(run: Confirmation) -> Figures:
-    """A run in numbers.
-
-    Args:
-        run: A plan along a path, confirmed.
-
-    Returns:
-        Its numbers over the poses that are feasible and held; NaN if there are none.
-    """
+def figures(run: sl.Confirmation) -> Figures:
+    """A run in numbers."""
     plan, good = run.plan, np.atleast_1d(run.plan.feasible & run.held)
     if not good.any():
         return Figures(*(float("nan"),) * 13, float(np.mean(plan.feasible)), 0.0)
@@ -195,11 +157,11 @@ def figures(run: Confirmation) -> Figures:
     )
 
 
-def _run(robot: Robot, path: Path, model: CableModel, method: TensionMethod) -> Confirmation:
-    return confirm(inverse(robot, path, model, method))
+def _run(robot: sl.Robot, path: sl.Path, model: sl.CableModel, method: sl.TensionMethod) -> sl.Confirmation:
+    return sl.confirm(sl.inverse(robot, path, model, method))
 
 
-def _smoothness(run: Confirmation) -> dict[str, float]:
+def _smoothness(run: sl.Confirmation) -> dict[str, float]:
     path, tension = run.plan.path, run.plan.horizontal_tension
     assert path is not None
     change = np.diff(tension, axis=0)

@@ -41,9 +41,6 @@ class Table2:
 def table2() -> Table2:
     """Read the table that comes with the package.
 
-    Returns:
-        The table, in meters.
-
     Source:
         Gia Luan & Truong Thinh 2020, Table 2.
     """

@@ -8,24 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+import sagline as sl
 from sagline.article.explanations import ErrorOf, Explanation, explanations, subsets, tangents
-from sagline.article.fits import Line, fit_line
 from sagline.article.machine import ANCHORS, DEAD, PARAMETERS, PULLEY, ZERO, Errors, Parameter, machine, rest
+from sagline.article.sampling import Line, fit_line
 from sagline.article.table2 import Table2, table2
-from sagline.cables.models import Empirical
 from sagline.core.arrays import Array, locked
-from sagline.files.robot_file import load_robot
-from sagline.kinematics.inverse import inverse
-from sagline.kinematics.plan import Plan
-from sagline.motion.rest_to_rest import quintic_path
 from sagline.motion.segments import QUINTIC
-from sagline.robot.pose import Pose
-from sagline.robot.robot import Robot
-from sagline.statics.stiffness import stiffness
-from sagline.tension.methods import MinimumNorm
 
 HOME = (0.0, 0.0, 1.5)  # m, the prototype's home position
-METHOD = MinimumNorm("horizontal")
+METHOD = sl.MinimumNorm("horizontal")
 TOUR_SPEED = 0.2  # m/s, ours: the article says "low speed"
 
 
@@ -53,12 +45,12 @@ class Tour(NamedTuple):
         stops: When it passes the ten poses [s], shape (10,).
     """
 
-    plan: Plan
+    plan: sl.Plan
     stops: Array
 
 
 class Limits(NamedTuple):
-    """What ten poses cannot tell apart, about the best explanation by two parameters.
+    """Limits of ten poses near the best explanation by two parameters.
 
     Attributes:
         imitated: Of what a pulley radius does to the positions, the part that a zero of the lengths and an anchor
@@ -88,8 +80,8 @@ class TenPoses:
     """
 
     table: Table2
-    plan: Plan
-    home: Plan
+    plan: sl.Plan
+    home: sl.Plan
     model_error: Array
     height_line: Line
     trends: tuple[Trend, ...]
@@ -112,14 +104,8 @@ def ten_poses(most: int = 3) -> TenPoses:
 
     Every model of up to three of the parameters is fitted with the exact machine, within what we think plausible.
     Positions are printed in whole millimeters: no fit can be better than 0.3 mm.
-
-    Args:
-        most: Largest number of parameters in an explanation.
-
-    Returns:
-        The study.
     """
-    table, robot = table2(), load_robot("article-prototype")
+    table, robot = table2(), sl.load_robot("article-prototype")
     plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 
     def error_of(errors: Sequence[Errors]) -> Array:
@@ -143,23 +129,16 @@ def ten_poses(most: int = 3) -> TenPoses:
 
 
 def tour(rate: float = 10.0) -> Tour:
-    """The prototype's way from its home position through the ten poses and back, from rest to rest, without stops.
-
-    Args:
-        rate: Samples per second [1/s].
-
-    Returns:
-        The tour.
-    """
+    """The prototype's way from its home position through the ten poses and back, from rest to rest, without stops."""
     stops = [HOME, *table2().desired, HOME]
-    path = quintic_path(stops, speed=TOUR_SPEED, rate=rate)
-    plan = inverse(load_robot("article-prototype"), path, Empirical(), METHOD)
+    path = sl.quintic_path(stops, speed=TOUR_SPEED, rate=rate)
+    plan = sl.inverse(sl.load_robot("article-prototype"), path, sl.Empirical(), METHOD)
     way = np.linalg.norm(np.diff(np.asarray(stops), axis=0), axis=1)
     return Tour(plan, locked(np.cumsum(way * QUINTIC.peak_speed / TOUR_SPEED)[:-1]))
 
 
-def _planned(robot: Robot, positions: Array) -> Plan:
-    return inverse(robot, Pose.from_euler(positions, 0.0, 0.0, 0.0), Empirical(), METHOD)
+def _planned(robot: sl.Robot, positions: Array) -> sl.Plan:
+    return sl.inverse(robot, sl.Pose.from_euler(positions, 0.0, 0.0, 0.0), sl.Empirical(), METHOD)
 
 
 def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
@@ -168,16 +147,16 @@ def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
     return Trend(parameter, error, float(line.slope), float(np.corrcoef(height, error[:, 2])[0, 1]))
 
 
-def _limits(robot: Robot, error_of: ErrorOf, plan: Plan, found: Explanation) -> Limits:
-    """What the ten poses cannot tell apart, about an explanation."""
+def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> Limits:
+    """Limits of ten poses near an explanation."""
     at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
     three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
     slopes = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])[0].slopes
     is_pulley = np.array([p.name == PULLEY for p in three])
     whole, others = slopes[:, is_pulley], slopes[:, ~is_pulley]
     imitation = others @ np.linalg.lstsq(others, whole)[0]
-    state = inverse(machine(robot, at), plan.state.pose, tension=METHOD).state
-    by_zero = stiffness(state).length_sensitivity[:, :3].reshape(-1, robot.cable_count)
+    state = sl.inverse(machine(robot, at), plan.state.pose, tension=METHOD).state
+    by_zero = sl.stiffness(state).length_sensitivity[:, :3].reshape(-1, robot.cable_count)
     scatter = found.rms * np.sqrt(len(by_zero) / (len(by_zero) - robot.cable_count))
     return Limits(
         imitated=float(np.linalg.norm(imitation) / np.linalg.norm(whole)),

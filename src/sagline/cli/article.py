@@ -36,7 +36,7 @@ def article(
         sagline article figures 6-9 --out results
         sagline article errata table 2
     """
-    from sagline.report.article import NAMES, write_article
+    from sagline.article.report import NAMES, write_article
 
     check_files(folder, NAMES)
     needed = () if parts else (INVERSE, FORWARD)  # single parts need neither, or one

@@ -54,10 +54,10 @@ def experiment(
         sagline experiment article --in-process --true worn.yaml --out worn
     """
     from sagline.article.experiment import PROTOTYPE, in_process
+    from sagline.article.experiment_page import NAMES, experiment_chapter, write_experiment
     from sagline.cli.values import whole_of
     from sagline.files.robot_file import load_robot
     from sagline.files.writing import plain
-    from sagline.report.experiment import NAMES, experiment_chapter, write_experiment
     from sagline.twin.machine import MOST_SEED
 
     if name not in KNOWN:

@@ -98,7 +98,7 @@ def _found(source: Path) -> Robot | Course:
 
 def _log(source: Path) -> Course:
     try:
-        from sagline.share.log_course import of_session
+        from sagline.share.course import of_session
         from sagline.viewer.session_log import Follower
     except ModuleNotFoundError as error:
         raise FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None

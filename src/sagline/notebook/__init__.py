@@ -1,1 +1,1 @@
-"""How robots, plans and results look in Jupyter: the verdict in words, and a small figure."""
+"""Representation of robots, plans and results in Jupyter: the summary and a small figure."""

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from base64 import b64encode
 from dataclasses import replace
 from functools import singledispatch
+from hashlib import sha1
+from html import escape
+from io import BytesIO
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -15,13 +20,24 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
-from sagline.notebook.verdicts import plan_of
 from sagline.plot.calibration import calibration
 from sagline.plot.drawing import draw_at_rest
-from sagline.plot.names import name_lines
-from sagline.plot.scene import pose_of
-from sagline.plot.sheet import BLUE, COLORS, axes_or_new, draw_course, dressed, runs, shade, sheet
-from sagline.plot.style import PLAIN
+from sagline.plot.labels import name_lines
+from sagline.plot.robot import pose_of
+from sagline.plot.sheet import (
+    BLUE,
+    COLORS,
+    axes_or_new,
+    draw_course,
+    dressed,
+    runs,
+    shade,
+    sheet,
+    svg_text,
+    unique_names,
+)
+from sagline.plot.style import PLAIN, Using
+from sagline.present.summaries import plan_of
 from sagline.robot.robot import Robot
 from sagline.workspaces.space import Workspace
 
@@ -32,6 +48,21 @@ STYLE: Final = replace(PLAIN, name="notebook", width=6.0, height=0.8, direct=Tru
 MOST_SAMPLES: Final = 300  # of a course
 MOST_CABLES: Final = 16
 LEVELS: Final = 4  # slices of a workspace that are drawn
+
+LARGEST: Final = 200_000  # bytes of a figure
+MOST_MARKS: Final = 1500  # points, that are drawn as such; more are one picture within the figure
+DOTS: Final = 110  # dots an inch of that
+FONT: Final = "'DejaVu Sans', Verdana, sans-serif"
+_remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>", flags=re.DOTALL)
+_gray = re.compile(r"\b(fill|stroke): #([0-9a-f]{2})\2\2(?![0-9a-f])")
+_family = re.compile(r"font-family: 'DejaVu Sans'(?:, 'DejaVu Sans')?;? ?")
+
+
+def drawing_of(thing: object, description: str) -> str:
+    """The figure in the notebook's style and colors as HTML; nothing if there is none."""
+    with Using(STYLE):
+        figure = figure_of(thing)
+        return "" if figure is None else _inline(figure, description)
 
 
 @singledispatch
@@ -85,7 +116,7 @@ def _(path: Path) -> Figure | None:
 
 @figure_of.register
 def _(space: Workspace) -> Figure | None:
-    """Where the boundary is at some heights, seen from above; of a flat one in its own plane."""
+    """The boundary at some heights, seen from above; of a flat workspace in its own plane."""
     sides = [k for k, axis in enumerate(space.axes) if axis.size > 1]
     if space.volume <= 0.0 or len(sides) < 2:
         return None
@@ -147,3 +178,36 @@ def _chosen(values: Array) -> Indices:
 def _whole(ax: object) -> Figure | None:
     figure = getattr(ax, "figure", None)
     return figure if isinstance(figure, Figure) else None
+
+
+def _inline(figure: Figure, description: str) -> str:
+    """The figure as a drawing, or as a picture if that is smaller; nothing if both are too large."""
+    lines = [line for ax in figure.findobj(lambda each: hasattr(each, "get_lines")) for line in ax.get_lines()]  # type: ignore[attr-defined]
+    if sum(len(line.get_xdata()) for line in lines if line.get_marker() not in ("None", None)) > MOST_MARKS:
+        for line in lines:
+            line.set_rasterized(True)
+    drawing = themed(svg_text(figure, DOTS), description)
+    if len(drawing.encode()) <= LARGEST:
+        return drawing
+    written = BytesIO()
+    figure.savefig(written, format="png", dpi=DOTS, facecolor="white")
+    picture = b64encode(written.getvalue()).decode()
+    if len(picture) > LARGEST:
+        return ""
+    return f'<img style="max-width:100%" alt="{escape(description)}" src="data:image/png;base64,{picture}">'
+
+
+def _ink(gray: re.Match[str]) -> str:
+    return f"{gray[1]}: currentColor; {gray[1]}-opacity: {1.0 - int(gray[2], 16) / 255.0:.2f}"
+
+
+def themed(svg: str, description: str) -> str:
+    """A drawing in the colors of the page: what is black has the color of its text, what is gray has less of it.
+
+    Names inside are made its own, so that many drawings stand on one page.
+    """
+    svg = _family.sub("", _remarks.sub("", svg)).strip()
+    svg = _gray.sub(_ink, svg)
+    svg = unique_names(svg, f"s{sha1(svg.encode()).hexdigest()[:8]}-")
+    look = f"max-width:100%;height:auto;color:inherit;fill:currentColor;stroke-linejoin:round;font-family:{FONT}"
+    return svg.replace("<svg ", f'<svg role="img" aria-label="{escape(description)}" style="{look}" ', 1)

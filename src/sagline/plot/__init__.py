@@ -6,24 +6,17 @@ width, the fonts and the sizes of a journal.
 """
 
 from sagline.plot.calibration import calibration
-from sagline.plot.courses import lengths, overview, tensions
 from sagline.plot.drawing import drawing
-from sagline.plot.energy import energy
-from sagline.plot.errors import error, errors
+from sagline.plot.dynamics import energy, frequencies, frequency_map, response
 from sagline.plot.execution import execution, measured_tensions, mendable_tensions, place_errors, states
 from sagline.plot.film import film
-from sagline.plot.frequencies import frequencies
 from sagline.plot.front import front
-from sagline.plot.maps import frequency_map
-from sagline.plot.motion import path, velocity
-from sagline.plot.multiples import small_multiples
+from sagline.plot.plan import error, errors, lengths, overview, path, small_multiples, tensions, velocity
 from sagline.plot.polygon import polygon
-from sagline.plot.response import response
 from sagline.plot.robot import robot
 from sagline.plot.sheet import save
-from sagline.plot.slice import slice
 from sagline.plot.style import style
-from sagline.plot.workspace import workspace
+from sagline.plot.workspace import slice, workspace
 
 __all__ = [
     "calibration",

@@ -1,4 +1,4 @@
-"""What a calibration left over, what it tells apart, and how far the platform is to be expected from its place."""
+"""Residuals, correlations and expected position errors of a calibration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.names import fitting, wrapped
+from sagline.plot.labels import fitting, wrapped
 from sagline.plot.sheet import COLORS, GAP_COLOR, VERMILLION, dressed, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose

@@ -1,4 +1,4 @@
-"""What a machine did: tensions, what they are off, where the platform is, states and events over time."""
+"""An execution over time: states, tensions, their errors, position errors and faults."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from sagline.control.execution import Execution, null_space_error, position_erro
 from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
-from sagline.plot.names import above, name_lines
+from sagline.plot.labels import above, name_lines
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
+    DASHED,
     GAP_COLOR,
     GREEN,
     ORANGE,
@@ -22,6 +23,7 @@ from sagline.plot.sheet import (
     VERMILLION,
     WIDTH,
     axes_or_new,
+    cable_look,
     draw_course,
     dressed,
     runs,
@@ -38,7 +40,6 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 MOST_POINTS: Final = 4000  # of a line: what lies closer is drawn as the range that it covers
-DASHED: Final = (0, (4.0, 1.6))
 PER_METER: Final = 1e3  # mm
 BESIDE: Final[dict[str, Any]] = {  # the axes, in two columns: the band of the states is low
     "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "frameon": False,
@@ -121,13 +122,10 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     clock = _clock(done)
     for i, read in enumerate(done.tension.T):
-        _line(ax, clock, read, color=_color(i), linewidth=0.8, alpha=0.8, label=f"cable {i}")
+        _line(ax, clock, read, color=cable_look(i)["color"], linewidth=0.8, alpha=0.8, label=f"cable {i}")
     for i, planned in enumerate(done.planned_tension.T):
         _line(ax, clock, planned, color="black", linewidth=0.7, linestyle=DASHED, label="planned" if i == 0 else "_")
-    dressed(ax, "time [s]", "tension at the frame [N]")
-    _limit(ax, clock)
-    name_lines(ax)
-    return ax
+    return _finished(ax, clock, "tension at the frame [N]")
 
 
 def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
@@ -143,11 +141,8 @@ def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax, height=2.6)
     clock = _clock(done)
     for i, course in enumerate(null_space_error(done).T):
-        _line(ax, clock, course, color=_color(i), linestyle=_style(i), linewidth=1.0, label=f"cable {i}")
-    dressed(ax, "time [s]", "mendable tension\nerror [N]")
-    _limit(ax, clock)
-    name_lines(ax)
-    return ax
+        _line(ax, clock, course, **cable_look(i), linewidth=1.0, label=f"cable {i}")
+    return _finished(ax, clock, "mendable tension\nerror [N]")
 
 
 def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
@@ -166,25 +161,13 @@ def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
         "xyz", PER_METER * position_error(done).T, COLORS[:3], ("-", "--", ":"), strict=True
     ):
         _line(ax, clock, course, color=color, linestyle=style, linewidth=1.1, label=f"${name}$")
-    dressed(ax, "time [s]", "estimated less\nplanned [mm]")
-    _limit(ax, clock)
-    name_lines(ax)
-    return ax
+    return _finished(ax, clock, "estimated less\nplanned [mm]")
 
 
 def _clock(done: Execution) -> Array:
     """Time since the first cycle [s]."""
     time = instance(done, Execution, "execution").time
     return np.asarray(time - time[0]) if time.size else time
-
-
-def _color(cable: int) -> str:
-    """Neighbors, which most robots pair at a winch post, share a color."""
-    return COLORS[cable // 2 % len(COLORS)]
-
-
-def _style(cable: int) -> str | tuple[int, tuple[float, float]]:
-    return "-" if cable % 2 == 0 else DASHED
 
 
 def _line(ax: Axes, clock: Array, course: Array, **look: object) -> None:
@@ -200,6 +183,14 @@ def _line(ax: Axes, clock: Array, course: Array, **look: object) -> None:
         chosen = np.append(chosen, np.arange(rows.size, clock.size))
         clock, course = clock[chosen], course[chosen]
     draw_course(ax, clock, course, **look)
+
+
+def _finished(ax: Axes, clock: Array, label: str) -> Axes:
+    """Labels of the axes, their limits, and names of the lines."""
+    dressed(ax, "time [s]", label)
+    _limit(ax, clock)
+    name_lines(ax)
+    return ax
 
 
 def _limit(ax: Axes, clock: Array) -> None:

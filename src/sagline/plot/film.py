@@ -102,11 +102,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
 
 
 def shares_told(mode: ListedMode) -> str:
-    """Whose the energy of a mode is, in words.
-
-    Args:
-        mode: The mode.
-    """
+    """Shares of platform and cables in the kinetic energy of a mode, in words."""
     words = f"kinetic energy: platform {100.0 * mode.platform_share:.0f} %"
     if mode.cable is None or mode.cable_share < LEAST_SHARE:
         return f"{words}, each cable less than {100.0 * LEAST_SHARE:g} %"
@@ -114,7 +110,7 @@ def shares_told(mode: ListedMode) -> str:
 
 
 def _frame(ax: Axes3D, swing: Swing) -> None:
-    """What is seen, at one scale along all axes, without numbers."""
+    """Limits of the view at one scale along all axes, without numbers."""
     points = swing.rest.reshape(-1, 3)
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(high - low, 0.15 * np.max(high - low))

@@ -1,4 +1,4 @@
-"""What a search for better robots has found: all candidates, and those that none is better than."""
+"""Candidates of an optimization and the best among them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from sagline.core.arguments import instance
 from sagline.optimization.front import Front
-from sagline.plot.names import name_lines, wrapped
+from sagline.plot.labels import name_lines, wrapped
 from sagline.plot.sheet import BLUE, GAP_COLOR, VERMILLION, dressed, sheet
 from sagline.plot.style import current
 
@@ -23,7 +23,7 @@ EACH = 3.2  # in, the height of a panel
 
 
 def front(front: Front) -> Figure:
-    """What `design` has found, beside all candidates it has looked at.
+    """The best robots found by `design`, beside all candidates.
 
     Of one goal the course of the search: each candidate, and the best until then. Of several the first goal against
     each of the others: better robots are joined, the start is marked.
@@ -78,7 +78,7 @@ def _draw_pair(ax: Axes, front: Front, k: int) -> None:
 
 
 def label_of(goal: Goal) -> str:
-    """What a goal is, with its unit, and which way is better."""
+    """Axis label of a goal: name, unit and direction of improvement."""
     unit = f" [{goal.unit}]" if goal.unit else ""
     return f"{goal.kind.replace('_', ' ')}{unit}, {'higher' if goal.maximize else 'lower'} is better"
 

@@ -1,4 +1,4 @@
-"""What of lines is seen from where one stands: what lies behind surfaces and behind nearer lines is cut away.
+"""Hidden line removal in parallel projection: parts behind surfaces and behind nearer lines are cut away.
 
 Sorting things by how far away they are cannot do that: three cables can each pass before the next. Seen from infinitely
 far away all is linear along a segment, in the picture and in depth, so that what hides a part of it begins and ends
@@ -58,7 +58,7 @@ class _Covers(NamedTuple):
 
 
 class _Crossing(NamedTuple):
-    """Where a line passes before another.
+    """A crossing of two lines in the picture.
 
     Attributes:
         line: Number of the line in front.
@@ -74,12 +74,7 @@ class _Crossing(NamedTuple):
 
 
 def directions(azimuth: float, elevation: float) -> Array:
-    """To the right, up, and toward the viewer, as rows, in the world's axes, shape (3, 3).
-
-    Args:
-        azimuth: Where the viewer stands, from x toward y [rad].
-        elevation: How far above the ground, as an angle [rad].
-    """
+    """To the right, up, and toward the viewer, as rows, in the world's axes, shape (3, 3)."""
     around, above = np.array([np.cos(azimuth), np.sin(azimuth)]), np.array([np.cos(elevation), np.sin(elevation)])
     toward = np.array([above[0] * around[0], above[0] * around[1], above[1]])
     right = np.array([-around[1], around[0], 0.0])
@@ -87,16 +82,7 @@ def directions(azimuth: float, elevation: float) -> Array:
 
 
 def seen(lines: Sequence[Line], surfaces: Sequence[Array], labels: Sequence[Array] = ()) -> list[list[Array]]:
-    """The parts of lines that are seen.
-
-    Args:
-        lines: In the picture.
-        surfaces: Corners of flat convex surfaces in the picture, each of shape (k, 3), in order around them.
-        labels: Corners of what is written over everything, each of shape (k, 2).
-
-    Returns:
-        Of each line its parts, each of shape (p, 3), p >= 2.
-    """
+    """The parts of lines that are seen."""
     if not lines:
         return []
     everything = np.concatenate([line.points for line in lines])
@@ -120,7 +106,7 @@ def seen(lines: Sequence[Line], surfaces: Sequence[Array], labels: Sequence[Arra
 
 
 def _rest(spans: Array) -> list[tuple[float, float]]:
-    """What spans (n, 2) leave of 0 to 1."""
+    """Complement of spans (n, 2) within 0 to 1."""
     left, reached = [], 0.0
     for low, high in spans[np.argsort(spans[:, 0])].tolist():
         if low > reached:
@@ -130,7 +116,7 @@ def _rest(spans: Array) -> list[tuple[float, float]]:
 
 
 def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Which spans of segments (S, 3) are hidden, 0 at the start and 1 at the end, of each of shape (n, 2)."""
+    """Hidden spans of segments (S, 3), 0 at the start and 1 at the end, each of shape (n, 2)."""
     if not len(covers.owners):
         return [np.empty((0, 2)) for _ in starts]
     at_once = max(1, CHUNK // covers.offsets.size)
@@ -195,7 +181,7 @@ def _covers(lines: Sequence[Line], surfaces: Sequence[Array], crossings: Sequenc
 
 
 def _crossings(lines: Sequence[Line], starts: Array, ends: Array, owners: Indices) -> list[_Crossing]:
-    """Where a line that hides something passes before another."""
+    """Crossings at which a line that hides something passes before another."""
     steps = ends - starts
     hides = np.array([line.half_width + line.gap for line in lines])[owners]
     front = np.flatnonzero(hides > 0.0)

@@ -11,7 +11,7 @@ from matplotlib.textpath import TextPath
 
 from sagline.core.arguments import instance
 from sagline.core.errors import InvalidValueError
-from sagline.plot.names import name_lines
+from sagline.plot.labels import name_lines
 from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, dressed
 from sagline.plot.style import current
 from sagline.tension.polygon import TensionPolygon

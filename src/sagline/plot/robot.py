@@ -1,7 +1,8 @@
-"""A robot in space, its cables hanging as they hang."""
+"""A robot in space: cables as catenaries, pulleys, drums, frame, platform and ground."""
 
 from __future__ import annotations
 
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -11,15 +12,19 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
+from scipy.spatial import ConvexHull
 
 from sagline.core.arguments import instance, optional
+from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.plot.scene import EDGES, frame_box, ground, hung, platform_box, pose_of, taut, wheels
 from sagline.plot.sheet import VERMILLION, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
+from sagline.robot.several import pulleys_of
+from sagline.robot.wheels import on_wheels
+from sagline.viewer import lines
 from sagline.viewer.tension_scale import TensionScale
 
 if TYPE_CHECKING:
@@ -28,10 +33,104 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
+POINTS = 50  # around each pulley
+FLAT = 1e-6  # of the robot's size: a platform that is thinner casts a line
+_SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
+EDGES = tuple(  # of a box: between corners that differ in one direction
+    (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
+)
+FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
-NEAR = 0.04  # of the robot's size: anchors that are closer share a label
+SAME_PLACE = 0.04  # of the robot's size: anchors that are closer share a label
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
-AWAY = 0.045  # of the robot's size: how far outside its anchor a label stands
+LABEL_DISTANCE = 0.045  # of the robot's size: how far outside its anchor a label stands
+
+
+def pose_of(robot: Robot, pose: Pose | None) -> Pose:
+    """The pose that is drawn: the one given, or the middle of the robot's test box.
+
+    Raises:
+        InvalidValueError: If no pose is given and the robot has no test box, or the pose is a batch.
+    """
+    if pose is None and robot.test_box is not None:
+        return Pose(0.5 * (robot.test_box.low + robot.test_box.high), np.eye(3))
+    if pose is None or pose.shape:
+        value = "missing" if pose is None else f"a batch of {len(pose)}"
+        raise InvalidValueError("pose", value, "a single pose, where the robot has no test box", "Give one pose.")
+    return pose
+
+
+def hung(robot: Robot, pose: Pose, plan: Plan) -> Array:
+    """Points of the cables in the world as a feasible plan of the pose has them [m], shape (m, points, 3)."""
+    contact = plan.state.contact
+    wraps = lines.wraps(robot, pose, None if contact is None else contact.wrap_angle)
+    free = lines.hanging(lines.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
+    return np.concatenate((wraps, free), axis=1)
+
+
+def taut(robot: Robot, pose: Pose) -> Array:
+    """Points of straight cables in the world [m], shape (m, points, 3)."""
+    wraps = lines.wraps(robot, pose, None)
+    return np.concatenate((wraps, lines.straight(lines.chords(robot, pose, wraps[:, -1]))), axis=1)
+
+
+def wheels(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
+    """Circles of the pulleys and of the drums that are known; and the runs behind pulleys, and whether each is upright.
+
+    Of dead cable only its length and its rise are known: of a run that is not upright its rise is drawn.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
+    pulleys = np.swapaxes(on_wheels(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
+    known = None if robot.winches is None else robot.winches.drum_radius
+    radii = np.empty(0) if known is None else known
+    drums = [_rims(ends, radius) for ends, radius in zip(lines.drum_axes(robot), radii, strict=False)]
+    runs, upright = lines.dead_runs(robot)
+    high = [(run, bool(known)) for run, known in zip(runs, upright, strict=True) if run[0, 2] != run[1, 2]]
+    return [*pulleys, *drums], high
+
+
+def _rims(ends: Array, radius: float) -> Array:
+    """Both rims of a level drum, from one end of its axis to the other (2, 3), as one line."""
+    axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
+    rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
+    return np.concatenate((ends[0] + rim, ends[1] + rim))
+
+
+def frame_box(robot: Robot) -> Array | None:
+    """Corners of the frame, shape (8, 3). Frames stand: their top is where the highest anchors are."""
+    if robot.frame_size is None:
+        return None
+    top = robot.frame_anchors.max(axis=0)
+    middle = 0.5 * (top + robot.frame_anchors.min(axis=0))
+    middle[2] = top[2] - 0.5 * robot.frame_size[2]
+    return box_corners(middle, robot.frame_size)
+
+
+def platform_box(robot: Robot, pose: Pose) -> Array:
+    """Corners of the platform in the world, shape (8, 3): of its size, or of the box around its anchors."""
+    low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
+    size = high - low if robot.platform_size is None else robot.platform_size
+    corners: Array = pose.position + box_corners(0.5 * (low + high), size) @ pose.matrix.T
+    return corners
+
+
+def box_corners(middle: Array, size: Array) -> Array:
+    """The eight corners of a box, shape (8, 3)."""
+    corners: Array = middle + 0.5 * size * _SIGNS
+    return corners
+
+
+def ground(points: Array, platform: Array) -> tuple[Array, Array]:
+    """The ground under all points, at z = 0 or lower, and the platform's shadow on it: corners, each (k, 3)."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    height = min(0.0, float(low[2]))
+    outline = box_corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
+    shadow = platform[:, :2]
+    if np.linalg.matrix_rank(shadow - shadow[0], tol=FLAT * float(np.ptp(points))) == 2:
+        shadow = shadow[ConvexHull(shadow).vertices]
+    flat = [np.column_stack((place, np.full(len(place), height))) for place in (outline, shadow)]
+    return flat[0], flat[1]
 
 
 def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> Axes3D:
@@ -68,17 +167,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
 
 
 def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) -> tuple[Plan, Array]:
-    """Frame, platform, cables and ground, without labels of the axes.
-
-    Args:
-        ax: Axes to draw on.
-        robot: The robot.
-        where: Where the platform is.
-        color: Of all cables; None for that of their tensions.
-
-    Returns:
-        What carries the platform, and points that stand for what is drawn [m], shape (n, 3).
-    """
+    """Frame, platform, cables and ground, without labels of the axes."""
     ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it
     plan = inverse(robot, where)
     courses = hung(robot, where, plan) if plan.feasible else taut(robot, where)
@@ -95,7 +184,7 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
     _draw_box(ax, platform, VERMILLION, 1.3)
     points = np.concatenate((courses.reshape(-1, 3), machinery, platform, *([] if frame is None else [frame])))
     _draw_ground(ax, points, platform)
-    _number(ax, robot.frame_anchors, points)
+    _number_cables(ax, robot.frame_anchors, points)
     return plan, points
 
 
@@ -120,30 +209,23 @@ def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
         ax.add_collection3d(Poly3DCollection([flat], facecolor=color, edgecolor="none", zorder=0.5))
 
 
-def _number(ax: Axes3D, anchors: Array, points: Array) -> None:
+def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
     """The number of each cable above and outside its anchor; anchors close to each other share a place."""
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     left = list(range(len(anchors)))
     while left:
-        together = [k for k in left if np.linalg.norm(anchors[k] - anchors[left[0]]) <= NEAR * size]
+        together = [k for k in left if np.linalg.norm(anchors[k] - anchors[left[0]]) <= SAME_PLACE * size]
         left = [k for k in left if k not in together]
         place = anchors[together].mean(axis=0)
         out = (place - points.mean(axis=0)) * (1.0, 1.0, 0.0)
         out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have their numbers below
-        place = place + AWAY * size * out
+        place = place + LABEL_DISTANCE * size * out
         text = ", ".join(map(str, together))
         ax.text(*place, text, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=5.0)
 
 
 def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["left", "right"]) -> None:
-    """A bar that says what the colors of cables mean.
-
-    Args:
-        ax: Axes beside which it stands.
-        scale: What the colors mean.
-        tension: Of the cables [N], shape (m,); a bar has an arrow where one of them is beyond its end.
-        place: "left" or "right".
-    """
+    """A bar that says what the colors of cables mean."""
     steps = np.geomspace(scale.low, scale.high, 128)
     shown = ScalarMappable(LogNorm(scale.low, scale.high), ListedColormap(scale.colors(steps) / 255.0))
     below, above = tension.min() < scale.low * (1.0 - 1e-6), tension.max() > scale.high * (1.0 + 1e-6)

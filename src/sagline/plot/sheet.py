@@ -1,24 +1,29 @@
-"""The sheet a figure is drawn on, its look, and the way it gets into a file."""
+"""Figures without pyplot: size and style, axes, lines over time, and files with the fonts inside."""
 
 from __future__ import annotations
 
 import os
+import re
+from base64 import b64encode
 from io import BytesIO
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, cast
+from xml.etree import ElementTree
 
 import matplotlib
 import numpy as np
+from fontTools import subset
+from fontTools.ttLib import TTFont
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, fontManager
 
 from sagline.core.arguments import brief, file_path, optional
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import atomic_file
-from sagline.plot.fonts import with_fonts
-from sagline.plot.names import break_labels
-from sagline.plot.style import PLAIN, Using, current
+from sagline.plot.labels import break_labels
+from sagline.plot.style import PLAIN, SANS, SERIF, Using, current
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,9 +34,18 @@ if TYPE_CHECKING:
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"
 COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 GAP_COLOR = "#BBBBBB"
+DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
 WIDTH = 7.0  # in, of a page with margins
 LABEL, TICK = PLAIN.label, PLAIN.tick  # pt, of a page of documentation
 RESOLUTION = 200  # dots an inch
+
+
+_reference = re.compile(r'(href="#|url\(#)([^")]+)')
+_name = re.compile(r' id="([^"]+)"')
+SVG = "{http://www.w3.org/2000/svg}"
+FAMILY = re.compile(r"font-family:\s*([^;]+)")
+OWN = frozenset({SANS, SERIF})  # come with Matplotlib, under licenses that let them be passed on inside documents
+_Face = tuple[str, str, str]  # family, style and weight
 
 
 class Sheet(Figure):
@@ -65,15 +79,7 @@ class Sheet(Figure):
 
 
 def sheet(height: float, width: float = WIDTH) -> Sheet:
-    """An empty figure that leaves room for what stands outside its axes, in the style that is in use.
-
-    Args:
-        height: As it would be on a page of documentation [in].
-        width: As well [in].
-
-    Returns:
-        The figure.
-    """
+    """An empty figure that leaves room for what stands outside its axes, in the style that is in use."""
     return Sheet(figsize=current().size(width, height), layout="constrained")
 
 
@@ -92,14 +98,6 @@ def _thicken(figure: Figure, factor: float) -> None:
 def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> Axes:
     """The caller's Axes, or the only ones of a new figure.
 
-    Args:
-        ax: The caller's; None for a new figure.
-        height: Of the new figure [in].
-        width: Of the new figure [in].
-
-    Returns:
-        The axes.
-
     Raises:
         InvalidValueError: If the caller's are none, or not flat.
     """
@@ -112,13 +110,7 @@ def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> A
 
 
 def dressed(ax: Axes, x: str, y: str) -> None:
-    """Labels, a light grid, and no more lines around it than needed.
-
-    Args:
-        ax: The axes.
-        x: Label of the horizontal axis, with its unit.
-        y: Label of the vertical axis, with its unit.
-    """
+    """Labels, a light grid, and no more lines around it than needed."""
     look = current()
     ax.set_xlabel(x, fontsize=look.label)
     ax.set_ylabel(y, fontsize=look.label)
@@ -129,15 +121,13 @@ def dressed(ax: Axes, x: str, y: str) -> None:
     ax.spines[["left", "bottom"]].set_linewidth(0.6 * look.line)
 
 
-def draw_course(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
-    """A line over time; a sample that has no neighbor to be joined to is a point, not nothing.
+def cable_look(cable: int) -> dict[str, Any]:
+    """Color and line style of a cable; neighbors, which most robots pair at a winch post, share a color."""
+    return {"color": COLORS[cable // 2 % len(COLORS)], "linestyle": "-" if cable % 2 == 0 else DASHED}
 
-    Args:
-        ax: The axes.
-        clock: Where the samples are on the horizontal axis, shape (N,).
-        course: The samples, NaN where there is none, shape (N,).
-        look: Of the line, as `Axes.plot` takes it.
-    """
+
+def draw_course(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
+    """A line over time; a sample that has no neighbor to be joined to is a point, not nothing."""
     known = np.concatenate(([False], np.isfinite(course), [False]))
     alone = np.flatnonzero(known[1:-1] & ~known[:-2] & ~known[2:])
     points: dict[str, Any] = {"marker": "o", "markersize": 3.5, "markevery": alone.tolist()} if alone.size else {}
@@ -145,14 +135,7 @@ def draw_course(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:
-    """First and last sample of each run of flags.
-
-    Args:
-        flags: Shape (N,).
-
-    Returns:
-        The runs, in order.
-    """
+    """First and last sample of each run of flags."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
@@ -160,16 +143,7 @@ def runs(flags: Flags) -> list[tuple[int, int]]:
 def shade(
     ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str, color: str = GAP_COLOR, alpha: float = 0.5
 ) -> None:
-    """Shade the spans of samples (first, last), each up to halfway to its neighbors.
-
-    Args:
-        ax: The axes.
-        clock: Where the samples are on the horizontal axis, shape (N,).
-        spans: First and last sample of each span.
-        label: Of all of them, in the legend.
-        color: Of the shade.
-        alpha: How dense it is, 0 to 1.
-    """
+    """Shade the spans of samples (first, last), each up to halfway to its neighbors."""
     if clock.size > 1:
         middles = [0.5 * (before + after) for before, after in pairwise(clock)]
         edges = np.array([clock[0], *middles, clock[-1]])
@@ -178,6 +152,22 @@ def shade(
     for k, (first, last) in enumerate(spans):
         name = label if k == 0 else "_"
         ax.axvspan(edges[first], edges[last + 1], color=color, alpha=alpha, linewidth=0.0, label=name, zorder=0.5)
+
+
+def svg_text(figure: Figure, dots: int, **settings: str) -> str:
+    """A figure as an SVG element without date and creator, the same at each call, to be put into a page."""
+    written = BytesIO()
+    with matplotlib.rc_context(cast(Any, settings)):
+        figure.savefig(written, format="svg", dpi=dots, metadata={"Date": None, "Creator": None}, transparent=True)
+    text = written.getvalue().decode("utf-8")
+    return text[text.index("<svg") :]
+
+
+def unique_names(svg: str, prefix: str) -> str:
+    """A drawing whose inner names begin with a prefix, so that many stand on one page; unused names are left out."""
+    used = {found[1] for found in _reference.findall(svg)}
+    svg = _name.sub(lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", svg)
+    return _reference.sub(lambda found: f"{found[1]}{prefix}{found[2]}", svg)
 
 
 def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
@@ -209,3 +199,56 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
         content = with_fonts(content.decode("utf-8")).encode("utf-8")
     with atomic_file(path) as partial:
         partial.write_bytes(content)
+
+
+def with_fonts(svg: str) -> str:
+    """Put the fonts of the text of a drawing into it, each with the letters that are used."""
+    letters = _letters(svg)
+    faces = [_face(face, "".join(sorted(used))) for face, used in sorted(letters.items()) if used]
+    if not faces:
+        return svg
+    head, opening, rest = re.split(r"(<svg\b[^>]*>)", svg, maxsplit=1)
+    return f'{head}{opening}\n <style type="text/css">\n{"".join(faces)} </style>{rest}'
+
+
+def _letters(svg: str) -> dict[_Face, set[str]]:
+    """The letters of each font of ours that text is written in."""
+    found: dict[_Face, set[str]] = {}
+
+    def visit(element: ElementTree.Element, style: str) -> None:
+        style = f"{style};{element.get('style', '')}"
+        if element.tag in (f"{SVG}text", f"{SVG}tspan") and element.text and (families := FAMILY.findall(style)):
+            names = [name.strip().strip("'\"") for name in families[-1].split(",")]
+            for name in OWN.intersection(names):
+                face = (name, _last(style, "font-style", "normal"), _last(style, "font-weight", "400"))
+                found.setdefault(face, set()).update(element.text)
+        for child in element:
+            visit(child, style)
+
+    visit(ElementTree.fromstring(svg), "")
+    return found
+
+
+def _last(style: str, name: str, default: str) -> str:
+    values = re.findall(rf"(?:^|;)\s*{name}:\s*([^;]+)", style)
+    return values[-1].strip() if values else default
+
+
+def _face(face: _Face, letters: str) -> str:
+    """A rule of a style sheet that holds the letters of a font."""
+    family, style, weight = face
+    properties = FontProperties(family=[family], weight=int(weight) if weight.isdigit() else weight)
+    properties.set_style(cast(Literal["normal", "italic", "oblique"], style))
+    options = subset.Options(notdef_outline=True)
+    options.drop_tables += ["FFTM"]  # when it was made; it is not known how to take a part of that
+    with TTFont(fontManager.findfont(properties), recalcTimestamp=False) as font:
+        subsetter = subset.Subsetter(options)
+        subsetter.populate(text=letters)
+        subsetter.subset(font)
+        font.flavor = "woff"
+        written = BytesIO()
+        font.save(written)
+    source = f"url(data:font/woff;base64,{b64encode(written.getvalue()).decode()})"
+    return (
+        f"  @font-face{{font-family:'{family}';font-style:{style};font-weight:{weight};src:{source} format('woff')}}\n"
+    )

@@ -1,4 +1,4 @@
-"""How figures look in a journal's column or on a slide: width, fonts, and what lines carry themselves."""
+"""Styles of figures for journals and slides: width, fonts, line widths, names at lines."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # in, that a figure may be tall
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """How figures look. `style` puts one to use.
+    """A style of figures, activated by `style`.
 
     Attributes:
         name: What it is called; "" for that of a page of documentation.
@@ -49,12 +49,12 @@ class Style:
 
     @property
     def narrow(self) -> bool:
-        """Whether no two panels have room side by side."""
+        """True if two panels do not fit side by side."""
         return self.width is not None and self.width < 36.0 * self.tick / 72.0
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What Matplotlib is told of it; its text stays text, and its fonts are in the file."""
+        """Matplotlib's settings: text stays text in files, and fonts are embedded."""
         if not self.name:
             return {}
         sizes = dict.fromkeys(("axes.labelsize", "axes.titlesize", "figure.titlesize"), self.label)

@@ -1,21 +1,27 @@
-"""Where a robot can work, as a figure: the hull around the robot, and what limits it."""
+"""A workspace: a slice with its boundary, margins and limiting cables; the hull around the robot."""
 
 from __future__ import annotations
 
+from math import floor, log10
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from matplotlib.colors import to_rgb
+from matplotlib import patheffects
+from matplotlib.colors import to_rgb, to_rgba
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from scipy.ndimage import distance_transform_edt, label
 
-from sagline.core.arguments import instance
-from sagline.plot.names import wrapped
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import number
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
+from sagline.plot.labels import wrapped
 from sagline.plot.robot import draw_robot, dress_space
-from sagline.plot.sheet import GAP_COLOR, sheet
-from sagline.plot.slice import limit_colors, limit_name, slice
+from sagline.plot.sheet import GAP_COLOR, axes_or_new, dressed, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
-from sagline.workspaces.region import AXES, flat_axis
+from sagline.viewer.tension_scale import CABLES, cable_color
+from sagline.workspaces.region import AXES, Plane, Slice, flat_axis, slice_of
 from sagline.workspaces.space import BY_BOX, Workspace, amount_of
 
 if TYPE_CHECKING:
@@ -23,9 +29,17 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from mpl_toolkits.mplot3d.axes3d import Axes3D
 
-    from sagline.core.arrays import Array, Indices
-    from sagline.plot.slice import Key
+    from sagline.core.arrays import Array, Flags, Indices
 
+POINTS: Final = 200  # along the longer side
+LINES: Final = 5  # of equal margin, at most about so many
+ROOM: Final = 11.0  # pt: a region that is narrower than twice this at its widest has no name
+OUTSIDE: Final = to_rgba(GAP_COLOR, 0.35)
+BESIDE: Final = 1e-6  # of the way to the end of the box
+PALE: Final = 0.45  # of a region's color; the rest is white
+Key = tuple[int, int]  # criterion, as an index, and cable
+Color = tuple[float, float, float]
+HALO: Final = [patheffects.withStroke(linewidth=2.2, foreground="white")]
 NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull before and behind the robot
 FINEST: Final = 90  # cells along the longest side of the hull as it is drawn: more is not seen, and takes long
 HEIGHT, ZOOM = 3.4, 1.0  # in; and how large the robot stands in its axes
@@ -33,6 +47,163 @@ WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2,
 ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # the same where nothing fits beside anything
 MOST_LIMITS: Final = 10  # that have a bar of their own
 REST: Final = "others"
+
+
+def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes | None = None) -> Axes:
+    """A slice through a workspace, at right angles to an axis of the world.
+
+    The bold line is the boundary, as exact as the slice is fine; the workspace's own criteria count. Inside, thin lines
+    say what further load in any direction the robot can bear [N], and colors which limit is the first to be in the way:
+    of the margin the cable, of other criteria their names.
+
+    Args:
+        space: The workspace; its robot, loads, orientations and criteria are those of the slice.
+        normal: The axis at right angles: "x", "y" or "z".
+        at: Where on it [m]; None for the middle of the workspace.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InvalidValueError: If the place is not in the workspace's box, or the box is flat and the axis is not its own.
+    """
+    plane = _plane(instance(space, Workspace, "space"), normal, at)
+    low, high = space.box.low, space.box.high
+    first, second = plane.axes
+    size = high - low
+    longest = max(size[first], size[second])
+    shape = tuple(max(2, round(POINTS * float(size[axis] / longest))) for axis in plane.axes)
+    # in a plane of symmetry rounding alone says which of two cables limits: what is drawn is that of a plane beside
+    beside = plane._replace(at=plane.at + BESIDE * float(high[plane.normal] - plane.at))
+    cut = slice_of(space.levels().details, beside, low, high, (shape[0], shape[1]))
+    ax = axes_or_new(ax, height=0.9 + 5.6 * float(np.clip(size[second] / size[first], 0.3, 1.3)))
+    dressed(ax, f"${AXES[first]}$ [m]", f"${AXES[second]}$ [m]")
+    ax.grid(visible=False)
+    ax.set_aspect("equal")
+    ax.set(xlim=(low[first], high[first]), ylim=(low[second], high[second]))
+    if not (cut.level >= 0.0).any():
+        ax.set_facecolor(OUTSIDE)
+        ax.text(
+            0.5, 0.5, "nothing of the workspace is here", transform=ax.transAxes, ha="center", fontsize=current().label
+        )
+    else:
+        levels = round_levels(float(cut.margin[(cut.level >= 0.0) & np.isfinite(cut.margin)].max(initial=0.0)))
+        _draw_regions(ax, cut, space, levels)
+        _draw_lines(ax, cut, levels)
+    held = f"{space.wrenches}; {space.orientations}"
+    told = f"{space.robot.name}, {AXES[plane.normal]} = {n(plane.at, unit='m')}; {held}"
+    ax.set_title(wrapped(told, current().label), fontsize=current().label)
+    return ax
+
+
+def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
+    """The plane that is asked for.
+
+    Raises:
+        InvalidValueError: If it is not in the box.
+    """
+    axis = AXES.index(choice(normal, "normal", AXES))
+    low, high = float(space.box.low[axis]), float(space.box.high[axis])
+    flat = flat_axis(space.box)
+    if flat is not None and flat[0] != axis:
+        own = AXES[flat[0]]
+        raise InvalidValueError(
+            "normal", repr(normal), f"{own!r}, along which the box is flat", f'Give normal="{own}".'
+        )
+    if at is None:
+        known = space.surface.vertices[:, axis] if len(space.surface.vertices) else np.array([low, high])
+        return Plane(axis, float(np.clip(0.5 * (known.min() + known.max()), low, high)))
+    place = number(at, "at", "m")
+    if not low <= place <= high:
+        raise InvalidValueError("at", f"{place:g} m", f"{low:g} to {high:g} m, the box", "Slice the box.")
+    return Plane(axis, place)
+
+
+def limit_name(key: Key, space: Workspace) -> str:
+    """Name of a limit; for the margin, the first criterion, only the cable."""
+    which, cable = key
+    named = [space.criteria[which].title] if which > 0 or cable < 0 else []
+    return ", ".join(named + [f"cable {cable}"] * (cable >= 0))
+
+
+def limit_colors(space: Workspace) -> dict[Key, Color]:
+    """Colors of all limits that there can be: the same for one limit in each figure of a workspace."""
+    count = space.robot.cable_count
+    colors = {(0, cable): _shade(cable_color(cable)) for cable in range(-1, count)}
+    others = [(which, cable) for which in range(1, len(space.criteria)) for cable in range(-1, count)]
+    return colors | {key: _shade(CABLES[-1 - k % len(CABLES)]) for k, key in enumerate(others)}
+
+
+def _shade(color: tuple[int, int, int]) -> Color:
+    """As matplotlib has it."""
+    red, green, blue = color
+    return red / 255.0, green / 255.0, blue / 255.0
+
+
+def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array) -> None:
+    """Pale colors by what limits, each region with its name; gray outside."""
+    ax.set_facecolor(OUTSIDE)
+    inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
+    pairs = np.stack((cut.criterion, cut.cable), axis=-1).reshape(-1, 2)
+    kinds, which = np.unique(pairs, axis=0, return_inverse=True)
+    region = which.reshape(cut.level.shape)
+    shades, keys = limit_colors(space), [(int(which), int(cable)) for which, cable in kinds]
+    colors = np.array([shades[key] for key in keys])
+    image = ax.pcolormesh(
+        cut.across, cut.up, PALE * colors[region] + 1.0 - PALE, shading="nearest", rasterized=True, zorder=0.9
+    )
+    image.set_clip_path(inside.get_paths()[0], ax.transData)
+    free = (cut.level >= 0.0) & ~_on_lines(cut.margin, levels)
+    for k, key in enumerate(keys):
+        _name_region(ax, cut, (region == k) & (cut.level >= 0.0), free, limit_name(key, space))
+
+
+def _on_lines(margin: Array, levels: Array) -> Flags:
+    """Grid points beside a line of equal margin."""
+    band = np.searchsorted(levels, margin)
+    passed = np.zeros(margin.shape, dtype=bool)
+    passed[:, 1:] |= band[:, 1:] != band[:, :-1]
+    passed[1:] |= band[1:] != band[:-1]
+    return passed
+
+
+def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) -> None:
+    """Its name in the middle of each part that has room for it, between lines if there is room."""
+    parts, count = label(within)
+    figure: Any = ax.get_figure(root=True)
+    figure.draw_without_rendering()  # now it is known how large the slice is on the sheet
+    points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size
+    for part in range(1, count + 1):
+        for room in ((parts == part) & free, parts == part):
+            depth = distance_transform_edt(np.pad(room, 1))[1:-1, 1:-1]
+            row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
+            if points * depth[row, column] >= ROOM:
+                place = cut.across[column], cut.up[row]
+                ax.text(*place, name, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=3.0)
+                break
+
+
+def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> None:
+    """The boundary, and lines of equal margin inside of it."""
+    if levels.size:
+        margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
+        drawn = ax.contour(cut.across, cut.up, margin, levels=levels, colors="0.25", linewidths=0.7, zorder=2.0)
+        for text in ax.clabel(
+            drawn, fmt=lambda value: n(value, unit="N"), fontsize=current().tick - 1.0, inline_spacing=3
+        ):
+            text.set_path_effects([*HALO])
+    ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors="black", linewidths=2.2, zorder=2.5)
+
+
+def round_levels(largest: float) -> Array:
+    """Round margins from the first above 0 up to the largest, about as many as are drawn."""
+    if not np.isfinite(largest) or largest <= 0.0:
+        return np.empty(0)
+    coarse = largest / LINES
+    power = 10.0 ** floor(log10(coarse))
+    step = min(times * power for times in (1.0, 2.0, 5.0, 10.0) if times * power >= coarse * (1.0 - 1e-9))
+    return np.arange(step, largest * (1.0 + 1e-9), step)
 
 
 def workspace(space: Workspace) -> Figure:
@@ -100,11 +271,7 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
 
 
 def _coarser(vertices: Array, faces: Indices) -> tuple[Array, Indices, Indices]:
-    """A mesh with as many faces as a sheet shows: corners in one cell of a grid become one.
-
-    Returns:
-        Corners (V, 3), faces (F, 3), and of each face a corner of the mesh as it was, shape (F,).
-    """
+    """A mesh with as many faces as a sheet shows: corners in one cell of a grid become one."""
     if not len(faces):
         return vertices, faces, np.empty(0, dtype=np.int64)
     low = vertices.min(axis=0)

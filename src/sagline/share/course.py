@@ -1,14 +1,15 @@
-"""What a page plays: poses, tensions and lengths over time, and what is to say of them."""
+"""Samples that a page plays: poses, tensions and lengths over time, with a verdict for each."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sagline.cables.models import Catenary
+from sagline.control.states import State
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.dynamics.simulation.results import Simulation
@@ -21,11 +22,14 @@ from sagline.robot.several import pulleys_of
 from sagline.robot.wheels import dead_cable
 from sagline.statics.chords import chord_geometry
 
+if TYPE_CHECKING:
+    from sagline.viewer.session import Session
+
 MOST_RATE: Final = 100.0  # samples a second; of twice as many and more a page keeps some: screens show 60
 
 
 class Verdict(NamedTuple):
-    """What is said of a sample.
+    """Verdict on a sample.
 
     Attributes:
         good: Whether all is well; None where there is nothing to judge.
@@ -69,7 +73,7 @@ class Course:
     notes: tuple[str, ...] = ()
 
     def pose_at(self, index: int) -> Pose | None:
-        """Where the platform is at a sample; None where that is not known."""
+        """Pose of the platform at a sample; None if it is not known."""
         if not np.isfinite(self.position[index]).all():
             return None
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
@@ -154,3 +158,25 @@ def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
     span, rise = (np.where(known, chord * part, 1.0) for part in (cosine, sine))
     cables = Catenary().from_length(robot.cables, span, rise, np.where(known, free, 2.0), robot.gravity)
     return np.where(known, cables.chord_tension, np.nan)
+
+
+def of_session(session: Session) -> Course:
+    """A controller's log: the platform where it was to be, beside a plan where it was estimated to be."""
+    from sagline.viewer.session import WRONG
+
+    wanted = np.isfinite(session.planned).all(axis=1, keepdims=True)
+    row = np.maximum(session.shown, 0)
+    position = np.where(wanted, session.planned, session.position[row])
+    quaternion = np.where(wanted, session.planned_quaternion, session.quaternion[row])
+    codes, which = np.unique(session.state, return_inverse=True)
+    states = [State(int(code)) for code in codes]
+    verdicts = tuple(Verdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
+    unknown = ~np.isfinite(position).all(axis=1)
+    if unknown.any():  # nothing was known before, or ever
+        somewhere = session.pose_at(int(np.argmax(unknown)))
+        position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
+    drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)
+    return Course(
+        session.robot, "log", session.time, position, quaternion, session.tension, "measured", drawn, session.length,
+        which.astype(np.intp), verdicts,
+    )  # fmt: skip

@@ -35,14 +35,7 @@ class Channel(NamedTuple):
 
 
 def packed(channels: Sequence[Channel]) -> tuple[dict[str, object], str]:
-    """What a page reads the channels from.
-
-    Args:
-        channels: All of N samples.
-
-    Returns:
-        How to read it, for JSON; and the numbers, deflated, in base64.
-    """
+    """Encode channels for a page."""
     described, planes = [], []
     for channel in channels:
         values = channel.values.reshape(len(channel.values), -1)

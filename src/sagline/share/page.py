@@ -17,9 +17,8 @@ from sagline.kinematics.inverse import inverse
 from sagline.robot.bounds import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.course import Course
-from sagline.share.machine import colors, machine, numbers, picture
+from sagline.share.machine import colors, machine, numbers, picture, still
 from sagline.share.packing import Channel, packed
-from sagline.share.still import still
 from sagline.viewer.wording import number
 
 SCRIPTS: Final = (  # in the order in which they need each other
@@ -36,14 +35,7 @@ AROUND: Final = "Drag, or press the arrow keys, to look around; pinch, scroll or
 
 
 def robot_page(robot: Robot) -> str:
-    """A robot whose platform is dragged; the page finds the tensions itself.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        The text of an HTML file.
-    """
+    """A robot whose platform is dragged; the page finds the tensions itself."""
     at = home_pose(robot)
     plan = inverse(robot, at)
     facts = {**_facts(robot), "home": {"position": numbers(at.position)}}
@@ -67,15 +59,7 @@ def robot_page(robot: Robot) -> str:
 
 
 def course_page(course: Course, title: str) -> str:
-    """A run that plays.
-
-    Args:
-        course: What is played.
-        title: Of the page.
-
-    Returns:
-        The text of an HTML file.
-    """
+    """A run that plays."""
     robot, kept = course.robot, course.thinned()
     first = kept.pose_at(0)
     header, text = packed(
@@ -135,7 +119,7 @@ def _facts(robot: Robot) -> dict[str, Any]:
 
 
 def _about(robot: Robot) -> str:
-    """What kind of robot it is, in a line."""
+    """Number of cables, degrees of freedom and mass, in a line."""
     mass = n(robot.mass, ".4g", "kg")
     return f"{robot.cable_count} cables, {robot.degrees_of_freedom} degrees of freedom, a platform of {mass}"
 
@@ -175,7 +159,7 @@ def _clock() -> str:
 
 
 def _table(robot: Robot, tension: Array, length: Array) -> str:
-    """What a page without JavaScript shows: the cables where it begins."""
+    """Table of the cables at the start, for pages without JavaScript."""
     rows = "".join(
         f"<tr><td>{i}</td><td>{number(tension[i], ',.1f')}</td><td>{number(length[i], '.4f')}</td></tr>"
         for i in range(robot.cable_count)
@@ -185,7 +169,7 @@ def _table(robot: Robot, tension: Array, length: Array) -> str:
 
 
 def _precision() -> str:
-    """How far what a page shows may be from what was computed."""
+    """Largest rounding of the values that a page keeps, in words."""
     return (
         f"Kept to {0.5e6 * POSITION:g} µm of positions and lengths, {0.5e6 * TURN:g} µrad of rotations, "
         f"{50.0 * TENSION:g} % of tensions. Cables are computed here, as they hang."

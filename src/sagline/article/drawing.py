@@ -1,0 +1,254 @@
+"""Small drawings of the article's page, readable on a phone: curves, courses with fits, maps of errors."""
+
+from __future__ import annotations
+
+import re
+from itertools import count
+from math import ceil
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import matplotlib
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.textpath import TextPath
+
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
+from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, Sheet, cable_look, dressed, svg_text, unique_names
+from sagline.present.page import Panel
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from matplotlib.axes import Axes
+    from matplotlib.contour import ContourSet
+    from matplotlib.path import Path
+
+WIDTH, HEIGHT = 4.6, 3.1  # in: drawn at its own size on a desk, at four fifths of it on a phone
+LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins around axes: shares of the width, then in
+POINT = 1.0 / 72.0  # in
+NAME_SIZE = TICK - 0.5  # pt, of legends
+SHADES = "viridis"
+MOST_POINTS = 400  # of a course over time: a page is not a data file
+
+_remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|\n\s*(?=\n)", flags=re.DOTALL)
+_size = re.compile(r' (?:width|height)="[^"]*pt"')
+HALO = (patheffects.withStroke(linewidth=2.2, foreground="white"),)
+LOOK: dict[str, Any] = {"colors": "black", "linestyles": "-", "linewidths": 0.8}
+MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins: room for a color bar
+
+
+class Drawings:
+    """Turns figures into drawings of one page: every name inside them is used once in it."""
+
+    def __init__(self, page: str) -> None:
+        """Drawings whose names begin with that of their part of the page."""
+        self._names = (f"{page}-{k}-" for k in count(1))
+
+    def panel(self, figure: Sheet, caption: str) -> Panel:
+        """The figure as a drawing inside the page; the caption is its text for those who do not see it."""
+        svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
+        svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # as large as its place in the page
+        return Panel(unique_names(svg.replace("<svg ", '<svg role="img" ', 1), next(self._names)), caption)
+
+
+def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
+    """A small figure with one pair of axes."""
+    figure = Sheet(figsize=(WIDTH, height))  # fixed margins: half the time of a layout that measures every label
+    figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BELOW / height, top=1.0 - ABOVE / height)
+    ax = figure.add_subplot()
+    dressed(ax, x, y)
+    return figure, ax
+
+
+def legend(ax: Axes, title: str = "") -> None:
+    """A legend above the axes, off the curves, in as many columns as fit; the figure grows by its height."""
+    figure = cast(Sheet, ax.get_figure(root=True))
+    handles, labels = ax.get_legend_handles_labels()
+    widest = max(TextPath((0.0, 0.0), label, size=NAME_SIZE).get_extents().width for label in labels)
+    room = ax.get_position().width * figure.get_figwidth() / POINT
+    columns = min(len(labels), max(1, int((room + 1.2 * NAME_SIZE) / (widest + 3.6 * NAME_SIZE))))
+    rows = ceil(len(labels) / columns) + bool(title)
+    grown = (1.45 * rows + 0.4) * NAME_SIZE * POINT
+    _grow(figure, grown)
+    ax.legend(
+        handles,
+        labels,
+        title=title or None,
+        alignment="left",
+        fontsize=NAME_SIZE,
+        title_fontsize=NAME_SIZE,
+        frameon=False,
+        ncols=columns,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.2,
+        borderpad=0.1,
+        labelspacing=0.25,
+        handlelength=1.8,
+        handletextpad=0.5,
+        columnspacing=1.2,
+    )
+
+
+def _grow(figure: Sheet, more: float) -> None:
+    """Make room above the axes [in]; they keep their size."""
+    before, place = figure.get_figheight(), figure.subplotpars
+    after = before + more
+    figure.set_figheight(after)
+    figure.subplots_adjust(bottom=place.bottom * before / after, top=1.0 - ((1.0 - place.top) * before + more) / after)
+
+
+def floored(ax: Axes, floor: float, told: str) -> None:
+    """A logarithmic vertical axis that ends at a floor.
+
+    Curves below it run under a shaded strip that says what is there; none is lifted onto the floor. Without any the
+    axis is an ordinary one.
+    """
+    ax.set_yscale("log")
+    values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.get_lines()])
+    seen = values[np.isfinite(values)]
+    if not np.any(seen < floor):
+        return
+    high = 3.0 * max(float(seen.max()), 10.0 * floor)
+    strip = floor * (floor / high) ** 0.09  # a share of the axis that holds a line of text
+    ax.set_ylim(strip, high)
+    ax.axhspan(strip, floor, facecolor=GAP_COLOR, linewidth=0.0, zorder=3.0)
+    ax.text(
+        0.5,
+        (floor * strip) ** 0.5,
+        told,
+        transform=ax.get_yaxis_transform(),
+        zorder=3.1,
+        fontsize=NAME_SIZE,
+        ha="center",
+        va="center",
+    )
+
+
+def shades(number: int) -> list[tuple[float, float, float, float]]:
+    """As many colors, in order, dark to light, each still seen on white."""
+    colors = matplotlib.colormaps[SHADES]
+    return [colors(0.85 * k / max(number - 1, 1)) for k in range(number)]
+
+
+def thinned(number: int) -> slice:
+    """Every so many samples."""
+    return slice(None, None, max(1, number // MOST_POINTS))
+
+
+def cables_over_time(
+    time: Array, values: Array, label: str, width: float, name: str = "", stops: Iterable[float] = ()
+) -> tuple[Sheet, Axes]:
+    """A line a cable over time, values (N, m); a vertical line at each stop, between which the time is counted."""
+    figure, ax = axes("time without stops [s]" if stops else "time [s]", label, height=2.7)
+    part = thinned(len(time))
+    for i, course in enumerate(values[part].T):
+        ax.plot(time[part], course, **cable_look(i), linewidth=width, label=name.format(i))
+    for stop in stops:
+        ax.axvline(stop, color="0.75", linewidth=0.6, linestyle="--")
+    return figure, ax
+
+
+def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
+    """Draw one course, sampled at x, with its fit."""
+    ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
+    ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
+    legend(ax)
+
+
+class Courses(NamedTuple):
+    """Several courses with their fits.
+
+    Attributes:
+        x: Where they are sampled, shape (n,).
+        rows: The samples, shape (k, n).
+        fine: Where the fits are drawn, shape (l,).
+        fits: The fits, shape (k, l).
+        names: What the courses are called in the legend.
+    """
+
+    x: Array
+    rows: Array
+    fine: Array
+    fits: Array
+    names: list[str]
+
+    def draw(self, ax: Axes, title: str) -> None:
+        """All of them, dark to light."""
+        for row, fit, name, color in zip(self.rows, self.fits, self.names, shades(len(self.names)), strict=True):
+            ax.plot(self.x, row, "o", color=color, markersize=2.6, label=name)
+            ax.plot(self.fine, fit, color=color, linewidth=0.9)
+        legend(ax, title)
+
+    def panels(
+        self, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
+    ) -> tuple[Panel, Panel]:
+        """One of them alone, and all; labels of both axes and of the legend."""
+        figure, ax = axes(*labels[:2])
+        with_fit(ax, self.x, self.rows[one], self.fine, self.fits[one])
+        second, bx = axes(*labels[:2])
+        self.draw(bx, labels[2])
+        return draw.panel(figure, captions[0]), draw.panel(second, captions[1])
+
+
+def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
+    """Axes with room for a color bar."""
+    figure, ax = axes(x, y)
+    figure.subplots_adjust(left=MAP_LEFT, right=MAP_RIGHT)
+    ax.grid(visible=False)
+    return figure, ax
+
+
+def draw_errors(
+    ax: Axes, x: Array, y: Array, error: Array, edges: Array, ticks: tuple[float, ...], lines: tuple[float, ...]
+) -> None:
+    """Fill a map between round errors and draw some errors as lines, interpolated between the samples.
+
+    An error with a sign is followed through zero: bands around it are as narrow as they are. What is below the first
+    edge is gray, which the color bar says.
+    """
+    colors = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.92, len(edges)))
+    filled = [*colors[::-1], matplotlib.colors.to_rgba(GAP_COLOR), *colors]
+    ax.contourf(x, y, error, levels=[*-edges[::-1], *edges], colors=filled, extend="both").set_rasterized(True)
+    drawn = [
+        ax.contour(x, y, error, levels=sorted(sign * line for line in lines), **LOOK)
+        for sign, seen in ((1.0, np.max(error) >= lines[0]), (-1.0, np.min(error) <= -lines[0]))
+        if seen
+    ]
+    _number_lines(ax, max(drawn, key=_points))
+    key = ListedColormap(colors[:-1], under=GAP_COLOR, over=colors[-1])
+    scale = matplotlib.cm.ScalarMappable(BoundaryNorm(edges, len(edges) - 1), key)
+    bar = ax.figure.colorbar(scale, ax=ax, pad=0.02, extend="both", spacing="uniform")
+    bar.set_ticks(list(ticks), labels=[n(tick, ".3g", "m") for tick in ticks])
+    bar.set_label(f"gray: below {n(edges[0], '.3g', 'm')}", fontsize=LABEL - 1.0)
+    bar.ax.tick_params(labelsize=TICK - 1.0)
+    bar.ax.minorticks_off()
+
+
+def _number_lines(ax: Axes, drawn: ContourSet) -> None:
+    """Numbers in the middle of the lines, with a halo so that they are read on the darkest ground."""
+    middles = [middle for path in drawn.get_paths() if (middle := _middle(ax, path)) is not None]
+    names = ax.clabel(
+        drawn, manual=middles, fmt=lambda level: n(abs(level), ".3g", "m"), fontsize=TICK - 0.5, inline_spacing=3
+    )
+    for text in names:
+        text.set_path_effects([*HALO])
+
+
+def _middle(ax: Axes, path: Path) -> tuple[float, float] | None:
+    """The point halfway along the longest piece of a line on the sheet; None if there is no line."""
+    polygons = map(np.asarray, path.to_polygons(closed_only=False))
+    pieces = [ax.transData.transform(piece) for piece in polygons if len(piece) > 1]
+    if not pieces:
+        return None
+    passed = [np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(piece, axis=0).T)))) for piece in pieces]
+    k = int(np.argmax([way[-1] for way in passed]))
+    place = pieces[k][int(np.searchsorted(passed[k], 0.5 * passed[k][-1]))]
+    x, y = ax.transData.inverted().transform(place)
+    return float(x), float(y)
+
+
+def _points(drawn: ContourSet) -> int:
+    return sum(np.shape(path.vertices)[0] for path in drawn.get_paths())

@@ -1,0 +1,212 @@
+"""The page of an experiment: Table 2 and figures 25 to 27 beside the article's."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from sagline import control
+from sagline.article.drawing import Drawings, axes, cables_over_time, legend
+from sagline.article.experiment import SPEED, STOP, Experiment
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
+from sagline.files.writing import atomic_files, create_folder, json_text, plain
+from sagline.plot.sheet import BLUE, TICK, VERMILLION
+from sagline.present.page import Chapter, Finding, Panel, Table, Verdict, page, table_of
+
+NAMES = ("experiment.html", "experiment.json")
+TITLE = "The experiment, done again"
+NOTATION = "Errors are true less desired positions. A twin's true position is known; a prototype's has to be measured."
+JERK = 2.0  # s, as long as the article's lasts
+AREA = 600.0  # pt^2 of the largest error of a figure
+
+
+def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
+    """Write an HTML page that needs nothing else, and its numbers as JSON.
+
+    Raises:
+        FileError: If the folder cannot be written; then nothing has been.
+    """
+    chapter = experiment_chapter(result, how)
+    lead = (
+        "Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7: home, ten points, home, with a stop at "
+        f"each. {how}"
+    )
+    made = f"Made by sagline {version('sagline')}: sagline experiment article."
+    numbers = {finding.key: plain(finding.numbers) for finding in chapter.findings}
+    contents = page(TITLE, lead, NOTATION, [chapter], None, made, summary=False), json_text(numbers) + "\n"
+    place = create_folder(folder)
+    with atomic_files(place, NAMES) as files:
+        for file, content in zip(files, contents, strict=True):
+            file.write_text(content, encoding="utf-8")
+    return place / NAMES[0]
+
+
+def experiment_chapter(result: Experiment, how: str) -> Chapter:
+    """Everything that is told of an experiment."""
+    draw = Drawings("experiment")
+    return Chapter(
+        "experiment",
+        "Home, ten points, home",
+        how,
+        (_stops(result), _cells(result, draw), _lengths(result, draw), _space(result, draw), _run(result)),
+    )
+
+
+def _stops(result: Experiment) -> Finding:
+    table = result.table
+    worst, ours, theirs = int(np.argmax(result.distance)), 1e3 * result.distance, 1e3 * table.distance
+    return Finding(
+        key="stops",
+        tables=(2,),
+        title="ours beside the article's",
+        statement=f"Errors from {n(theirs.min(), '.1f')} to {n(theirs.max(), '.1f', 'mm')}, "
+        f"{n(theirs.mean(), '.1f', 'mm')} in the mean.",
+        measured=f"Ours: {n(ours.mean(), '.4f')} mm in the mean, {n(ours.max(), '.4f')} mm at most, at "
+        f"{table.points[worst]}. Back at home the platform is {n(1e3 * np.linalg.norm(result.back), '.4f')} mm from "
+        "where it began.",
+        verdict=Verdict.OURS,
+        numbers={
+            "error_mm": 1e3 * result.error,
+            "distance_mm": ours,
+            "mean_mm": ours.mean(),
+            "article_distance_mm": 1e3 * table.distance,
+            "estimated_m": result.estimated,
+            "null_error_N": result.null_error,
+            "largest_mm": ours.max(),
+            "back_mm": 1e3 * np.linalg.norm(result.back),
+        },
+        data=(
+            table_of(
+                "The ten points; null-space error: what of the load cells' error lengths could mend without moving the "
+                "platform, largest of a cable",
+                ("point", [*table.points, "mean"], ""),
+                ("desired x, y, z [m]", [*(_joined(place, ".2f") for place in table.desired), ""], ""),
+                ("article: error x, y, z [mm]", [*(_joined(1e3 * error, ".0f") for error in table.error), ""], ""),
+                ("article [mm]", [*theirs, theirs.mean()], ".1f"),
+                ("ours: error x, y, z [mm]", [*(_joined(1e3 * error, "+.3f") for error in result.error), ""], ""),
+                ("ours [mm]", [*(n(each, ".3f") for each in ours), n(ours.mean(), ".4f")], ""),
+                ("null-space error [N]", [*result.null_error, ""], ".1f"),
+            ),
+        ),
+    )
+
+
+def _cells(result: Experiment, draw: Drawings) -> Finding:
+    off, cells, early = result.cells - result.planned, result.cells, result.time < JERK
+    at_stops = result.tension - result.planned_tension
+    return Finding(
+        key="load-cells",
+        figures=(25,),
+        title="what the load cells read",
+        statement="Amplified signals, without numbers. The torque fluctuates most when the platform starts, from the "
+        "overshoot of the PID controller; this jerk lasts about 2 s.",
+        measured=f"From {n(cells.min(), '.0f')} to {n(cells.max(), '.0f', 'N')} under way, at most "
+        f"{n(np.abs(off).max(), '.1f', 'N')} off the plan; in the first two seconds "
+        f"{n(np.abs(off[early]).max(), '.1f', 'N')}. At the stops, in the mean of a second, they are at most "
+        f"{n(np.abs(at_stops).max(), '.1f', 'N')} off.",
+        verdict=Verdict.OURS,
+        numbers={
+            "least_N": cells.min(),
+            "largest_N": cells.max(),
+            "off_plan_N": np.abs(off).max(),
+            "off_plan_at_first_N": np.abs(off[early]).max(),
+            "off_plan_at_stops_N": np.abs(at_stops).max(),
+        },
+        panels=(_courses(result, cells, "load cells [N]", "Load cells; dashed: the ten stops, left out.", draw),),
+    )
+
+
+def _lengths(result: Experiment, draw: Drawings) -> Finding:
+    lengths = result.lengths
+    caption = "Lengths by the encoders, less those at home; dashed: the ten stops, left out."
+    return Finding(
+        key="encoders",
+        figures=(26,),
+        title="how the lengths differ from those at home",
+        statement="Differences of cable length from the encoders, without numbers.",
+        measured=f"From {n(lengths.min(), '.3g')} to {n(lengths.max(), '.3g', 'm')}.",
+        verdict=Verdict.OURS,
+        numbers={"least_m": lengths.min(), "largest_m": lengths.max()},
+        panels=(_courses(result, 1e3 * lengths, "$L - L_{home}$ [mm]", caption, draw),),
+    )
+
+
+def _courses(result: Experiment, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
+    figure, ax = cables_over_time(result.time, values, label, 0.9, "cable {}", result.stops.tolist())
+    legend(ax)
+    return draw.panel(figure, caption)
+
+
+def _space(result: Experiment, draw: Drawings) -> Finding:
+    table, panels = result.table, []
+    scales = AREA / np.array([table.distance.max(), result.distance.max()])
+    for column, name in ((0, "x"), (1, "y")):
+        figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
+        place = table.desired[:, [column, 2]]
+        for who, distance, scale, color in (
+            ("article", table.distance, scales[0], VERMILLION),
+            ("ours", result.distance, scales[1], BLUE),
+        ):
+            text = f"{who}, largest {n(1e3 * distance.max(), '.2g', 'mm')}"
+            ax.scatter(place[:, 0], place[:, 1], s=scale * distance, color=color, alpha=0.3, linewidths=0.0, label=text)
+        for point, (x, z) in zip(table.points, place, strict=True):
+            ax.annotate(point, (x, z), fontsize=TICK, ha="center", va="center")
+        ax.margins(0.16)
+        legend(ax)
+        panels.append(draw.panel(figure, f"The points in the {name}-z plane; areas are errors, each on its own scale."))
+    height = table.desired[:, 2]
+    slopes = [float(np.polyfit(height, 1e3 * error[:, 2], 1)[0]) for error in (table.error, result.error)]
+    return Finding(
+        key="space",
+        figures=(27,),
+        title="where the errors are",
+        statement="The lower the platform, the larger the error: the vertical error changes by "
+        f"{n(slopes[0], '+.1f', 'mm')} with every meter of height.",
+        measured=f"Ours changes by {n(slopes[1], '+.3g', 'mm')} with every meter.",
+        verdict=Verdict.OURS,
+        numbers={"article_slope_mm_per_m": slopes[0], "slope_mm_per_m": slopes[1]},
+        panels=tuple(panels),
+    )
+
+
+def _run(result: Experiment) -> Finding:
+    told = [event for event in result.events if event.kind is not control.EventKind.STATE]
+    rows = [
+        ("how long it took", "about 14 min", n(result.duration / 60.0, ".1f", "min")),
+        ("samples", "100 a second", "100 a second"),
+        (
+            "speed of the platform, stop at each point",
+            "“low”, until it is measured",
+            f"{SPEED:g} m/s at most, {STOP:g} s",
+        ),
+        ("the fastest winch", "", n(1e3 * result.winch_speed, ".0f", "mm/s")),
+        ("true position from the set point under way, at most", "", n(1e3 * result.farthest, ".2f", "mm")),
+        ("true position from the estimate, at most", "", n(1e3 * result.misjudged, ".2f", "mm")),
+        ("the tension loop acted, of the time at stops", "", n(100.0 * result.acting, ".1f", "%")),
+        ("lengths it had changed at the stops, at most", "", n(1e3 * np.abs(result.correction).max(), ".2f", "mm")),
+        ("faults and notes", "", "; ".join(event.text for event in told) or "none"),
+    ]
+    return Finding(
+        key="run",
+        title="how it went",
+        statement="“The test was done in about 14 min with 100 samples/s.”",
+        measured=f"{n(result.duration / 60.0, '.1f')} minutes, {len(told) or 'no'} faults or notes.",
+        verdict=Verdict.OURS,
+        numbers={
+            "duration_min": result.duration / 60.0,
+            "winch_speed_mm_per_s": 1e3 * result.winch_speed,
+            "farthest_mm": 1e3 * result.farthest,
+            "misjudged_mm": 1e3 * result.misjudged,
+            "acting_share": result.acting,
+            "correction_mm": 1e3 * np.abs(result.correction).max(),
+            "faults_and_notes": len(told),
+        },
+        data=(Table("The run", ("", "article", "ours"), rows),),
+    )
+
+
+def _joined(values: Array, form: str) -> str:
+    return ", ".join(n(each, form) for each in values)

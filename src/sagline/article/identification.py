@@ -1,0 +1,185 @@
+"""Chapter: the article's identification for another cable."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import sagline as sl
+from sagline.article.drawing import Drawings, axes, draw_errors, legend, map_axes, shades
+from sagline.article.identify import EmpiricalFit, identify_empirical
+from sagline.article.identify_cable import CableFit, identify_cable
+from sagline.article.sampling import simulated_cable
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
+from sagline.present.page import Chapter, Finding, Table, Verdict, table_of
+
+SPANS = np.linspace(1.0, 13.0, 13)  # m: the working range of the simulated robots
+RISES = np.linspace(-5.0, 4.0, 10)  # m
+TENSIONS = np.linspace(20.0, 400.0, 77)  # N
+TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # m
+EDGES, TICKS = np.outer(10.0 ** np.arange(-4.0, -1.0), (1.0, 2.0, 5.0)).ravel(), (1e-4, 1e-3, 1e-2)  # of the map [m]
+LINES = (1e-3, 5e-3, 1e-2)  # m, drawn in it
+SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # of the made-up measurements: m, N
+BOTH = ("linear_density", "axial_stiffness")
+UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
+CASES = (  # lowest and highest chord tension [N], what is sought
+    ("loose and taut", 30.0, 600.0, BOTH),
+    ("taut only", 300.0, 600.0, BOTH),
+    ("loose only", 15.0, 40.0, BOTH),
+    ("loose and taut, zero of the encoder unknown", 30.0, 600.0, (*BOTH, "length_offset")),
+)
+
+
+def identify_chapter() -> Chapter:
+    """identify_empirical on the simulation's cable, identify_cable on made-up measurements of it."""
+    fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
+    draw = Drawings("identify")
+    return Chapter(
+        "identify",
+        "Identification for a cable of one's own",
+        "What the article did for its cables, in two calls: sagline.identify_empirical finds the empirical model for a "
+        "known cable and a working range; sagline.identify_cable, and the command sagline identify, find the cable "
+        "from measured lengths and tensions. Here for the simulation's cable.",
+        (_constants(fit, draw), _limits(fit, draw), _measured()),
+    )
+
+
+def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
+    figure, ax = map_axes("$T_x$ [N]", "span [m]")
+    draw_errors(ax, fit.tensions, fit.spans, fit.position_error.max(axis=1), EDGES, TICKS, LINES)
+    rows = [
+        (name, n(estimate.value, ".4f"), f"{n(estimate.low, '.4f')} to {n(estimate.high, '.4f')}", unit)
+        for name, estimate, unit in (("k_h", fit.k_h, "m/s²"), ("k_p", fit.k_p, "m²/s⁴"))
+    ]
+    return Finding(
+        key="empirical-fit",
+        title="constants for a working range",
+        statement="",
+        measured=f"Spans {n(SPANS[0])} to {n(SPANS[-1], unit='m')}, rises {n(RISES[0])} to "
+        f"{n(RISES[-1], unit='m')}, T_x {n(TENSIONS[0])} to {n(TENSIONS[-1], unit='N')}: k_h = "
+        f"{n(fit.k_h.value, '.4f')}, k_p = {n(fit.k_p.value, '.4f')}. "
+        "k_h is below g/2 because a stretched cable is lighter. The interval says how far a constant moves within the "
+        "range; it is no measuring error.",
+        verdict=Verdict.OURS,
+        numbers={
+            "spans_m": SPANS,
+            "rises_m": RISES,
+            "tensions_N": TENSIONS,
+            "k_h": fit.k_h._asdict(),
+            "k_p": fit.k_p._asdict(),
+            "largest_position_error_m": fit.position_error.max(),
+        },
+        panels=(
+            draw.panel(
+                figure,
+                f"Position error of (20), largest over the rises, between {len(fit.spans)} spans and "
+                f"{len(fit.tensions)} tensions.",
+            ),
+        ),
+        data=(Table("The constants", ("constant", "value", "95 % interval", "unit"), rows),),
+    )
+
+
+def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
+    figure, ax = axes("$T_x$ from here on [N]", "cable weight $wL$ up to [N]")
+    frontier = {}
+    for tolerance, color in zip(TOLERANCES, shades(len(TOLERANCES)), strict=True):
+        frontier[tolerance] = np.array([fit.weight_max(tolerance, tension) for tension in fit.tensions])
+        ax.plot(fit.tensions, frontier[tolerance], color=color, linewidth=1.3, label=n(1e3 * tolerance, unit="mm"))
+    legend(ax, "position error")
+    limits = [
+        {"tolerance_m": each, "tension_min_N": fit.tension_min(each), "weight_max_N": fit.weight_max(each)}
+        for each in TOLERANCES
+    ]
+    return Finding(
+        key="validity-limits",
+        title="the validity limits w_max and T_x,min",
+        statement="Section 3: ρgL < w_max and T_x > T_x,min must be satisfied. Neither has a value in the article.",
+        measured=f"For 5 mm: T_x,min = {n(limits[2]['tension_min_N'], '.3g', 'N')} with the heaviest cable of the "
+        "range, "
+        f"or wL ≤ {n(limits[2]['weight_max_N'], '.2f', 'N')} with every tension of it. A dash: not within this range.",
+        verdict=Verdict.OPEN,
+        numbers={"limits": limits},
+        panels=(draw.panel(figure, "Heaviest cable over the lowest tension, for four tolerances."),),
+        data=(
+            table_of(
+                "Limits that keep the position error of (20) below a tolerance",
+                ("tolerance", [n(1e3 * each, unit="mm") for each in TOLERANCES], ""),
+                ("T_x,min [N]", [limit["tension_min_N"] for limit in limits], ".3g"),
+                ("w_max, all tensions [N]", [limit["weight_max_N"] for limit in limits], ".2f"),
+                ("w_max, T_x ≥ 100 N [N]", [fit.weight_max(each, 100.0) for each in TOLERANCES], ".2f"),
+            ),
+        ),
+    )
+
+
+def _measured() -> Finding:
+    cable, rows, numbers = simulated_cable(), [], []
+    for name, lowest, highest, unknowns in CASES:
+        fit = made_up_fit(cable, lowest, highest, unknowns)
+        rows.append(
+            (
+                f"{name} ({n(lowest)} to {n(highest, unit='N')})",
+                *(
+                    n(value, unit=UNITS[unknown], uncertainty=error)
+                    for unknown, value, error in zip(unknowns, fit.values, fit.standard_error, strict=True)
+                ),
+                *["–"] * (3 - len(unknowns)),
+                n(fit.chi_squared, ".2f"),
+                "; ".join(fit.warnings) or "none",
+            )
+        )
+        numbers.append(
+            {
+                "case": name,
+                "names": unknowns,
+                "values": fit.values,
+                "standard_error": fit.standard_error,
+                "correlation": fit.correlation,
+                "warnings": fit.warnings,
+            }
+        )
+    return Finding(
+        key="cable-fit",
+        title="density and stiffness from measurements",
+        statement="",
+        measured=f"Four sets of {SAMPLES} made-up measurements of a cable of {n(cable.linear_density, unit='kg/m')} "
+        "and EA = "
+        f"{n(cable.axial_stiffness, unit='N')}, with scatter of {n(1e3 * LENGTH_ERROR, unit='mm')} and "
+        f"{n(TENSION_ERROR, unit='N')} at the frame end. Loose cables tell the density, taut ones the stiffness; an "
+        "unknown zero of the encoder "
+        "makes the stiffness less certain.",
+        verdict=Verdict.OURS,
+        numbers={
+            "measurements": SAMPLES,
+            "linear_density_kg_per_m": cable.linear_density,
+            "axial_stiffness_N": cable.axial_stiffness,
+            "length_error_m": LENGTH_ERROR,
+            "tension_error_N": TENSION_ERROR,
+            "cases": numbers,
+        },
+        data=(
+            Table(
+                "What was found; in parentheses the standard uncertainty of the last digits",
+                ("chord tensions", "ρ", "EA", "offset", "χ² per freedom", "warnings"),
+                rows,
+            ),
+        ),
+    )
+
+
+def made_up_fit(cable: sl.Cable, lowest: float, highest: float, unknowns: tuple[str, ...]) -> CableFit:
+    """Identify a known cable from measurements with seeded scatter, over a range of chord tensions [N]."""
+    random = np.random.default_rng(SEED)
+    span, rise = random.uniform(2.0, 12.0, SAMPLES), random.uniform(-4.0, 2.0, SAMPLES)
+    tension: Array = random.uniform(lowest, highest, SAMPLES)
+    state = sl.Catenary().from_tension(cable, span, rise, tension)
+    return identify_cable(
+        span,
+        rise,
+        state.unstrained_length + random.normal(0.0, LENGTH_ERROR, SAMPLES),
+        state.frame_end_tension + random.normal(0.0, TENSION_ERROR, SAMPLES),
+        length_error=LENGTH_ERROR,
+        tension_error=TENSION_ERROR,
+        unknowns=unknowns,
+    )

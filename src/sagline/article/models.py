@@ -1,0 +1,292 @@
+"""Errors of the five cable models, and the range in which each is good enough."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.patches import Rectangle
+from numpy.typing import ArrayLike
+
+import sagline as sl
+from sagline.article.drawing import Drawings, axes, draw_errors, floored, legend, map_axes
+from sagline.article.identify import position_error
+from sagline.article.sampling import GRAVITY, simulated_cable
+from sagline.core.arrays import Array, checked
+from sagline.core.numbers import n
+from sagline.plot.sheet import COLORS, TICK
+from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MODELS: tuple[sl.CableModel, ...] = (
+    sl.Straight(),
+    sl.Elastic(),
+    sl.Empirical(),
+    sl.Parabolic(),
+    sl.Catenary(),
+)  # coarse to exact
+CHORDS = np.geomspace(1.0, 30.0, 41)  # m
+TENSIONS = np.geomspace(5.0, 2000.0, 61)  # N
+TOLERANCE = 1e-3  # m
+FLOOR = 1e-9  # m: errors below a nanometer are not drawn
+EDGES, LINES = 10.0 ** np.arange(-9.0, 1.0), (1e-4, 1e-3, 1e-2)  # of the maps: fillings and drawn lines [m]
+TICKS = (1e-9, 1e-6, 1e-3, 1.0)  # m
+FINE_CHORDS, FINE_TENSIONS = np.geomspace(1.0, 30.0, 140), np.geomspace(5.0, 2000.0, 180)  # where the maps are drawn
+FINE_DENSITIES = np.geomspace(0.01, 1.0, 140)  # kg/m
+FINE_ANGLES = np.radians(np.linspace(-85.0, 0.0, 140))  # suspended: the platform end is below the frame end
+REFERENCE = {"chord": 10.0, "angle": float(np.radians(-30.0)), "density": 0.067, "tension": 100.0}
+USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0))  # chord [m], tension [N] of the table
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelErrors:
+    """Errors of the five models for every combination of four quantities of a cable, against the exact one.
+
+    All models are asked for the same horizontal tension, so a length error is what a winch would wind wrongly, and a
+    position error, |dx| + |dz| of (20), is how far the end of an exact cable with the model's force and length is
+    from where it should be.
+
+    Attributes:
+        models: The models, shape (5,).
+        axial_stiffness: EA [N].
+        chords: D [m], shape (c,).
+        angles: phi [rad], shape (a,).
+        densities: rho [kg/m], shape (r,).
+        tensions: Chord tension tau [N], shape (t,).
+        length_error: L of the model less the exact one [m], shape (5, c, a, r, t).
+        force_error: T_z of the model less the exact one [N], shape (5, c, a, r, t).
+        position_error: [m], shape (5, c, a, r, t).
+    """
+
+    models: tuple[sl.CableModel, ...]
+    axial_stiffness: float
+    chords: Array
+    angles: Array
+    densities: Array
+    tensions: Array
+    length_error: Array
+    force_error: Array
+    position_error: Array
+
+    def sufficient(self, tolerance: float) -> Array:
+        """The coarsest model that will do."""
+        within = np.abs(self.length_error) <= tolerance
+        coarsest: Array = np.argmax(within, axis=0).astype(np.float64)
+        return coarsest
+
+
+def model_errors(
+    axial_stiffness: float, chords: ArrayLike, angles: ArrayLike, densities: ArrayLike, tensions: ArrayLike
+) -> ModelErrors:
+    """Compare the five models on a grid.
+
+    Raises:
+        InvalidValueError: If a value is not finite or out of its range.
+    """
+    axes = (
+        checked(chords, "chords", "m", shape=(None,), above=0.0),
+        checked(angles, "angles", "rad", shape=(None,)),
+        checked(densities, "densities", "kg/m", shape=(None,), above=0.0),
+        checked(tensions, "tensions", "N", shape=(None,), above=0.0),
+    )
+    chord, angle, density, tension = np.meshgrid(*axes, indexing="ij")
+    cable, span, rise = sl.Cable(density, axial_stiffness), chord * np.abs(np.cos(angle)), chord * np.sin(angle)
+    states = [model.from_tension(cable, span, rise, tension, GRAVITY) for model in MODELS]
+    exact = states[-1]
+    return ModelErrors(
+        MODELS,
+        float(axial_stiffness),
+        *axes,
+        length_error=np.stack([state.unstrained_length - exact.unstrained_length for state in states]),
+        force_error=np.stack([state.vertical_force - exact.vertical_force for state in states]),
+        position_error=np.stack([position_error(state) for state in states]),
+    )
+
+
+def models_chapter() -> Chapter:
+    """The page an engineer opens to decide which model a controller needs."""
+    cable = simulated_cable()
+    draw = Drawings("models")
+    return Chapter(
+        "models",
+        "How good each model is, and where",
+        f"Lengths by the five cable models against the exact one, at the same horizontal tension. EA = "
+        f"{n(cable.axial_stiffness, unit='N')} (simulation), cables that hang down from the frame end. Where not "
+        f"varied: chord {n(REFERENCE['chord'], unit='m')}, 30° below level, {n(REFERENCE['density'], unit='kg/m')}, "
+        f"chord tension {n(REFERENCE['tension'], unit='N')}.",
+        (_maps(draw), _sufficient(draw), _slices(draw), _examples()),
+    )
+
+
+def _name(model: object) -> str:
+    return type(model).__name__
+
+
+def _study(**varied: Array) -> ModelErrors:
+    """Errors with the given quantities varied and the others at their reference."""
+    at = (varied.get(name, np.array([REFERENCE[name]])) for name in ("chord", "angle", "density", "tension"))
+    return model_errors(float(simulated_cable().axial_stiffness), *at)
+
+
+def _maps(draw: Drawings) -> Finding:
+    study = _study(chord=CHORDS, tension=TENSIONS)
+    errors = np.abs(study.length_error[:-1, :, 0, 0, :])
+    drawn = _study(chord=FINE_CHORDS, tension=FINE_TENSIONS).length_error[:-1, :, 0, 0, :]
+    names = [_name(model) for model in study.models[:-1]]
+    within = {name: float(np.mean(error <= TOLERANCE)) for name, error in zip(names, errors, strict=True)}
+    return Finding(
+        key="length-error-maps",
+        title="length error over chord and tension",
+        statement="",
+        measured="Within 1 mm of the exact length, of the points of this map: "
+        + ", ".join(f"{name} {n(100 * share, '.3g', '%')}" for name, share in within.items())
+        + ". Where the straight cable seems good for a moment, stretch and sag cancel.",
+        verdict=Verdict.OURS,
+        numbers={"share_within_1_mm": within},
+        panels=tuple(_map(error, f"{name}: length error.", draw) for name, error in zip(names, drawn, strict=True)),
+    )
+
+
+def _map(error: Array, caption: str, draw: Drawings) -> Panel:
+    figure, ax = map_axes("chord tension [N]", "chord [m]")
+    _logarithmic(ax)
+    draw_errors(ax, FINE_TENSIONS, FINE_CHORDS, error, EDGES, TICKS, LINES)
+    return draw.panel(figure, caption)
+
+
+def _sufficient(draw: Drawings) -> Finding:
+    over_chord = _study(chord=CHORDS, tension=TENSIONS).sufficient(TOLERANCE)[:, 0, 0, :]
+    fine = (
+        _study(chord=FINE_CHORDS, tension=FINE_TENSIONS).length_error[:, :, 0, 0, :],
+        _study(density=FINE_DENSITIES, tension=FINE_TENSIONS).length_error[:, 0, 0],
+        _study(angle=FINE_ANGLES, tension=FINE_TENSIONS).length_error[:, 0, :, 0, :],
+    )
+    names = [_name(model) for model in MODELS]
+    shares = {name: float(np.mean(over_chord == k)) for k, name in enumerate(names)}
+    return Finding(
+        key="sufficient-model",
+        title="the coarsest model that is good to a millimeter",
+        statement="",
+        measured="The straight cable never knows its stretch; the elastic one fails where cables are long, heavy or "
+        "loose; the empirical and the parabolic one fill the gap to the exact model, which "
+        f"{n(100 * shares['Catenary'], '.2g', '%')} of the first map needs for 1 mm.",
+        verdict=Verdict.OURS,
+        numbers={"share_of_map": shares},
+        panels=(
+            _choice("chord [m]", FINE_CHORDS, fine[0], "Over chord and tension.", draw),
+            _choice("linear density [kg/m]", FINE_DENSITIES, fine[1], "Over density and tension.", draw),
+            _choice("angle below level [°]", -np.degrees(FINE_ANGLES), fine[2], "Over angle and tension.", draw),
+        ),
+    )
+
+
+def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawings) -> Panel:
+    """Map of the coarsest sufficient model; borders are at the allowed length error, with its sign."""
+    names = [_name(model) for model in MODELS]
+    colors = matplotlib.colormaps["viridis_r"](0.9 * np.arange(len(names)) / (len(names) - 1))
+    figure, ax = map_axes("chord tension [N]", label)
+    ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, color=colors[-1], zorder=0.5))
+    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # the coarser over the better
+        band = ax.contourf(FINE_TENSIONS, heights, error, levels=[-TOLERANCE, TOLERANCE], colors=[color])
+        band.set_rasterized(True)
+    if heights is FINE_CHORDS:
+        _logarithmic(ax)
+    else:
+        ax.set_xscale("log")
+        ax.set_yscale("log" if heights is FINE_DENSITIES else "linear")
+    norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names))
+    scale = matplotlib.cm.ScalarMappable(norm, ListedColormap(colors))
+    bar = figure.colorbar(scale, ax=ax, ticks=range(len(names)), pad=0.02)
+    bar.ax.set_yticklabels(names, fontsize=TICK - 0.5)
+    bar.ax.tick_params(length=0.0)
+    return draw.panel(figure, caption)
+
+
+def _slices(draw: Drawings) -> Finding:
+    names = {
+        "chord": "chord [m]",
+        "angle": "angle below level [°]",
+        "density": "linear density [kg/m]",
+        "tension": "chord tension [N]",
+    }
+    courses = {
+        "chord": CHORDS,
+        "angle": np.radians(np.linspace(-89.0, 0.0, 45)),
+        "density": np.geomspace(0.005, 1.0, 40),
+        "tension": TENSIONS,
+    }
+    panels, worst = [], {}
+    for quantity, course in courses.items():
+        study = _study(**{quantity: course})
+        figure, ax = axes(names[quantity], "length error [mm]")
+        error = 1e3 * np.abs(study.length_error).reshape(len(study.models), -1)
+        x = -np.degrees(course) if quantity == "angle" else course
+        for model, row, color in zip(study.models[:-1], error, COLORS, strict=False):
+            ax.plot(x, row, color=color, linewidth=1.3, label=_name(model))
+        ax.axhline(1e3 * TOLERANCE, color="0.6", linewidth=0.7, linestyle=":")
+        floored(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
+        if quantity != "angle":
+            ax.set_xscale("log")
+        legend(ax)
+        panels.append(draw.panel(figure, f"Over the {names[quantity].split(' [')[0]}."))
+        worst[quantity] = {_name(model): float(row.max()) for model, row in zip(study.models[:-1], error, strict=False)}
+    return Finding(
+        key="length-error-slices",
+        title="length error over each quantity alone",
+        statement="",
+        measured="Along these lines the largest errors of the empirical model are "
+        + ", ".join(f"{n(worst[q]['Empirical'], '.2g', 'mm')} over the {q}" for q in worst)
+        + "; of the parabolic one "
+        + ", ".join(n(worst[q]["Parabolic"], ".2g", "mm") for q in worst)
+        + ". The exact model is the zero they are measured from.",
+        verdict=Verdict.OURS,
+        numbers={"largest_error_mm": worst},
+        panels=tuple(panels),
+    )
+
+
+def _examples() -> Finding:
+    density = REFERENCE["density"]
+    rows, numbers = [], []
+    for chord, tension in USES:
+        study = _study(chord=np.array([chord]), tension=np.array([tension]))
+        length, force = (1e3 * study.length_error.ravel(), study.force_error.ravel())
+        weight = density * GRAVITY * chord
+        rows.append(
+            (
+                f"{n(chord, unit='m')}, {n(tension, unit='N')}, wD/τ = {n(weight / tension, '.2g')}",
+                *(n(x, "+.2g", "mm") for x in length[:-1]),
+            )
+        )
+        numbers.append(
+            {
+                "chord_m": chord,
+                "tension_N": tension,
+                "length_error_mm": dict(zip(map(_name, study.models), length, strict=True)),
+                "force_error_N": dict(zip(map(_name, study.models), force, strict=True)),
+            }
+        )
+    names = [_name(model) for model in study.models[:-1]]
+    return Finding(
+        key="model-examples",
+        title="five cables as examples",
+        statement="",
+        measured="Errors in length at the same horizontal tension; "
+        f"{n(-np.degrees(REFERENCE['angle']), unit='°')} below level. As a rule wD/τ decides: the "
+        "sag term is D (wD cos φ/τ)²/24, what the shallow models leave out is smaller by that square again.",
+        verdict=Verdict.OURS,
+        numbers={"angle_below_level_deg": -np.degrees(REFERENCE["angle"]), "examples": numbers},
+        data=(Table("Length less the exact one", ("cable", *names), rows),),
+    )
+
+
+def _logarithmic(ax: Axes) -> None:
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_yticks([1, 2, 5, 10, 20], labels=["1", "2", "5", "10", "20"])
+    ax.minorticks_off()

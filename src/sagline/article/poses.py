@@ -1,0 +1,203 @@
+"""Chapter: Table 2 and figures 25 to 27."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sagline.article.causes import classes, explained, untold
+from sagline.article.drawing import Drawings, axes, cables_over_time, legend
+from sagline.article.sampling import fit_line
+from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
+from sagline.core.arrays import Array
+from sagline.core.numbers import n
+from sagline.plot.sheet import BLUE, COLORS, TICK
+from sagline.present.page import Chapter, Finding, Table, Verdict, table_of
+
+
+def poses_chapter() -> Chapter:
+    """The ten poses of the prototype, and what could be wrong with it."""
+    study, way = ten_poses(), tour()
+    draw = Drawings("poses")
+    return Chapter(
+        "poses",
+        "The experiment: ten poses",
+        "The prototype of Table 1 (anchors ours: frame and platform corners, crossed as the suspended robot), planned "
+        "with the article's empirical model and the least norm of T_x, then set on exact cables with something other "
+        "than planned.",
+        (
+            _table(study),
+            classes(study),
+            _tour(way, draw),
+            _space(study, draw),
+            _trends(study, draw),
+            explained(study, draw),
+            untold(study),
+        ),
+    )
+
+
+def _table(study: TenPoses) -> Finding:
+    table, plan = study.table, study.plan
+    difference = np.abs(table.distance - table.printed_error).max()
+    model = np.linalg.norm(study.model_error, axis=1).max()
+    return Finding(
+        key="table-2",
+        tables=(2,),
+        title="errors recomputed, lengths and tensions planned",
+        statement="Table 2: errors from 1.7 to 44.8 mm, “obtained by applying Equation (56)”.",
+        measured="The printed errors are the distances of the printed positions to "
+        f"{n(1e3 * difference, '.2g', 'mm')}, "
+        "not what (56) says (erratum 9). The empirical model itself puts the platform at most "
+        f"{n(1e3 * model, '.2g', 'mm')} off at these poses: it is not the cause.",
+        verdict=Verdict.HOLDS,
+        numbers={
+            "largest_difference_mm": 1e3 * difference,
+            "model_error_max_mm": 1e3 * model,
+            "distance_mm": 1e3 * table.distance,
+            "unstrained_length_m": plan.unstrained_length,
+            "horizontal_tension_N": plan.horizontal_tension,
+            "frame_end_tension_N": plan.state.cables.frame_end_tension,
+        },
+        data=(
+            table_of(
+                "The ten poses, and our plan for them",
+                ("pose", table.points, ""),
+                ("desired x, y, z [m]", [", ".join(n(x, ".2f") for x in place) for place in table.desired], ""),
+                ("error x, y, z [mm]", [", ".join(n(1e3 * x, ".0f") for x in error) for error in table.error], ""),
+                ("distance [mm]", 1e3 * table.distance, ".4f"),
+                ("printed [mm]", 1e3 * table.printed_error, ".4f"),
+                ("L planned [m]", [_span(each, ".3f") for each in plan.unstrained_length], ""),
+                ("tension at the winch [N]", [_span(each, ".0f") for each in plan.state.cables.frame_end_tension], ""),
+            ),
+        ),
+    )
+
+
+def _tour(way: Tour, draw: Drawings) -> Finding:
+    path, cables = way.plan.path, way.plan.state.cables
+    assert path is not None
+    panels = []
+    for values, label, caption in (
+        (cables.frame_end_tension, "tension at the winch [N]", "Planned tensions, for figure 25."),
+        (
+            1e3 * (cables.unstrained_length - cables.unstrained_length[0]),
+            "$L - L_{home}$ [mm]",
+            "Planned differences of length from the home pose, for figure 26.",
+        ),
+    ):
+        figure, _ = cables_over_time(path.time, values, label, 0.9, stops=way.stops.tolist())
+        panels.append(draw.panel(figure, caption))
+    tension = cables.frame_end_tension
+    return Finding(
+        key="tour",
+        figures=(25, 26),
+        title="what load cells and encoders should have shown",
+        statement="Amplified load cell signals and differences of cable length while the platform visits the ten "
+        "points from (0, 0, 1.5) and returns; no numbers in the text.",
+        measured=f"Planned along straight lines: tensions at the winch from {n(tension.min(), '.3g')} to "
+        f"{n(tension.max(), '.3g', 'N')}, all poses feasible: {'yes' if way.plan.feasible.all() else 'no'}.",
+        verdict=Verdict.OPEN,
+        numbers={
+            "frame_end_tension_min_N": tension.min(),
+            "frame_end_tension_max_N": tension.max(),
+            "feasible_share": float(np.mean(way.plan.feasible)),
+        },
+        panels=tuple(panels),
+    )
+
+
+def _space(study: TenPoses, draw: Drawings) -> Finding:
+    table, panels = study.table, []
+    for column, name in ((0, "x"), (1, "y")):
+        figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
+        place = table.desired[:, [column, 2]]
+        ax.scatter(place[:, 0], place[:, 1], s=2e4 * table.distance, color=BLUE, alpha=0.35, linewidths=0.0)
+        for point, (x, z) in zip(table.points, place, strict=True):
+            ax.annotate(point, (x, z), fontsize=TICK, ha="center", va="center")
+        ax.margins(0.12)
+        panels.append(draw.panel(figure, f"The poses in the {name}-z plane; the area is the positioning error."))
+    line, height = study.height_line, table.desired[:, 2]
+    figure, ax = axes("$z$ desired [m]", "vertical error [mm]")
+    ax.plot(height, 1e3 * table.error[:, 2], "o", color=BLUE, markersize=4.0, label="measured")
+    ends = np.array([height.min(), height.max()])
+    ax.plot(ends, 1e3 * (line.slope * ends + line.intercept), color="black", linewidth=0.9, label="line")
+    legend(ax)
+    panels.append(draw.panel(figure, "Actual less desired height."))
+    tension = study.plan.horizontal_tension.mean(axis=1)
+    against = float(np.corrcoef(tension, table.distance)[0, 1])
+    return Finding(
+        key="error-in-space",
+        figures=(27,),
+        title="the error grows as the platform sinks",
+        statement="Tensions are smaller at low altitude; “the larger the cable tensions, the smaller the positioning "
+        "error”. P2, P8, P6 are low and worse; P7, P5, P4 are high and better.",
+        measured="So it is measured: every platform sits too high, by a height that falls "
+        f"{n(-1e3 * line.slope, '.3g', 'mm')} with every meter up (R² {n(line.r_squared, '.2f')}). Correlation of the "
+        f"error with the mean planned T_x: {n(against, '.2f')}. That the tension is the cause does not follow: see "
+        "what a wrong E would do.",
+        verdict=Verdict.HOLDS_WITHIN,
+        numbers={
+            "slope_mm_per_m": 1e3 * line.slope,
+            "r_squared": line.r_squared,
+            "correlation_with_tension": against,
+            "lowest_vertical_error_mm": 1e3 * table.error[:, 2].min(),
+        },
+        panels=tuple(panels),
+    )
+
+
+def _trends(study: TenPoses, draw: Drawings) -> Finding:
+    height = study.table.desired[:, 2]
+    figure, ax = axes("$z$ desired [m]", "vertical error [mm]")
+    ax.plot(height, 1e3 * study.table.error[:, 2], "ko", markersize=4.0, label="measured")
+    second, bx = axes("$z$ desired [m]", "vertical error [mm]")
+    bx.plot(height, 1e3 * study.table.error[:, 2], "ko", markersize=4.0, label="measured")
+    fine = np.array([height.min(), height.max()])
+    for k, trend in enumerate(study.trends):
+        axis = ax if k < 5 else bx
+        line = fit_line(height, 1e3 * trend.error[:, 2])
+        label = f"{trend.parameter.name} {n(trend.parameter.typical, '+g', trend.parameter.unit)}"
+        axis.plot(fine, line.slope * fine + line.intercept, color=COLORS[k % 5], linewidth=1.2, label=label)
+    for axis in (ax, bx):
+        axis.set_ylim(-25.0, 85.0)
+        legend(axis)
+    rows = [
+        (
+            f"{trend.parameter.name} {n(trend.parameter.typical, '+g', trend.parameter.unit)}",
+            *(n(1e3 * z, ".1f") for z in trend.error[:, 2]),
+            n(trend.height_slope, "+.1f"),
+        )
+        for trend in study.trends
+    ]
+    rows.append(
+        ("measured", *(n(1e3 * z, ".1f") for z in study.table.error[:, 2]), n(1e3 * study.height_line.slope, "+.1f"))
+    )
+    slopes = {trend.parameter.name: trend.height_slope for trend in study.trends}
+    falling = [name for name, slope in slopes.items() if slope * study.height_line.slope > 1e-6 * abs(slope)]
+    return Finding(
+        key="one-parameter-off",
+        title="one parameter off at a time",
+        statement="“The larger the cable tensions, the smaller the positioning error”; the relation “can be "
+        "interpreted easily”.",
+        measured="A stiffer cable than planned (E too low in the plan) lifts the platform most where tensions are "
+        f"high: {n(slopes[study.trends[0].parameter.name], '+.3g', 'mm')} per meter, the opposite of the measured "
+        f"{n(1e3 * study.height_line.slope, '+.3g')}. With the signs shown, an error that falls with height comes "
+        "from: " + ", ".join(falling) + ".",
+        verdict=Verdict.FAILS,
+        numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": 1e3 * study.height_line.slope},
+        panels=(
+            draw.panel(figure, "Trends of the vertical error over height, and the measured errors."),
+            draw.panel(second, "The other parameters."),
+        ),
+        data=(
+            Table(
+                "Predicted vertical error [mm] at the ten poses, and its slope over height [mm/m]",
+                ("off by", *study.table.points, "slope"),
+                rows,
+            ),
+        ),
+    )
+
+
+def _span(values: Array, form: str) -> str:
+    return f"{n(values.min(), form)} to {n(values.max(), form)}"

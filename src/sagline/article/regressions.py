@@ -1,0 +1,297 @@
+"""Figures 6 to 15: the article's regressions for its two constants k_h and k_p."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+import sagline as sl
+from sagline.article.feasible_sets import End
+from sagline.article.sampling import GRAVITY, UNSTRETCHABLE, Sampling, article_sampling, fit_factor, fit_line
+from sagline.core.arrays import Array
+
+PUBLISHED_K_H = 4.845  # m/s^2, in magnitude: Gia Luan & Truong Thinh 2020, section 4.2.2
+PUBLISHED_K_P = 4.385  # m^2/s^4: section 5.2.4
+SHALLOW_K_H = GRAVITY / 2.0
+SHALLOW_K_P = GRAVITY**2 / 24.0
+LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # N: where the range of the article is looked for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class InterceptStudy:
+    """Intercepts b_pi of the forces on one end of the cable, and what the article regresses from them.
+
+    Attributes:
+        sampling: The cables, a angles, c chords, r densities.
+        slope: a_pi of the fitted lines, shape (a, c, r).
+        intercept: b_pi of the fitted lines [N], shape (a, c, r).
+        r_squared: How well the lines fit, shape (a, c, r).
+        h_b: Factor of D in b_pi = h_b D [N/m], shape (a, r).
+        k_h_of_angle: Factor of rho in h_b = k_h rho, angle by angle [m/s^2], shape (a,).
+        k_h: The same over all angles [m/s^2].
+    """
+
+    sampling: Sampling
+    slope: Array
+    intercept: Array
+    r_squared: Array
+    h_b: Array
+    k_h_of_angle: Array
+    k_h: float
+
+
+def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
+    """The article's regressions (21), (27), (28) at the platform end and at the frame end.
+
+    Both lines give the vertical force on the cable: at the frame end it is smaller by the cable's weight, so the
+    intercept is negative there.
+
+    Source:
+        Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in docs/errata.md.
+    """
+    state = sampling.hang()
+    frame_end = state.vertical_force - state.cable_weight
+    return _study(sampling, state.vertical_force), _study(sampling, frame_end)
+
+
+def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
+    line = fit_line(sampling.tensions, vertical)
+    h_b = fit_factor(sampling.chords[:, None], line.intercept, axis=-2)
+    everywhere = np.broadcast_to(sampling.densities, h_b.shape)
+    return InterceptStudy(
+        sampling=sampling,
+        slope=line.slope,
+        intercept=line.intercept,
+        r_squared=line.r_squared,
+        h_b=h_b,
+        k_h_of_angle=fit_factor(sampling.densities, h_b),
+        k_h=float(fit_factor(everywhere.ravel(), h_b.ravel())),
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StretchStudy:
+    """The adjusting length d = L - D of one cable over its tension.
+
+    Attributes:
+        cable: Material.
+        end: Where its platform end is.
+        tensions: T_x [N], shape (t,).
+        magnitude: |T| on the platform end of the unstretchable cable [N], shape (t,).
+        unstretchable: d of a cable that does not stretch [m], shape (t,).
+        stretchable: d_e of the cable [m], shape (t,).
+        relieved: d_e plus the article's elongation |T| L/EA of (36) [m], shape (t,).
+        relieved_exactly: d_e plus the true elongation, of the mean force along the cable [m], shape (t,).
+    """
+
+    cable: sl.Cable
+    end: End
+    tensions: Array
+    magnitude: Array
+    unstretchable: Array
+    stretchable: Array
+    relieved: Array
+    relieved_exactly: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SagStudy:
+    """The article's chain of regressions from d to k_p, for cables that do not stretch.
+
+    Attributes:
+        sampling: The cables, a angles, c chords, r densities, t tensions.
+        adjusting_length: d [m], shape (a, c, r, t).
+        a_d: Factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r).
+        q_a: Factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r).
+        p_q: Factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,).
+        k_p: Factor in p_q = k_p rho^2 (45) [m^2/s^4].
+    """
+
+    sampling: Sampling
+    adjusting_length: Array
+    a_d: Array
+    q_a: Array
+    p_q: Array
+    k_p: float
+
+    @property
+    def fitted_length(self) -> Array:
+        """D of (41) [m], shape (a, c, r, t)."""
+        return self.a_d[..., None] * length_shape(self.sampling.tensions)
+
+    @property
+    def fitted_a_d(self) -> Array:
+        """a_d of (43) [m N^2], shape (a, c, r)."""
+        return self.q_a[:, None] * chord_shape(self.sampling.chords)[:, None]
+
+    @property
+    def fitted_q_a(self) -> Array:
+        """q_a of (44) [N^2/m^2], shape (a, r)."""
+        return self.p_q * angle_shape(self.sampling.angles)[:, None]
+
+
+def length_shape(tension: Array) -> Array:
+    """Shape (41) of the adjusting length, 1/T_x^2 [1/N^2]."""
+    return tension**-2
+
+
+def chord_shape(chord: Array) -> Array:
+    """Shape (43) of a_d, D^3 [m^3]."""
+    return chord**3
+
+
+def angle_shape(angle: Array) -> Array:
+    """Shape (44) of q_a, cos^4 of the chord's angle."""
+    shape: Array = np.cos(angle) ** 4
+    return shape
+
+
+def density_shape(density: Array) -> Array:
+    """Shape (45) of p_q, rho^2 [kg^2/m^2]."""
+    return density**2
+
+
+def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
+    """Take the stretch out of a cable's adjusting length, as (36) and (38) do, and as they should.
+
+    The elongation under the force at the platform end, |T| L/EA, is too large by half the cable's weight
+    along the chord, w L^2 sin(phi)/(2 EA) (erratum 5).
+
+    Source:
+        Gia Luan & Truong Thinh 2020, (33) to (38), figures 8 and 9.
+    """
+    model, chord_tension = sl.Catenary(), tensions * end.chord / end.span
+    stiff = model.from_tension(cable.replace(axial_stiffness=UNSTRETCHABLE), *end, chord_tension, GRAVITY)
+    soft = model.from_tension(cable, *end, chord_tension, GRAVITY)
+    mean_force = np.hypot(soft.horizontal_tension, soft.vertical_force - 0.5 * soft.cable_weight)
+    stretch = soft.unstrained_length / cable.axial_stiffness
+    return StretchStudy(
+        cable=cable,
+        end=end,
+        tensions=stiff.horizontal_tension,
+        magnitude=stiff.platform_end_tension,
+        unstretchable=stiff.adjusting_length,
+        stretchable=soft.adjusting_length,
+        relieved=soft.adjusting_length + soft.platform_end_tension * stretch,
+        relieved_exactly=soft.adjusting_length + mean_force * stretch,
+    )
+
+
+def sag_study(sampling: Sampling) -> SagStudy:
+    """The article's regressions (41), (43), (44), (45), one after the other.
+
+    Source:
+        Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15.
+    """
+    excess = sampling.hang().adjusting_length
+    a_d = fit_factor(length_shape(sampling.tensions), excess)
+    q_a = fit_factor(chord_shape(sampling.chords)[:, None], a_d, axis=-2)
+    p_q = fit_factor(angle_shape(sampling.angles)[:, None], q_a, axis=-2)
+    return SagStudy(
+        sampling=sampling,
+        adjusting_length=excess,
+        a_d=a_d,
+        q_a=q_a,
+        p_q=p_q,
+        k_p=float(fit_factor(density_shape(sampling.densities), p_q)),
+    )
+
+
+class Constants(NamedTuple):
+    """Constants by the regressions for one range of tensions.
+
+    Attributes:
+        lowest: Lowest sampled T_x [N].
+        highest: Highest sampled T_x [N].
+        k_h_platform: k_h at the platform end [m/s^2].
+        k_h_frame: k_h at the frame end [m/s^2], negative.
+        k_p: [m^2/s^4].
+    """
+
+    lowest: float
+    highest: float
+    k_h_platform: float
+    k_h_frame: float
+    k_p: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ConstantsStudy:
+    """The constants over the range of tensions.
+
+    Attributes:
+        sampling: The cables; only their tensions change.
+        over_lowest: From each lowest tension to the same highest one.
+        over_highest: From the same lowest tension to each highest one.
+        scaled: Both ends of the article's range multiplied by 1, 2, 4, ...: the limit of taut cables.
+        published: The range in which the frame end gives the published |k_h|, and k_p comes out as published.
+    """
+
+    sampling: Sampling
+    over_lowest: tuple[Constants, ...]
+    over_highest: tuple[Constants, ...]
+    scaled: tuple[Constants, ...]
+    published: Constants
+
+
+def constants(sampling: Sampling) -> Constants:
+    """Both constants by the article's regressions."""
+    platform, frame = intercept_studies(sampling)
+    tensions = sampling.tensions
+    return Constants(float(tensions.min()), float(tensions.max()), platform.k_h, frame.k_h, sag_study(sampling).k_p)
+
+
+def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: Array) -> ConstantsStudy:
+    """The constants for many ranges of tensions, and the range of the published ones."""
+    found = published_range(sampling)
+    return ConstantsStudy(
+        sampling=sampling,
+        over_lowest=tuple(constants(sampling.between(low, found.highest)) for low in lowest),
+        over_highest=tuple(constants(sampling.between(found.lowest, high)) for high in highest),
+        scaled=tuple(constants(sampling.between(f * found.lowest, f * found.highest)) for f in factors),
+        published=found,
+    )
+
+
+@cache
+def published_sampling() -> Sampling:
+    """The article's sampling as we choose it, with the tensions that give its constants."""
+    sampling = article_sampling()
+    found = published_range(sampling)
+    return sampling.between(found.lowest, found.highest)
+
+
+def published_range(sampling: Sampling) -> Constants:
+    """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385.
+
+    Two ends of the range for two constants: k_p falls with the lower end, |k_h| rises with the upper one.
+
+    Raises:
+        InvalidValueError: If there is none for these cables between LOWEST and HIGHEST.
+    """
+    from scipy.optimize import brentq
+
+    def best_lowest(highest: float) -> float:
+        def excess(lowest: float) -> float:
+            return sag_study(sampling.between(lowest, highest)).k_p - PUBLISHED_K_P
+
+        return float(brentq(excess, *LOWEST, xtol=1e-6))
+
+    def missing(log_highest: float) -> float:
+        highest = float(np.exp(log_highest))
+        _, frame = intercept_studies(sampling.between(best_lowest(highest), highest))
+        return frame.k_h + PUBLISHED_K_H
+
+    try:
+        highest = float(np.exp(brentq(missing, *np.log(HIGHEST), xtol=1e-8)))
+    except ValueError:  # no change of sign between the ends of the search
+        raise sl.InvalidValueError(
+            "the sampled cables",
+            "such that no range of tensions gives the published constants",
+            f"lowest tensions in {LOWEST} N, highest in {HIGHEST} N",
+            "Sample chords and densities as the article did.",
+        ) from None
+    return constants(sampling.between(best_lowest(highest), highest))

@@ -1,0 +1,222 @@
+"""The report on the article: selected chapters as an HTML page and a JSON file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from matplotlib.ticker import FixedLocator, NullLocator
+
+import sagline as sl
+from sagline.article.drawing import NAME_SIZE, Drawings, axes, legend
+from sagline.article.simulation import ERROR_BAND
+from sagline.core.numbers import n
+from sagline.files.writing import atomic_files, check_files, create_folder, json_text, plain
+from sagline.plot.sheet import BLUE, VERMILLION
+from sagline.present.page import Chapter, Panel, page
+
+NAMES = ("article.html", "article.json")  # both or neither is written
+TITLE = "The article, redone"
+LEAD = (
+    "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
+    "Including Presence of Sagging”, Appl. Sci. 2020, 10(15), 5318, doi:10.3390/app10155318, beside what sagline "
+    "computes with exact elastic catenaries."
+)
+NOTATION = (
+    "Notation: z up, T acts on the cable at its platform end, φ is the article's β. Every number on the computed side "
+    "was computed when this page was made; one that is rounding of the arithmetic alone is told as such."
+)
+
+Progress = Callable[[int, int, str], None]
+_numbers = re.compile(r"(\d+)(?:-(\d+))?")
+REDONE = "3-15, 17-22 and 25-27; the others are drawings and photographs without data"
+KEY = "five-models"  # of the finding whose numbers it shows
+FIRST, LAST = 1e-3, 1e4  # mm, of the axis; what is smaller is written at its edge
+ROBOTS = (("suspended", BLUE, -0.16), ("mixed", VERMILLION, 0.16))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArticleReport:
+    """A report that has been written.
+
+    Attributes:
+        page: The HTML file.
+        data: The JSON file of its numbers.
+        chapters: What is in it.
+        numbers: Chapter -> finding -> the numbers behind it, plain.
+    """
+
+    page: Path
+    data: Path
+    chapters: tuple[Chapter, ...]
+    numbers: dict[str, dict[str, Any]]
+
+
+def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
+    """Redo the article's studies and write a self-contained HTML page and a JSON file of its numbers.
+
+    Raises:
+        InvalidValueError: If a part is unknown.
+        FileError: If the folder cannot be written; then nothing has been.
+    """
+    wanted = selection(parts)
+    check_files(folder, NAMES)
+    chapters = []
+    for done, part in enumerate(wanted.parts):
+        if progress is not None:
+            progress(done, len(wanted.parts), part.key)
+        chapters.append(wanted.cut(part.build()))
+    if progress is not None:
+        progress(len(chapters), len(chapters), "done")
+    numbers = {c.key: {finding.key: plain(finding.numbers) for finding in c.findings} for c in chapters}
+    made = f"Made by sagline {version('sagline')}: sagline article {' '.join(parts)}".rstrip() + "."
+    contents = page(TITLE, LEAD, NOTATION, chapters, picture(chapters), made), json_text(numbers) + "\n"
+    place = create_folder(folder)
+    with atomic_files(place, NAMES) as files:
+        for file, content in zip(files, contents, strict=True):
+            file.write_text(content, encoding="utf-8")
+    return ArticleReport(place / NAMES[0], place / NAMES[1], tuple(chapters), numbers)
+
+
+class Part(NamedTuple):
+    """A chapter that can be asked for.
+
+    Attributes:
+        key: Its name.
+        figures: The article's figures that it redoes.
+        tables: The article's tables that it redoes.
+        module: Where it is built; loaded only when it is.
+        function: The function that builds it.
+    """
+
+    key: str
+    figures: tuple[int, ...]
+    tables: tuple[int, ...]
+    module: str
+    function: str
+
+    def build(self) -> Chapter:
+        """Do the studies and draw."""
+        function: Callable[[], Chapter] = getattr(import_module(f"sagline.article.{self.module}"), self.function)
+        return function()
+
+
+PARTS = (
+    Part("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
+    Part("intercept", (6, 7), (), "constants", "intercept_chapter"),
+    Part("sag", tuple(range(8, 16)), (), "sag", "sag_chapter"),
+    Part("constants", (), (), "constants", "constants_chapter"),
+    Part("identify", (), (), "identification", "identify_chapter"),
+    Part("models", (), (), "models", "models_chapter"),
+    Part("simulation", tuple(range(17, 23)), (), "simulation_page", "simulation_chapter"),
+    Part("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
+    Part("workspace", (), (), "workspace", "workspace_chapter"),
+    Part("errata", (), (), "errata", "errata_chapter"),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Selection:
+    """Chapters, figures and tables that are requested.
+
+    Attributes:
+        whole: Keys of chapters that are wanted whole.
+        figures: Numbers of figures that are wanted.
+        tables: Numbers of tables that are wanted.
+    """
+
+    whole: frozenset[str]
+    figures: frozenset[int]
+    tables: frozenset[int]
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The chapters that have something to build."""
+        return tuple(
+            p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables}
+        )
+
+    def cut(self, chapter: Chapter) -> Chapter:
+        """The chapter with the requested findings only."""
+        if chapter.key in self.whole:
+            return chapter
+        kept = (f for f in chapter.findings if self.figures & {*f.figures} or self.tables & {*f.tables})
+        return replace(chapter, findings=tuple(kept))
+
+
+def selection(words: Sequence[str]) -> Selection:
+    """Read what is asked for; nothing means everything.
+
+    Raises:
+        InvalidValueError: If a word is none of these, or a figure has no data.
+    """
+    if not words:
+        return Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
+    whole: set[str] = set()
+    wanted: dict[str, set[int]] = {"figures": set(), "tables": set()}
+    kind, open_word = "figures", ""
+    for word in (w for text in words for w in text.replace(",", " ").split()):
+        lower = word.lower()
+        if lower.removesuffix("s") in {"figure", "table"}:
+            kind = open_word = f"{lower.removesuffix('s')}s"
+        elif found := _numbers.fullmatch(word):
+            wanted[kind] |= _checked_range(kind, word, int(found[1]), int(found[2] or found[1]))
+            open_word = ""
+        elif lower in {part.key for part in PARTS}:
+            whole.add(lower)
+        else:
+            raise _unknown(word)
+    if open_word:
+        raise sl.InvalidValueError(open_word, "without numbers", f"{open_word} 6-9", "Give the numbers after it.")
+    return Selection(frozenset(whole), frozenset(wanted["figures"]), frozenset(wanted["tables"]))
+
+
+def _checked_range(kind: str, word: str, first: int, last: int) -> set[int]:
+    known = {number for part in PARTS for number in getattr(part, kind)}
+    numbers = set(range(first, last + 1)) if last < 100 else set()
+    if not numbers & known:
+        allowed = REDONE if kind == "figures" else "2; Table 1 is in the presets"
+        raise sl.InvalidValueError(f"{kind} {word}", "not redone here", allowed, "Ask for one of these.")
+    return numbers & known
+
+
+def _unknown(word: str) -> sl.InvalidValueError:
+    keys = [part.key for part in PARTS]
+    near = get_close_matches(word.lower(), [*keys, "figures", "tables"], n=1)
+    step = f"Did you mean {near[0]}?" if near else "Or give nothing, for everything."
+    return sl.InvalidValueError("part", repr(word), f"{', '.join(keys)}, figures N-M, table 2", step)
+
+
+def picture(chapters: Sequence[Chapter]) -> Panel | None:
+    """The largest position error of each model for both robots; None where the report does not have them."""
+    numbers = next((f.numbers for c in chapters for f in c.findings if f.key == KEY), None)
+    if numbers is None:
+        return None
+    models = numbers["largest_error"]
+    figure, ax = axes("largest position error [mm]", "", height=2.7)
+    figure.subplots_adjust(left=0.2)
+    ax.axvline(1e3 * ERROR_BAND, color="0.4", linewidth=0.9, linestyle=":", label=f"article: {n(ERROR_BAND, unit='m')}")
+    for robot, color, shift in ROBOTS:
+        errors = [model[f"{robot}_mm"] for model in models.values()]
+        ax.plot(errors, [k + shift for k in range(len(errors))], "o", color=color, markersize=5.0, label=robot)
+        for k, error in enumerate(errors):
+            text = n(error, ".2g", "mm", size=1e3 * numbers["longest_length_m"])
+            place, away = (max(error, FIRST), k + shift), -7.0 if FIRST < error < 1e3 * ERROR_BAND else 7.0
+            side = "left" if away > 0.0 else "right"  # of the line of the article
+            ax.annotate(text, place, (away, 0.0), textcoords="offset points", fontsize=NAME_SIZE, va="center", ha=side)
+    ax.set_xscale("log")
+    ax.set_xlim(FIRST, LAST)
+    ax.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(-3, 4)]))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_yticks(range(len(models)), labels=list(models))
+    ax.set_ylim(len(models) - 0.5, -0.5)
+    legend(ax)
+    return Drawings("result").panel(
+        figure, "Lengths planned with each cable model, wound onto exact cables along the article's path."
+    )

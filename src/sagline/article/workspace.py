@@ -1,0 +1,140 @@
+"""Chapter: the article's future work, the boundary of the workspace with sag and without."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+import sagline as sl
+from sagline.article.drawing import Drawings, axes, legend
+from sagline.core.numbers import n
+from sagline.plot.sheet import BLUE, VERMILLION
+from sagline.present.page import Chapter, Finding, Panel, Verdict, table_of
+from sagline.workspaces.region import Plane, slice_of
+
+ROBOTS = ("article-suspended", "article-mixed")
+CELLS = 24  # along the longest edge of the frame
+HEIGHT = 3.0  # m: half the frame's
+POINTS = 121  # along each side of a slice
+
+
+class Pair(NamedTuple):
+    """One robot's workspace with sag and without.
+
+    Attributes:
+        exact: On exact catenaries.
+        straight: On straight cables without weight.
+    """
+
+    exact: sl.Workspace
+    straight: sl.Workspace
+
+
+def workspace_chapter() -> Chapter:
+    """Volume and boundary of both simulated robots."""
+    pairs = {name: _pair(name) for name in ROBOTS}
+    draw = Drawings("workspace")
+    return Chapter(
+        "workspace",
+        "Where the robots can work",
+        "Both simulated robots within their frames, level, bearing their own weight within the tension limits: all "
+        "positions, not a path. The boundary is found on the exact cables, each corner of it to rounding; the volume "
+        "has the error of what bulges between the corners.",
+        (_volumes(pairs), _boundaries(pairs, draw)),
+    )
+
+
+def _pair(name: str) -> Pair:
+    robot = sl.load_robot(name)
+    return Pair(*(sl.workspace(robot, model=model, cells=CELLS) for model in (sl.Catenary(), sl.Straight())))
+
+
+def _volumes(pairs: dict[str, Pair]) -> Finding:
+    change = {name: pair.exact.volume / pair.straight.volume - 1.0 for name, pair in pairs.items()}
+    told = "; ".join(
+        f"{name}: {n(pair.exact.volume, '.1f')} m³ with sag, {n(pair.straight.volume, '.1f')} m³ on straight cables, "
+        f"{n(100.0 * change[name], '+.2f', '%')}"
+        for name, pair in pairs.items()
+    )
+    return Finding(
+        key="volume",
+        title="how much of its frame each robot reaches",
+        statement="Future work: “the boundary of the wrench-feasible workspace” of cables that sag.",
+        measured=f"{told}.\n\nSag moves the boundary both ways: the weight of the cables tightens a robot whose cables "
+        "all come from above, and loads one that is also pulled down.",
+        verdict=Verdict.OURS,
+        numbers={
+            name: {
+                "volume_m3": pair.exact.volume,
+                "volume_error_m3": pair.exact.volume_error,
+                "straight_volume_m3": pair.straight.volume,
+                "straight_volume_error_m3": pair.straight.volume_error,
+                "change_percent": 100.0 * change[name],
+            }
+            for name, pair in pairs.items()
+        },
+        data=(
+            table_of(
+                "Volumes within the frame.",
+                ("robot", pairs, ""),
+                ("with sag [m³]", [pair.exact.volume for pair in pairs.values()], ".1f"),
+                ("error [m³]", [pair.exact.volume_error for pair in pairs.values()], ".1f"),
+                ("straight [m³]", [pair.straight.volume for pair in pairs.values()], ".1f"),
+                ("change [%]", [100.0 * each for each in change.values()], "+.2f"),
+            ),
+        ),
+    )
+
+
+def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
+    apart = {name: _farthest(pair) for name, pair in pairs.items()}
+    panels = tuple(
+        _panel(pair, normal, at, draw)
+        for pair in pairs.values()
+        for normal, at in ((2, HEIGHT), (1, 0.0))
+    )  # fmt: skip
+    told = ", ".join(f"{name} {n(value, '.2g', 'm')}" for name, value in apart.items())
+    return Finding(
+        key="boundary",
+        title="where sag moves the boundary",
+        statement="Future work, as above.",
+        measured=f"Seen along the axes through the middle of the frame, {n(HEIGHT, unit='m')} high, the boundaries "
+        f"with sag and without are at most so far apart: {told}.",
+        verdict=Verdict.OURS,
+        numbers={"height_m": HEIGHT, "farthest_apart_m": apart},
+        panels=panels,
+    )
+
+
+def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
+    """Both boundaries in a plane."""
+    plane, box = Plane(normal, at), pair.exact.box
+    first, second = plane.axes
+    figure, ax = axes(f"${'xyz'[first]}$ [m]", f"${'xyz'[second]}$ [m]")
+    for space, color, label in ((pair.exact, BLUE, "with sag"), (pair.straight, VERMILLION, "straight")):
+        cut = slice_of(space.levels().details, plane, box.low, box.high, (POINTS, POINTS))
+        style = "-" if space is pair.exact else "--"
+        ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors=color, linestyles=style, linewidths=1.3)
+        ax.plot([], [], color=color, linestyle=style, label=label)
+    ax.set(xlim=(box.low[first], box.high[first]), ylim=(box.low[second], box.high[second]))
+    legend(ax)
+    return draw.panel(figure, f"{pair.exact.robot.name}: the boundary in the plane {plane}; the frame is the border.")
+
+
+def _farthest(pair: Pair) -> float:
+    """Largest distance of both boundaries along rays from the middle of the frame [m]."""
+    middle = np.array([0.0, 0.0, HEIGHT])
+    ways = np.vstack((np.eye(3), -np.eye(3)))
+    reach = np.linspace(0.0, float(np.max(pair.exact.box.high - pair.exact.box.low)), 2001)
+    places = middle + reach[:, None, None] * ways
+    ends = []
+    for space in pair:
+        level = space.levels()(places.reshape(-1, 3)).reshape(reach.size, len(ways))
+        first = (level < 0.0).argmax(axis=0)  # beyond the boundary
+        row = np.arange(len(ways))
+        inner, outer = level[first - 1, row], level[first, row]
+        end = reach[first - 1] + (reach[first] - reach[first - 1]) * inner / (inner - outer)
+        within = (middle + end[:, None] * ways >= space.box.low) & (middle + end[:, None] * ways <= space.box.high)
+        ends.append(np.where((first > 0) & within.all(axis=1), end, np.nan))
+    return float(np.nanmax(np.abs(ends[0] - ends[1])))

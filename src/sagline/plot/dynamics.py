@@ -1,0 +1,336 @@
+"""Energy of a simulation; natural frequencies along a path and over a grid of poses; frequency response."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import pairwise
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LogNorm, Normalize, to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+from sagline.core.arguments import choice, instance
+from sagline.core.arrays import checked
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
+from sagline.dynamics.simulation.results import Simulation
+from sagline.dynamics.vibration.frequency_map import FrequencyMap
+from sagline.dynamics.vibration.response import FrequencyResponse, drawn_curves, response_curves
+from sagline.dynamics.vibration.vibration import Vibration
+from sagline.plot.labels import above, name_lines, wrapped
+from sagline.plot.sheet import BLUE, COLORS, DASHED, GAP_COLOR, TICK, VERMILLION, WIDTH, axes_or_new, dressed, sheet
+from sagline.plot.style import current
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+    from sagline.core.arrays import Array
+
+ENERGY_STYLES = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
+ROUNDING = 1e-12  # of the energy that there is: an error below it is the arithmetic's
+THIN, WIDE = 0.6, 3.6  # pt: a mode in which only cables swing, one in which only the platform does
+FAINT = 0.4  # how dense the thin ones are
+SHARES = (1.0, 0.5, 0.0)  # in the legend
+PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # heights that are drawn -> panels beside each other; none stays empty
+MAP_COLORS: Final = "cividis"  # the same to all eyes
+HIGHEST, LOWEST = 2e2, 1e-3  # over the answer at rest: undamped peaks have no top, and zeros no bottom
+MARK = 0.035  # longest mark of a mode, of the axes' height
+FAINTEST = 0.15  # mark of a mode in which the platform stands still
+
+
+def energy(simulation: Simulation) -> Figure:
+    """Kinetic and potential energy, work supplied and energy lost over time, and the error of the balance below.
+
+    The potential energy is drawn less its value at the start.
+
+    Args:
+        simulation: The simulation.
+
+    Returns:
+        A figure of two panels.
+    """
+    balance, time = instance(simulation, Simulation, "simulation").energy, simulation.time
+    figure = sheet(height=4.2)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1.0))
+    rise = balance.potential - balance.potential[0]
+    courses = {"kinetic": balance.kinetic, "potential, less its start": rise}
+    courses |= {"supplied": balance.supplied, "lost": balance.lost}
+    if balance.removed.any():
+        courses["left with cables and loads"] = balance.removed
+    for (name, course), color, style in zip(courses.items(), COLORS, ENERGY_STYLES, strict=False):
+        above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
+    dressed(above, "", "energy [J]")
+    _mark_events(above, simulation, named=True)
+    if time.size > 1:
+        above.set_xlim(time[0], time[-1])
+    name_lines(above)
+    below.plot(time, balance.error, color="black", linewidth=1.0, label="error of the balance")
+    dressed(below, "time [s]", "error [J]")
+    _mark_events(below, simulation, named=False)
+    least = ROUNDING * _largest(*courses.values(), balance.potential)
+    low, high = below.get_ylim()
+    below.set_ylim(min(low, -least), max(high, least))
+    worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
+    told = wrapped(f"the sum, supplied counted negative, less its start: at most {worst}", current().tick)
+    below.set_title(told, fontsize=current().tick, loc="left")
+    return figure
+
+
+def _largest(*courses: Array) -> float:
+    return max(float(np.nanmax(np.abs(course), initial=0.0)) for course in courses)
+
+
+def _mark_events(ax: Axes, simulation: Simulation, *, named: bool) -> None:
+    """A line at each event, with its name on top."""
+    for event in simulation.events:
+        ax.axvline(event.time, color=GAP_COLOR, linewidth=1.0, zorder=1.0)
+        if named:
+            what = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
+            ax.annotate(
+                what, (event.time, 1.0), xycoords=("data", "axes fraction"), xytext=(0.0, 2.0),
+                textcoords="offset points", fontsize=current().tick, ha="center", va="bottom", annotation_clip=False,
+            )  # fmt: skip
+
+
+def frequencies(
+    vibrations: Iterable[Vibration], time: ArrayLike | None = None, label: str = "time [s]", ax: Axes | None = None
+) -> Axes:
+    """Natural frequencies along a path, as in a diagram of Campbell: with cable mass, and massless (dashed).
+
+    A line is as wide and as dense as the platform's share of the mode's kinetic energy: where a wide line fades and
+    its neighbor grows, platform and cable pass the motion on to each other.
+
+    Args:
+        vibrations: Of N states in a row, from `vibration`.
+        time: Where the states are on the horizontal axis, ascending, shape (N,), times of a path [s] for instance;
+            None for their numbers.
+        label: Of that axis, with its unit.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InvalidValueError: If there are less than two, or the times do not fit them.
+    """
+    states = tuple(instance(each, Vibration, f"vibrations[{k}]") for k, each in enumerate(vibrations))
+    if len(states) < 2:
+        raise InvalidValueError("vibrations", f"{len(states)} of them", "two at least", "Take more states of the path.")
+    clock = np.arange(len(states), dtype=np.float64)
+    if time is not None:
+        clock = checked(time, "time", "s", shape=(len(states),))
+        if clock.ndim != 1 or not np.all(np.diff(clock) > 0.0):
+            raise InvalidValueError("time", "not ascending", "a time a state", "Sort the states by their times.")
+    ax = axes_or_new(ax, height=3.6)
+    ax.add_collection(_swinging(states, clock))
+    massless = _filled([each.massless_frequency for each in states])
+    ax.plot(clock, massless, color=VERMILLION, linewidth=0.9, linestyle=DASHED, zorder=2.5)
+    dressed(ax, "state" if time is None else label, "natural frequency [Hz]")
+    if time is None:
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.set_xlim(clock[0], clock[-1])
+    ax.set_ylim(0.0, min(each.up_to for each in states))
+    _legend_of_shares(ax)
+    return ax
+
+
+def _swinging(states: tuple[Vibration, ...], clock: Array) -> LineCollection:
+    """A segment between every two neighbors, of the mean of both shares."""
+    pieces, shares = [], []
+    for (first, one), (second, other) in pairwise(zip(clock, states, strict=True)):
+        count = min(one.frequency.size, other.frequency.size)
+        ends = np.stack((one.frequency[:count], other.frequency[:count]), axis=1)
+        places = np.broadcast_to((first, second), ends.shape)
+        pieces.append(np.stack((places, ends), axis=2))
+        shares.append(0.5 * (one.platform_share[:count] + other.platform_share[:count]))
+    share = np.concatenate(shares)
+    return LineCollection(
+        list(np.concatenate(pieces)), colors=_colors(share), linewidths=_widths(share), capstyle="round", zorder=2.0
+    )
+
+
+def _widths(share: Array) -> Array:
+    return np.asarray(THIN + (WIDE - THIN) * share)
+
+
+def _colors(share: Array) -> list[tuple[float, float, float]]:
+    """On white; not by opacity, in which round ends would show."""
+    dense = FAINT + (1.0 - FAINT) * share
+    red, green, blue = (1.0 - dense * (1.0 - part) for part in to_rgb(BLUE))
+    return list(zip(red.tolist(), green.tolist(), blue.tolist(), strict=True))
+
+
+def _filled(rows: list[Array]) -> Array:
+    """Rows of different lengths as one table, NaN where there is none."""
+    table = np.full((len(rows), max(row.size for row in rows)), np.nan)
+    for k, row in enumerate(rows):
+        table[k, : row.size] = row
+    return table
+
+
+def _legend_of_shares(ax: Axes) -> None:
+    handles = [
+        Line2D([], [], color=_colors(np.array([share]))[0], linewidth=float(_widths(np.array(share))),
+               label=f"with cable mass, platform share {100.0 * share:.0f} %")
+        for share in SHARES
+    ]  # fmt: skip
+    handles.append(Line2D([], [], color=VERMILLION, linewidth=0.9, linestyle=DASHED, label="massless"))
+    labels = [str(handle.get_label()) for handle in handles]
+    place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2, "fontsize": TICK, "frameon": False}
+    ax.legend(handles=handles, **(above(ax, labels) if current().direct else place))
+
+
+class MapQuantity(NamedTuple):
+    """A quantity of a map: attribute, label, and True for a logarithmic scale."""
+
+    place: str
+    label: str
+    logarithmic: bool
+
+
+MAP_QUANTITIES: Final = {
+    "frequency": MapQuantity("frequency", "lowest frequency with cable mass [Hz]", False),
+    "massless_frequency": MapQuantity("massless_frequency", "lowest frequency, massless [Hz]", False),
+    "platform_share": MapQuantity("platform_share", "platform's share of the lowest mode with cable mass", False),
+    "peak": MapQuantity("peak", "strongest answer with cable mass [m/N]", True),
+    "peak_frequency": MapQuantity("peak_frequency", "frequency of the strongest answer, with cable mass [Hz]", False),
+}
+
+
+def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
+    """One quantity of a map over a grid of poses, a panel for each of some heights.
+
+    Args:
+        found: From `frequency_map`, of poses that are a grid along x, y and z.
+        quantity: "frequency", "massless_frequency", "platform_share", "peak" or "peak_frequency".
+
+    Returns:
+        The figure; gray where there is no answer.
+
+    Raises:
+        InvalidValueError: If there is no such quantity, or the poses are no grid.
+    """
+    name, label, logarithmic = MAP_QUANTITIES[choice(quantity, "quantity", MAP_QUANTITIES)]
+    x, y, z, values = _gridded(instance(found, FrequencyMap, "found"), getattr(found, name))
+    shown = max(count for count in PANELS if count <= z.size)
+    rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # the lowest, the highest, and some between
+    known = values[:, :, rows][np.isfinite(values[:, :, rows])]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.5, 1.0)
+    scale = LogNorm(low, max(high, 1.01 * low)) if logarithmic and low > 0.0 else Normalize(low, high)
+    columns = PANELS[shown]
+    count, each = shown // columns, WIDTH / columns
+    tall = np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.4, 1.4) * each
+    figure = sheet(0.5 + count * (0.85 * float(tall) + 0.3))
+    panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
+    for ax, row in zip(panels.flat, rows, strict=True):
+        ax.set_facecolor(GAP_COLOR)
+        ax.pcolormesh(_edges(x), _edges(y), values[:, :, row].T, norm=scale, cmap=MAP_COLORS, rasterized=True)
+        ax.set_title(f"$z$ = {z[row]:.3g} m", fontsize=current().tick)
+        ax.set_aspect("equal")
+        ax.tick_params(labelsize=current().tick, length=3.0, width=0.6)
+        ax.set_xlabel("$x$ [m]", fontsize=current().label)
+        ax.set_ylabel("$y$ [m]", fontsize=current().label)
+        ax.label_outer()
+    bar = figure.colorbar(ScalarMappable(scale, MAP_COLORS), ax=list(panels.flat), shrink=0.8, pad=0.02)
+    bar.set_label(label, fontsize=current().label)
+    bar.ax.tick_params(labelsize=current().tick)
+    figure.suptitle(found.robot.name, fontsize=current().label)
+    return figure
+
+
+def _gridded(found: FrequencyMap, values: Array) -> tuple[Array, Array, Array, Array]:
+    """The grid's coordinates, and values at its points, (nx, ny, nz)."""
+    axes = [np.unique(column) for column in found.pose.position.T]
+    shape = tuple(axis.size for axis in axes)
+    places = tuple(np.searchsorted(axis, column) for axis, column in zip(axes, found.pose.position.T, strict=True))
+    if values.size != np.prod(shape) or np.unique(np.ravel_multi_index(places, shape)).size != values.size:
+        step = "Make the poses with numpy.meshgrid, all with one orientation."
+        raise InvalidValueError("found", f"{values.size} poses that fill no grid", "every point of a grid, once", step)
+    grid = np.empty(shape)
+    grid[places] = values
+    return axes[0], axes[1], axes[2], grid
+
+
+def _edges(middles: Array) -> Array:
+    """Edges of the cells around points of a grid."""
+    if middles.size == 1:
+        return np.asarray(middles[0] + np.array([-0.5, 0.5]))
+    between = 0.5 * (middles[1:] + middles[:-1])
+    return np.concatenate(([2.0 * middles[0] - between[0]], between, [2.0 * middles[-1] - between[-1]]))
+
+
+def response(
+    vibration: Vibration | FrequencyResponse, force: str = "x", motion: str | None = None, ax: Axes | None = None
+) -> Axes:
+    """Amplitude of the platform for a force of 1 N, over frequency: with cable mass, and massless.
+
+    Marks at the foot are the modes with cable mass, the darker the more the platform takes part.
+
+    Args:
+        vibration: Of a stable state, from `vibration`; its damping is that of both curves. Or what `frequency_response`
+            found, which is drawn at its own frequencies and marks no modes.
+        force: "x", "y", "z": a force along it; "about x", ...: a moment [N m].
+        motion: In the same words, what is drawn; None for the motion of the force.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes, both logarithmic.
+
+    Raises:
+        InvalidValueError: If the vibration has no modes or the response no frequencies, or there is no such motion.
+    """
+    if isinstance(vibration, FrequencyResponse):
+        curves, modes = drawn_curves(vibration, force, motion), []
+    else:
+        curves = response_curves(vibration, force, motion)
+        modes = list(zip(vibration.frequency, vibration.platform_share, strict=True))
+    ax = axes_or_new(ax)
+    ax.loglog(curves.frequency, curves.with_mass, color=BLUE, linewidth=1.2, label="with cable mass", zorder=2.2)
+    ax.loglog(
+        curves.frequency, curves.massless, color=VERMILLION, linewidth=1.1, linestyle=DASHED,
+        label="massless", zorder=2.1,
+    )  # fmt: skip
+    dressed(ax, "frequency [Hz]", f"{_name(motion or force)} for a {_cause(force)} [{curves.unit}]")
+    ax.set_xlim(curves.frequency[0], curves.frequency[-1])
+    ax.set_ylim(*_vertical_range(curves.with_mass, curves.massless, curves.static))
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.tick_params(which="minor", length=1.5, width=0.4)
+    for frequency, share in modes:
+        shade = FAINTEST + (1.0 - FAINTEST) * float(share)
+        ax.axvline(frequency, ymax=MARK, color=BLUE, alpha=shade, linewidth=0.9, zorder=1.9)
+    ax.set_title(_damping(vibration), fontsize=current().tick, loc="right")
+    name_lines(ax)
+    return ax
+
+
+def _vertical_range(with_mass: Array, massless: Array, static: float) -> tuple[float, float]:
+    low = min(with_mass.min(), massless.min())
+    high = max(with_mass.max(), massless.max())
+    return 0.7 * max(float(low), LOWEST * static), 1.4 * min(float(high), HIGHEST * static)
+
+
+def _name(motion: str) -> str:
+    return f"rotation {motion}" if motion.startswith("about") else f"motion along {motion}"
+
+
+def _cause(force: str) -> str:
+    return f"moment {force}" if force.startswith("about") else f"force along {force}"
+
+
+def _damping(vibration: Vibration | FrequencyResponse) -> str:
+    """Damping of both curves, in words."""
+    damping = vibration.damping
+    parts = [
+        f"modal damping {100.0 * damping.modal_damping:g} %" if damping.modal_damping else "",
+        f"loss time {damping.loss_time:g} s" if damping.loss_time else "",
+        f"air damping {damping.air_damping:g} N s/m²" if damping.air_damping else "",
+    ]
+    return ", ".join(filter(None, parts)) or "undamped: peaks have no top"

@@ -1,0 +1,197 @@
+"""Labels in figures: names at the ends of lines, legends, headings that fit the width."""
+
+from __future__ import annotations
+
+from math import ceil
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.textpath import TextPath
+from scipy.optimize import isotonic_regression
+
+from sagline.plot.style import SANS, SERIF, current
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+    from sagline.core.arrays import Array
+
+POINT = 1.0 / 72.0  # in
+WIDE = {SANS: 0.58, SERIF: 0.48}  # of the size of the text, that a letter takes
+SHARE = 0.9  # of a figure's width, that a heading may take
+MOST = 0.3  # of a figure's width, that names beside the axes may take
+SPACING = 1.15  # of the size of the text, from name to name
+END = 0.02  # of the width of the axes: a line that ends farther from their right side carries no name there
+LEADER = 8.0  # pt, from the end of a line to its name
+
+
+def name_lines(ax: Axes, title: str = "") -> None:
+    """Say which line is which: in a legend to the right of the axes, or as the style in use likes it.
+
+    Styles of journals and slides write the name of each line at its end, in its color. Where lines end elsewhere, or
+    are more than there is room for, a legend stands above the axes; there also stands what is no line.
+    """
+    if not current().direct:
+        _beside(ax, title)
+        return
+    handles, labels = ax.get_legend_handles_labels()
+    ends = _ends(ax, handles, labels)
+    if ends:
+        _write(ax, ends, title)
+        rest = [(handle, label) for handle, label in zip(handles, labels, strict=True) if not _is_line(handle)]
+        handles, labels, title = [handle for handle, _ in rest], [label for _, label in rest], ""
+    if handles:
+        ax.legend(handles, labels, title=title or None, **above(ax, labels, title))
+
+
+def name_all(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], place: Any) -> None:
+    """One legend for all axes of a figure: at its side, or above them all in the styles whose figures are narrow."""
+    look, columns = current(), 1
+    if look.direct:
+        place, columns = "outside upper center", fitting(labels, figure.get_figwidth(), look.tick)
+    figure.legend(handles, labels, loc=place, ncols=columns, fontsize=look.tick, frameon=False)
+
+
+def above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
+    """Arguments for a legend above the axes, in as many columns as there is room for."""
+    look = current()
+    width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
+    return {
+        "loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": fitting([*labels, title], 0.85 * width, look.tick),
+        "fontsize": look.tick, "title_fontsize": look.tick, "alignment": "left", "frameon": False,
+        "borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8, "handletextpad": 0.5, "columnspacing": 1.2,
+    }  # fmt: skip
+
+
+def fitting(labels: Sequence[str], width: float, size: float) -> int:
+    """Number of legend columns that fit, at least 1, none of them empty."""
+    widest = max((TextPath((0.0, 0.0), label, size=size).get_extents().width for label in labels if label), default=0.0)
+    columns = max(1, min(len(labels), int((width / POINT + 1.2 * size) / (widest + 3.6 * size))))
+    return ceil(len(labels) / ceil(len(labels) / columns))
+
+
+def wrapped(text: str, size: float) -> str:
+    """A heading in as many lines as the width of figures in the style in use asks for."""
+    look = current()
+    return text if look.width is None else fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
+
+
+def break_labels(figure: Figure) -> None:
+    """Break the upright labels of axes in two where they are longer than their axes."""
+    for ax in figure.axes:
+        words = ax.yaxis.get_label_text().split(" ")
+        taken, room = ax.yaxis.label.get_window_extent().height, ax.bbox.height
+        if taken > room and len(words) > 2 and "\n" not in ax.yaxis.get_label_text():
+            lines = [(" ".join(words[:k]), " ".join(words[k:])) for k in range(1, len(words))]
+            whole = [pair for pair in lines if all(line.count("$") % 2 == 0 for line in pair)]  # no broken formula
+            if whole:
+                ax.yaxis.label.set_text("\n".join(min(whole, key=lambda pair: max(map(len, pair)))))
+
+
+class _End(NamedTuple):
+    """The end of a line that carries its name there.
+
+    Attributes:
+        name: Of the line.
+        color: Of the line.
+        place: Where it ends, in the data of the axes.
+        height: The same, of the axes: 0 below, 1 above.
+    """
+
+    name: str
+    color: Any
+    place: tuple[float, float]
+    height: float
+
+
+def _is_line(handle: Artist) -> bool:
+    """True for a line of more than two points, False for a mark across the axes or a set of points."""
+    if not isinstance(handle, Line2D) or handle.get_linestyle() in ("None", "", " "):
+        return False
+    return np.size(np.asarray(handle.get_xdata())) > 2
+
+
+def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_End]:
+    """Ends of the lines; empty if one is not at the right side, or names are too many or too long."""
+    figure, look = cast(Figure, ax.get_figure(root=True)), current()
+    longest = max((len(label) for handle, label in zip(handles, labels, strict=True) if _is_line(handle)), default=0)
+    if longest * WIDE[look.font] * look.tick * POINT > MOST * figure.get_figwidth():
+        return []
+    figure.draw_without_rendering()  # now it is known how tall the axes are
+    found = []
+    for handle, label in zip(handles, labels, strict=True):
+        if not _is_line(handle):
+            continue
+        line = cast(Line2D, handle)
+        course = np.asarray(line.get_xydata(), dtype=np.float64)
+        known = course[np.isfinite(course).all(axis=1)]
+        if not len(known):
+            return []
+        across, height = ax.transAxes.inverted().transform(line.get_transform().transform(known[-1]))
+        if across < 1.0 - END or not 0.0 <= height <= 1.0:
+            return []
+        found.append(_End(label, line.get_color(), (float(known[-1, 0]), float(known[-1, 1])), float(height)))
+    return found if len(found) * _spacing(ax) <= 1.0 else []
+
+
+def _spacing(ax: Axes) -> float:
+    """From name to name, of the height of the axes."""
+    figure = cast(Figure, ax.get_figure(root=True))
+    return SPACING * current().tick * figure.dpi * POINT / ax.bbox.height
+
+
+def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
+    """Write the names beside the ends of the lines, apart from each other; what all begin with stands above them."""
+    look, names = current(), [end.name for end in ends]
+    if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
+        title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
+    heights = spread(np.array([end.height for end in ends]), _spacing(ax))
+    for end, name, height in zip(ends, names, heights, strict=True):
+        ax.annotate(
+            name, end.place, xycoords="data", xytext=(LEADER, (height - end.height) * ax.bbox.height * _points(ax)),
+            textcoords="offset points", va="center", ha="left", fontsize=look.tick, color=end.color,
+            annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "color": end.color, "linewidth": 0.5 * look.line, "shrinkA": 1.0,
+                        "shrinkB": 1.0, "relpos": (0.0, 0.5)},
+        )  # fmt: skip
+    if title:
+        place = (LEADER, (heights.max() - 1.0 + _spacing(ax)) * ax.bbox.height * _points(ax))
+        ax.annotate(title, (1.0, 1.0), xycoords="axes fraction", xytext=place, textcoords="offset points", va="center",
+                    ha="left", fontsize=look.tick)  # fmt: skip
+
+
+def _points(ax: Axes) -> float:
+    """Points a pixel."""
+    return 1.0 / (cast(Figure, ax.get_figure(root=True)).dpi * POINT)
+
+
+def spread(heights: Array, spacing: float) -> Array:
+    """Heights of names: as near as can be, by least squares, to those of the ends, in their order, and apart."""
+    order = np.argsort(heights, kind="stable")
+    steps = spacing * np.arange(heights.size)
+    placed = np.asarray(isotonic_regression(heights[order] - steps).x)
+    top = 1.0 - 0.5 * spacing - steps[-1]
+    spaced = np.empty_like(heights)
+    spaced[order] = np.clip(placed, min(0.5 * spacing, top), top) + steps
+    return spaced
+
+
+def _beside(ax: Axes, title: str) -> None:
+    """A legend to the right of the axes."""
+    size = current().tick
+    ax.legend(
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        borderaxespad=0.0,
+        fontsize=size,
+        title=title or None,
+        title_fontsize=size,
+        frameon=False,
+        handlelength=2.4,
+    )

@@ -1,0 +1,337 @@
+"""Paths, plans and their confirmation over time: lengths, tensions, position errors, velocity."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from sagline.core.arguments import HOW_TO_GET, choice, instance
+from sagline.core.errors import InvalidValueError
+from sagline.core.numbers import n
+from sagline.kinematics.confirm import Confirmation
+from sagline.kinematics.plan import Plan
+from sagline.motion.path import Path
+from sagline.plot.labels import name_all, name_lines
+from sagline.plot.sheet import (
+    BLUE,
+    COLORS,
+    DASHED,
+    ORANGE,
+    VERMILLION,
+    axes_or_new,
+    cable_look,
+    draw_course,
+    dressed,
+    runs,
+    shade,
+    sheet,
+)
+from sagline.plot.style import current
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from sagline.core.arrays import Array
+
+TENSIONS = {  # quantity -> label with unit, and factor from SI
+    "chord_tension": (r"chord tension $\tau$ [N]", 1.0),
+    "horizontal_tension": (r"horizontal tension $T_x$ [N]", 1.0),
+    "vertical_force": (r"vertical force $T_z$ [N]", 1.0),
+    "frame_end_tension": (r"tension at the frame end $T_A$ [N]", 1.0),
+    "platform_end_tension": (r"tension at the platform end $T_B$ [N]", 1.0),
+}
+LENGTHS = {
+    "unstrained_length": (r"unstrained length $L$ [m]", 1.0),
+    "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
+}
+OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
+INFEASIBLE = "infeasible"
+LEAST_ERROR = 1e-3  # mm: rounding errors are drawn as the flat line that they are, and told
+FLAT = 0.01  # of the axis: below it a course is a flat line to the eye
+UNCONFIRMED = "not confirmed"  # planned, but the lengths lead to no stable equilibrium that is found
+AXIS_STYLES = ("-", DASHED, (0, (1.0, 1.2)))
+OTHER_CABLES = "0.82"  # color of the other cables behind each
+ROW_HEIGHT = 1.45  # in, that a row of panels is tall
+LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
+START_COLOR = "#A84300"  # vermillion, dark enough for text
+MOST_ARROWS = 100  # arrows along a path: more are a blur, and each takes its time
+LEVEL = 1e-9  # m: a path that rises less lies in a plane
+
+
+def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None) -> Axes:
+    """Tensions of all cables over time.
+
+    Args:
+        plan: The plan; over the number of the pose where it follows no path.
+        quantity: One of "chord_tension", "horizontal_tension", "vertical_force", "frame_end_tension" and
+            "platform_end_tension", as `CableState` has them [N].
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InvalidValueError: If there is no such quantity.
+    """
+    ax = axes_or_new(ax)
+    _draw_cables(ax, plan, quantity, TENSIONS)
+    name_lines(ax)
+    return ax
+
+
+def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = None) -> Axes:
+    """Lengths of all cables over time.
+
+    Args:
+        plan: The plan; over the number of the pose where it follows no path.
+        quantity: "unstrained_length", L [m], or "adjusting_length", d = L - D [mm].
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+
+    Raises:
+        InvalidValueError: If there is no such quantity.
+    """
+    ax = axes_or_new(ax)
+    _draw_cables(ax, plan, quantity, LENGTHS)
+    name_lines(ax)
+    return ax
+
+
+def overview(plan: Plan) -> Figure:
+    """Lengths, adjusting lengths, horizontal tensions and vertical forces of all cables: the article's figure 20.
+
+    Args:
+        plan: The plan; over the number of the pose where it follows no path.
+
+    Returns:
+        A figure of four panels.
+    """
+    rows, columns, height = (4, 1, 9.0) if current().narrow else (2, 2, 5.0)
+    figure = sheet(height)
+    panels = figure.subplots(rows, columns, sharex=True).flat
+    for ax, quantity in zip(panels, OVERVIEW, strict=True):
+        _draw_cables(ax, plan, quantity, LENGTHS | TENSIONS)
+        ax.label_outer()
+    handles, labels = panels[0].get_legend_handles_labels()
+    name_all(figure, handles, labels, "outside right center")
+    return figure
+
+
+def clock_of(plan: Plan) -> Array:
+    """Abscissa of a plan: times of its path [s], or the numbers of its poses, shape (N,).
+
+    Raises:
+        InvalidValueError: If it has no pose.
+    """
+    if not plan.status.size:
+        raise InvalidValueError("plan", "one of no pose", "one pose at least", "Plan some poses first.")
+    return np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
+
+
+def dress_over(ax: Axes, plan: Plan, label: str) -> None:
+    """Dress axes of what a plan does over time, or over the numbers of its poses."""
+    dressed(ax, "pose" if plan.path is None else "time [s]", label)
+    if plan.path is None:
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    clock = clock_of(plan)
+    if clock.size > 1:
+        ax.set_xlim(clock[0], clock[-1])
+
+
+def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> None:
+    """One line a cable, and the infeasible poses shaded."""
+    label, scale = table[choice(quantity, "quantity", table)]
+    values = scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity))
+    clock = clock_of(plan)
+    for i, course in enumerate(values.T):
+        draw_course(ax, clock, course, **cable_look(i), linewidth=1.1, label=f"cable {i}")
+    shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    dress_over(ax, plan, label)
+
+
+def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
+    """Position error along x, y and z over time: where the platform really is, less where it was planned.
+
+    Poses without a plan, and poses whose lengths lead to no stable equilibrium that was found, are shaded. Errors too
+    small for the axis are told in numbers.
+
+    Args:
+        confirmation: A plan and what its lengths lead to.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, height=2.6)
+    _draw_errors(ax, confirmation)
+    _tell_flat(ax, confirmation)
+    name_lines(ax)
+    return ax
+
+
+def errors(*confirmations: Confirmation) -> Figure:
+    """Position errors of several plans side by side, on one scale: the article's figure 22.
+
+    Args:
+        confirmations: Plans and what their lengths lead to.
+
+    Returns:
+        A figure of one panel each, titled with the robot.
+
+    Raises:
+        InvalidValueError: If there is none, or one is no confirmation.
+    """
+    if not confirmations:
+        raise InvalidValueError("confirmations", "none", "one at least", HOW_TO_GET["Confirmation"])
+    figure = sheet(height=2.8)
+    panels = figure.subplots(1, len(confirmations), sharey=True, squeeze=False)[0]
+    for ax, confirmation in zip(panels, confirmations, strict=True):
+        _draw_errors(ax, confirmation)
+        ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
+        ax.label_outer()
+    for ax, confirmation in zip(panels, confirmations, strict=True):
+        _tell_flat(ax, confirmation)  # on the scale that they have found together
+    handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
+    name_all(figure, [*handles.values()], [*handles], "outside right upper")
+    return figure
+
+
+def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
+    plan = instance(confirmation, Confirmation, "confirmation").plan
+    clock = clock_of(plan)
+    courses = 1e3 * np.atleast_2d(confirmation.position_error)
+    for name, course, color, style in zip("xyz", courses.T, COLORS[:3], AXIS_STYLES, strict=True):
+        draw_course(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
+    shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    lost = np.atleast_1d(plan.feasible & ~confirmation.held)
+    shade(ax, clock, runs(lost), UNCONFIRMED, ORANGE, 0.25)
+    dress_over(ax, plan, "position error [mm]")
+    low, high = ax.get_ylim()
+    ax.set_ylim(min(low, -LEAST_ERROR), max(high, LEAST_ERROR))
+
+
+def _tell_flat(ax: Axes, confirmation: Confirmation) -> None:
+    """Say how large errors are that the scale of the axis makes a flat line."""
+    errors = np.abs(1e3 * confirmation.position_error)
+    known = errors[np.isfinite(errors)]
+    if known.size and known.max() < FLAT * max(map(abs, ax.get_ylim())):
+        size = 1e3 * float(np.nanmax(confirmation.plan.unstrained_length))
+        text = f"largest: {n(known.max(), '.2g', 'mm', size=size)}"
+        ax.text(0.03, 0.95, text, transform=ax.transAxes, fontsize=current().tick, va="top")
+
+
+def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
+    """One quantity over time, a panel for each cable on one scale, before all others in gray.
+
+    Where lines are many and cross, this is easier to read than one panel of all, on paper without color too. Limits of
+    the robot are dotted where they are of this quantity and in sight.
+
+    Args:
+        plan: The plan; over the number of the pose where it follows no path.
+        quantity: What `sl.plot.tensions` or `sl.plot.lengths` draw: "chord_tension", "horizontal_tension",
+            "vertical_force", "frame_end_tension" and "platform_end_tension" [N], "unstrained_length" [m] and
+            "adjusting_length" [mm].
+
+    Returns:
+        A figure of a panel for each cable.
+
+    Raises:
+        InvalidValueError: If there is no such quantity.
+    """
+    table = TENSIONS | LENGTHS
+    label, scale = table[choice(quantity, "quantity", table)]
+    values = scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity))
+    clock, robot, count = clock_of(plan), plan.state.one_robot, values.shape[1]
+    columns = min(count, 2 if current().narrow else 4)
+    rows = ceil(count / columns)
+    figure = sheet(0.4 + rows * ROW_HEIGHT)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).flat
+    for i, ax in enumerate(panels):
+        if i >= count:
+            ax.set_axis_off()
+            continue
+        for other in np.delete(values, i, axis=1).T:
+            draw_course(ax, clock, other, color=OTHER_CABLES, linewidth=0.6, zorder=1.5)
+        draw_course(ax, clock, values[:, i], color=BLUE, linewidth=1.3, zorder=2.0, label=f"cable {i}")
+        shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+        dress_over(ax, plan, "")
+        ax.set_xlabel("")
+        ax.set_title(f"cable {i}", fontsize=current().tick, loc="left", pad=2.0)
+        ax.label_outer()
+    low, high = panels[0].get_ylim()
+    for i, ax in enumerate(panels[:count]):
+        for limit in (robot.tension_min[i], robot.tension_max[i]):
+            if LIMITED.get(quantity) == robot.tension_limits_of and low <= limit <= high:
+                ax.axhline(limit, color=VERMILLION, linewidth=0.8, linestyle=":", zorder=1.8)
+    figure.supxlabel("pose" if plan.path is None else "time [s]", fontsize=current().label)
+    figure.supylabel(label, fontsize=current().label)
+    return figure
+
+
+def path(path: Path, ax: Axes | None = None) -> Axes:
+    """The way of the platform's origin seen from above, with its start and direction.
+
+    Args:
+        path: The path.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, height=3.6, width=4.6)
+    x, y, z = instance(path, Path, "path").pose.position.T
+    ax.plot(x, y, color=BLUE, linewidth=1.3)
+    ax.plot(x[0], y[0], "o", color=VERMILLION, markersize=5.0, zorder=3.0)
+    ax.set_title("\N{BLACK CIRCLE} start", color=START_COLOR, fontsize=current().tick, loc="left")
+    for k in _arrow_samples(path):
+        base = path.pose.position[k, :2]
+        tip = base + 1e-3 * path.twist[k, :2]  # s: short enough to show the direction only
+        arrow = {"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 11.0}
+        ax.annotate("", (tip[0], tip[1]), (base[0], base[1]), arrowprops=arrow)
+    low, high = float(z.min()), float(z.max())
+    height = f"$z$ = {low:g} m" if high - low < LEVEL else f"$z$ from {low:g} m to {high:g} m"
+    ax.set_title(height, fontsize=current().tick, loc="right")
+    dressed(ax, "$x$ [m]", "$y$ [m]")
+    ax.set_aspect("equal")
+    ax.margins(0.06)
+    return ax
+
+
+def velocity(path: Path, ax: Axes | None = None) -> Axes:
+    """Velocity of the platform's origin over time, along x, y and z.
+
+    Args:
+        path: The path.
+        ax: Axes to draw on; None for a new figure.
+
+    Returns:
+        The axes.
+    """
+    ax = axes_or_new(ax, height=2.6)
+    for name, course, color, style in zip(
+        "xyz", instance(path, Path, "path").twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True
+    ):
+        ax.plot(path.time, course, color=color, linestyle=style, linewidth=1.3, label=f"$v_{name}$")
+    dressed(ax, "time [s]", "velocity [m/s]")
+    if len(path) > 1:
+        ax.set_xlim(path.time[0], path.time[-1])
+    name_lines(ax)
+    return ax
+
+
+def _arrow_samples(path: Path) -> list[int]:
+    """Samples before the middle of each stretch between two rests, so that arrows there and back do not meet.
+
+    Of more stretches than anybody can tell apart, evenly chosen ones.
+    """
+    speed = np.linalg.norm(path.twist[:, :2], axis=1)
+    moving = np.concatenate(([False], speed > 1e-3 * speed.max(initial=0.0), [False]))
+    edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)
+    chosen = edges[np.unique(np.linspace(0, len(edges) - 1, min(len(edges), MOST_ARROWS)).astype(np.intp))]
+    return [int(first + 0.42 * (end - first)) for first, end in chosen]

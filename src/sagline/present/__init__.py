@@ -1,0 +1,1 @@
+"""Presentation of results: a summary of each type, and HTML pages of findings."""

@@ -1,0 +1,257 @@
+"""An HTML page of findings that needs no other file: chapters, verdicts, tables and drawings."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from html import escape
+from importlib.resources import files
+from typing import Any, NamedTuple
+
+from sagline.core.numbers import n
+
+SENTENCE = 40  # characters from which on a cell of a table is text
+NARROW = 3  # columns of a table that stands beside the text
+_subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
+
+
+class Verdict(StrEnum):
+    """Verdict on a statement of the article."""
+
+    HOLDS = "holds"
+    HOLDS_WITHIN = "holds within limits"
+    FAILS = "does not hold"
+    OPEN = "cannot be decided"
+    ERRATUM = "erratum"
+    OURS = "not in the article"
+
+
+class Panel(NamedTuple):
+    """One drawing.
+
+    Attributes:
+        svg: The drawing as text.
+        caption: What is to be seen.
+    """
+
+    svg: str
+    caption: str
+
+
+class Table(NamedTuple):
+    """A table of texts.
+
+    Attributes:
+        caption: What it holds.
+        head: Column heads with units.
+        rows: The cells; the first of each row names it.
+    """
+
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+
+def table_of(caption: str, *columns: tuple[str, Iterable[Any], str]) -> Table:
+    """Table by columns, each with its head, its values and their form as `n` takes it; texts stay as they are."""
+    cells = [[each if isinstance(each, str) else n(each, form) for each in values] for _, values, form in columns]
+    return Table(caption, [head for head, _, _ in columns], list(zip(*cells, strict=True)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finding:
+    """One thing the article says or shows, beside what we measured.
+
+    Attributes:
+        key: Anchor in the page and key of its numbers: letters, digits and hyphens.
+        figures: Numbers of the article's figures that it redoes.
+        tables: Numbers of the article's tables that it redoes.
+        title: A few words.
+        statement: What the article says, with figure or equation; empty where it says nothing.
+        measured: What we found.
+        verdict: How the statement fares.
+        panels: Drawings.
+        data: Tables.
+        numbers: The numbers behind it, plain: they go into the JSON file.
+    """
+
+    key: str
+    title: str
+    statement: str
+    measured: str
+    verdict: Verdict
+    numbers: dict[str, Any]
+    figures: tuple[int, ...] = ()
+    tables: tuple[int, ...] = ()
+    panels: tuple[Panel, ...] = ()
+    data: tuple[Table, ...] = field(default=())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chapter:
+    """A part of the report.
+
+    Attributes:
+        key: Name by which it can be asked for.
+        title: Its heading.
+        lead: What it is about.
+        findings: What was found.
+    """
+
+    key: str
+    title: str
+    lead: str
+    findings: tuple[Finding, ...]
+
+
+MANY = {  # verdicts as they are told of more than one finding
+    Verdict.HOLDS: "hold",
+    Verdict.HOLDS_WITHIN: "hold within limits",
+    Verdict.FAILS: "do not hold",
+    Verdict.ERRATUM: "errata",
+}
+
+
+CLASSES = {
+    Verdict.HOLDS: "holds",
+    Verdict.HOLDS_WITHIN: "within",
+    Verdict.FAILS: "fails",
+    Verdict.OPEN: "open",
+    Verdict.ERRATUM: "fails",
+    Verdict.OURS: "ours",
+}
+
+
+def page(
+    title: str,
+    lead: str,
+    notation: str,
+    chapters: Sequence[Chapter],
+    picture: Panel | None,
+    footer: str,
+    *,
+    summary: bool = True,
+) -> str:
+    """The whole page: the result on one screen, then every finding."""
+    style = files("sagline.present").joinpath("page.css").read_text(encoding="utf-8")
+    before = f"{_result(chapters, picture)}\n{_contents(chapters)}\n" if summary else ""
+    body = "\n".join(_chapter(number, chapter) for number, chapter in enumerate(chapters, start=1))
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<title>{escape(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n"
+        f"<header>\n<h1>{escape(title)}</h1>\n<p>{escape(lead)}</p>\n</header>\n"
+        f"{before}<p>{_text(notation)}</p>\n"
+        f"<main>\n{body}\n</main>\n<footer>{escape(footer)}</footer>\n</body>\n</html>\n"
+    )
+
+
+def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
+    """Numbers of statements by verdict and chapter, and one drawing."""
+    counts = Counter(finding.verdict for chapter in chapters for finding in chapter.findings)
+    verdicts = [verdict for verdict in Verdict if counts[verdict]]
+    tiles = "".join(
+        f'<li class="{CLASSES[verdict]}"><strong>{counts[verdict]}</strong> {_counted(verdict, counts[verdict])}</li>'
+        for verdict in verdicts
+    )
+    head = '<th scope="col">chapter</th>' + "".join(
+        f'<th scope="col"><span>{verdict}</span></th>' for verdict in verdicts
+    )
+    rows = ""
+    for number, chapter in enumerate(chapters, start=1):
+        found = Counter(finding.verdict for finding in chapter.findings)
+        cells = "".join(f'<td class="{CLASSES[verdict]}">{found[verdict] or ""}</td>' for verdict in verdicts)
+        name = f'<a href="#{chapter.key}">{number}. {_text(chapter.title)}</a>'
+        rows += f'<tr><th scope="row">{name}</th>{cells}</tr>'
+    return (
+        f'<section class="result" aria-label="Result">\n<ul class="tiles">{tiles}</ul>\n<div class="beside">\n'
+        f'<div class="scroll" tabindex="0"><table class="counts"><thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>\n{_figure(picture) if picture else ''}</div>\n</section>"
+    )
+
+
+def _counted(verdict: Verdict, count: int) -> str:
+    return str(verdict) if count == 1 else MANY.get(verdict, str(verdict))
+
+
+def _contents(chapters: Sequence[Chapter]) -> str:
+    """Every finding with its verdict, one line each."""
+    parts = []
+    for number, chapter in enumerate(chapters, start=1):
+        lines = "".join(
+            f'<li><a href="#{finding.key}">{_text(_headline(finding))}</a> {_badge(finding)}</li>'
+            for finding in chapter.findings
+        )
+        parts.append(
+            f'<section><h3><a href="#{chapter.key}">{number}. {_text(chapter.title)}</a></h3><ul>{lines}</ul></section>'
+        )
+    return f'<nav aria-label="All findings">\n<h2>All findings</h2>\n<div>{"".join(parts)}</div>\n</nav>'
+
+
+def _chapter(number: int, chapter: Chapter) -> str:
+    findings = "\n".join(_finding(finding) for finding in chapter.findings)
+    return (
+        f'<section class="chapter" id="{chapter.key}">\n<h2>{number}. {_text(chapter.title)}</h2>\n'
+        f'<p class="lead">{_text(chapter.lead)}</p>\n{findings}\n</section>'
+    )
+
+
+def _finding(finding: Finding) -> str:
+    """Heading, what is said and found, drawings and tables; one drawing or a narrow table stands beside the text."""
+    said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
+    paragraphs = "".join(f"<p>{_text(part)}</p>" for part in finding.measured.split("\n\n"))
+    pair = f'<div class="pair">{said}<div class="found"><h4>Computed</h4>{paragraphs}</div></div>'
+    drawn = "".join(map(_figure, finding.panels))
+    tables = "\n".join(map(_table, finding.data))
+    if len(finding.panels) == 1:
+        content = f'<div class="beside">\n{pair}\n{drawn}</div>\n{tables}'
+    elif finding.panels:
+        content = f'{pair}\n<div class="panels{" three" * (len(finding.panels) % 3 == 0)}">{drawn}</div>\n{tables}'
+    elif all(len(table.head) <= NARROW for table in finding.data):
+        content = f'<div class="beside">\n{pair}\n<div>{tables}</div></div>'
+    else:
+        content = f"{pair}\n{tables}"
+    return (
+        f'<article id="{finding.key}">\n<h3>{_text(_headline(finding))} {_badge(finding)}</h3>\n{content}\n</article>'
+    )
+
+
+def _figure(panel: Panel) -> str:
+    return f"<figure>{panel.svg}<figcaption>{_text(panel.caption)}</figcaption></figure>"
+
+
+def _headline(finding: Finding) -> str:
+    """Number and title: "Figures 6, 7: ..."."""
+    labels = [
+        f"{word}{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
+        for word, numbers in (("Table", finding.tables), ("Figure", finding.figures))
+        if numbers
+    ]
+    return f"{', '.join(labels)}: {finding.title}" if labels else finding.title[0].upper() + finding.title[1:]
+
+
+def _text(text: str) -> str:
+    """Text with its subscripts set as such: T_x, b_π, ε_max."""
+    return _subscript.sub(r"<sub>\1</sub>", escape(text))
+
+
+def _badge(finding: Finding) -> str:
+    return f'<span class="badge {CLASSES[finding.verdict]}">{finding.verdict}</span>'
+
+
+def _cell(text: str) -> str:
+    """A number on one line, or a sentence that may wrap."""
+    return f'<td class="words">{_text(text)}</td>' if len(text) > SENTENCE else f"<td>{_text(text)}</td>"
+
+
+def _table(table: Table) -> str:
+    head = "".join(f'<th scope="col">{_text(cell)}</th>' for cell in table.head)
+    rows = "".join(f'<tr><th scope="row">{_text(row[0])}</th>{"".join(map(_cell, row[1:]))}</tr>' for row in table.rows)
+    return (
+        f'<div class="scroll" tabindex="0"><table><caption>{_text(table.caption)}</caption>'
+        f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+    )

@@ -1,0 +1,177 @@
+"""A summary of each result type: title, verdict and further lines."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.calibration.result import Calibration
+from sagline.calibration.summary import chi_squared_text
+from sagline.core.numbers import n
+from sagline.core.results import Result
+from sagline.dynamics.simulation.results import Simulation
+from sagline.dynamics.vibration.vibration import Vibration
+from sagline.kernels.jit import is_compiled
+from sagline.kinematics.confirm import Confirmation
+from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.inverse import inverse
+from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import PoseStatus
+from sagline.motion.path import Path
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.workspaces.space import Workspace
+
+MOST_GAPS = 5  # that are listed
+MOST_MODES = 8
+
+
+class Summary(NamedTuple):
+    """Summary of a robot, a path, a plan or a result.
+
+    Attributes:
+        title: Type and name of the object.
+        verdict: In one line.
+        good: True or False if the verdict is one; None for neither.
+        lines: Further lines.
+    """
+
+    title: str
+    verdict: str
+    good: bool | None
+    lines: tuple[str, ...]
+
+
+@singledispatch
+def summary_of(thing: object) -> Summary | None:
+    """Summary of a robot, a path, a plan or a result; None if its ordinary text says as much."""
+    if isinstance(thing, Result) and type(thing).__str__ is not object.__str__:
+        first, *rest = str(thing).splitlines()
+        return Summary(type(thing).__name__, first, None, tuple(rest))
+    return None
+
+
+@summary_of.register
+def _(robot: Robot) -> Summary:
+    plan = plan_of(robot)
+    verdict, good = f"{robot.cable_count} cables", None
+    if plan is not None:
+        there = "in the middle of its test box"
+        good = bool(plan.feasible)
+        verdict = f"held {there} by {_range(plan.chord_tension)}" if good else f"no tensions hold it {there}"
+    lines = [
+        f"{robot.cable_count} cables, {robot.degrees_of_freedom} freedoms ({robot.motion_pattern}), "
+        f"platform of {n(robot.mass, '.4g', 'kg')}",
+        f"limits of the {robot.tension_limits_of.replace('_', ' ')} tension: "
+        f"{n(robot.tension_min.min(), unit='N')} to {n(robot.tension_max.max(), unit='N')}",
+    ]
+    if robot.assumed:
+        lines.append(f"assumed: {', '.join(robot.assumed)}")
+    return Summary(robot.name, verdict, good, tuple(lines))
+
+
+def plan_of(robot: Robot) -> Plan | None:
+    """Plan of the middle of a robot's test box; None without a box, or if compiling would take long."""
+    from sagline.kernels.inverse.poses import inverse_poses
+    from sagline.kernels.inverse.verdicts import decide_poses
+
+    box = robot.test_box
+    if box is None or not (is_compiled(inverse_poses) and is_compiled(decide_poses)):
+        return None
+    return inverse(robot, Pose(0.5 * (box.low + box.high), np.eye(3)))
+
+
+@summary_of.register
+def _(plan: Plan) -> Summary:
+    feasible, name = np.atleast_1d(plan.feasible), plan.state.one_robot.name
+    good, count = bool(feasible.all()), feasible.size
+    lines = [f"chord tensions {_range(plan.chord_tension)}"] if feasible.any() else []
+    gaps = plan.gaps if feasible.size > 1 else ()
+    for gap in gaps[:MOST_GAPS]:
+        why = PoseStatus(gap.status).text
+        short = f", {n(gap.shortfall, '.3g', 'N')} short" if np.isfinite(gap.shortfall) and gap.shortfall > 0.0 else ""
+        lines.append(f"{_when(plan, gap.first, gap.last)}{short}: {why}")
+    if len(gaps) > MOST_GAPS:
+        lines.append(f"and {len(gaps) - MOST_GAPS} more gaps")
+    if count == 1:
+        verdict = "feasible" if good else PoseStatus(int(plan.status.reshape(-1)[0])).text
+    else:
+        verdict = f"all {count:,} poses are feasible" if good else f"{int(feasible.sum()):,} of {count:,} feasible"
+    return Summary(f"Plan of {name}", verdict, good, (*lines, *plan.warnings))
+
+
+def _when(plan: Plan, first: int, last: int) -> str:
+    if plan.path is None:
+        return f"pose {first}" if first == last else f"poses {first} to {last}"
+    times = plan.path.time[[first, last]]
+    return f"at {times[0]:.4g} s" if first == last else f"{times[0]:.4g} s to {times[1]:.4g} s"
+
+
+@summary_of.register
+def _(proof: Confirmation) -> Summary:
+    held, planned = np.atleast_1d(proof.held), np.atleast_1d(proof.plan.feasible)
+    good, size = bool(held[planned].all()), 1e3 * float(np.nanmax(proof.plan.unstrained_length, initial=0.0))
+    away = 1e3 * np.linalg.norm(np.atleast_2d(proof.position_error), axis=1)
+    largest = float(np.nanmax(away, initial=0.0))
+    verdict = f"{int(held.sum()):,} of {int(planned.sum()):,} planned poses are confirmed"
+    line = f"largest position error {n(largest, '.2g', 'mm', size=size)}"
+    return Summary(f"Confirmation of {proof.plan.state.one_robot.name}", verdict, good, (line,))
+
+
+@summary_of.register
+def _(found: ForwardSolution) -> Summary:
+    solved, stable = np.atleast_1d(found.solved), np.atleast_1d(found.stable)
+    verdict = f"{int(solved.sum()):,} of {solved.size:,} solved, {int((solved & stable).sum()):,} stable"
+    lines = []
+    if solved.size == 1 and solved[0]:
+        place = ", ".join(n(each, ".4f") for each in found.pose.position.reshape(-1))
+        lines = [f"at ({place}) m, least stiffness {n(np.min(found.stiffness_min), '.3g', 'N/m')}"]
+    return Summary(f"Equilibrium of {found.state.one_robot.name}", verdict, bool((solved & stable).all()), tuple(lines))
+
+
+@summary_of.register
+def _(run: Simulation) -> Summary:
+    happened = [
+        f"{event.time:.4g} s: {event.kind}" + ("" if event.cable is None else f", cable {event.cable}")
+        for event in run.events[:MOST_GAPS]
+    ]
+    verdict = f"{n(run.time[-1] - run.time[0], '.4g', 's')}, tensions at the frame {_range(run.tensions)}"
+    return Summary(f"Simulation of {run.robot.name}", verdict, None, tuple(happened))
+
+
+@summary_of.register
+def _(swings: Vibration) -> Summary:
+    count = swings.frequency.size
+    verdict = f"{count} modes below {n(swings.up_to, '.4g', 'Hz')}" + ("" if swings.complete else ", some are missing")
+    listed = [
+        f"{k + 1}: {frequency:.3f} Hz, platform {100.0 * share:.0f} %"
+        for k, (frequency, share) in enumerate(zip(swings.frequency, swings.platform_share, strict=True))
+    ]
+    return Summary(f"Vibration of {swings.state.one_robot.name}", verdict, swings.complete, tuple(listed[:MOST_MODES]))
+
+
+@summary_of.register
+def _(path: Path) -> Summary:
+    length = float(np.linalg.norm(np.diff(path.pose.position, axis=0), axis=1).sum())
+    span = float(path.time[-1] - path.time[0])
+    return Summary("Path", f"{len(path):,} poses, {n(span, '.4g', 's')}, {n(length, '.4g', 'm')}", None, ())
+
+
+@summary_of.register
+def _(space: Workspace) -> Summary:
+    first, *rest = str(space).splitlines()
+    return Summary("Workspace", first.removeprefix("Workspace of "), space.volume > 0.0, tuple(rest))
+
+
+@summary_of.register
+def _(found: Calibration) -> Summary:
+    verdict = f"{len(found.values)} numbers from {len(found.rows)} poses; {chi_squared_text(found)}"
+    return Summary(f"Calibration of {found.robot.name}", verdict, None, tuple(str(found).splitlines()))
+
+
+def _range(tensions: object) -> str:
+    values = np.asarray(tensions, dtype=np.float64)
+    known = values[np.isfinite(values)]
+    return f"{n(known.min(), '.4g', 'N')} to {n(known.max(), '.4g', 'N')}" if known.size else "unknown"

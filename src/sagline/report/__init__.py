@@ -1,1 +1,0 @@
-"""The HTML report on the article: what it says beside what was computed."""

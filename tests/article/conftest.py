@@ -1,0 +1,67 @@
+"""The report, once for all tests of this folder, with the figures that were drawn for it: three chapters, and whole."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from matplotlib.figure import Figure
+
+from sagline.article.drawing import Drawings
+from sagline.article.report import ArticleReport, write_article
+from sagline.present.page import Panel
+from tests.tiers import wide
+
+QUICK = ("feasible-sets", "intercept", "errata")  # chapters that take less than a second together
+
+
+class Written(NamedTuple):
+    """A report, and the drawings in it with their captions.
+
+    Attributes:
+        report: The report.
+        figures: Captions and drawings.
+        is_whole: False for the quick chapters alone.
+    """
+
+    report: ArticleReport
+    figures: list[tuple[str, Figure]]
+    is_whole: bool
+
+
+def written_with_figures(folder: Path, parts: tuple[str, ...] = ()) -> Written:
+    figures: list[tuple[str, Figure]] = []
+    panel = Drawings.panel
+
+    def kept(self: Drawings, figure: Any, caption: str) -> Panel:
+        figures.append((caption, figure))
+        return panel(self, figure, caption)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Drawings, "panel", kept)
+        report = write_article(folder, parts)
+    return Written(report, figures, not parts)
+
+
+@pytest.fixture(scope="session")
+def quick(tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """The quick chapters."""
+    return written_with_figures(tmp_path_factory.mktemp("quick"), QUICK)
+
+
+@pytest.fixture(scope="session")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Written:
+    """The whole report; its seconds are the longest of this folder."""
+    return written_with_figures(tmp_path_factory.mktemp("report"))
+
+
+@pytest.fixture(scope="session", params=wide(["quick", "written"]))
+def either(request: pytest.FixtureRequest) -> Written:
+    """The quick chapters in the first tier, the whole report in the second."""
+    found: Written = request.getfixturevalue(request.param)
+    return found
+
+
+@pytest.fixture(scope="session")
+def report(written: Written) -> ArticleReport:
+    """The whole report alone."""
+    return written.report
