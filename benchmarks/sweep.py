@@ -53,7 +53,7 @@ def in_a_loop_and_on_workers() -> Iterator[Row]:
 
 def without_the_start() -> Iterator[Row]:
     """Tasks a second of one worker and of two, once they run: what a long sweep goes by."""
-    from sagline.sweep.cluster import local_workers, spread
+    from sagline.sweep.cluster import local_workers, run_tasks
 
     request = asked(POSES // 4, LOADS)  # of some twenty tasks; with a few only the first and the last would count
     size, rates = measured_size(request), []
@@ -70,7 +70,7 @@ def without_the_start() -> Iterator[Row]:
         done: list[float] = []
         with local_workers(2, lambda text: None) as client:
             job = (str(together), _digest(together))
-            spread(client, job, range(count), lambda *_: done.append(time.perf_counter()), lambda text: None)
+            run_tasks(client, job, range(count), lambda *_: done.append(time.perf_counter()), lambda text: None)
         # between the fourth task and the last but one: both workers are at work
         rates.append((len(done) - 6) / (done[-2] - done[4]))
     text = f"{rates[1] / rates[0]:.2f} x ({rates[0]:.2f} tasks a second, {rates[1]:.2f})"

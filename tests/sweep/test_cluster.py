@@ -98,14 +98,14 @@ def scheduler(folder: Path, workers: int = 1) -> Iterator[tuple[str, Callable[[]
     file.unlink(missing_ok=True)
     here = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
     there = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    processes = [subprocess.Popen([*here, "--no-dashboard", "--scheduler-file", str(file)], **quiet)]  # type: ignore[call-overload]
+    silence_dask = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    processes = [subprocess.Popen([*here, "--no-dashboard", "--scheduler-file", str(file)], **silence_dask)]  # type: ignore[call-overload]
     try:
         deadline = time.monotonic() + 60.0
         while not file.exists() and time.monotonic() < deadline:
             time.sleep(0.05)
         processes += [
-            subprocess.Popen([*there, "--scheduler-file", str(file)], cwd=folder, **quiet)  # type: ignore[call-overload]
+            subprocess.Popen([*there, "--scheduler-file", str(file)], cwd=folder, **silence_dask)  # type: ignore[call-overload]
             for _ in range(workers)
         ]
         import json

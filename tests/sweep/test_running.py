@@ -195,7 +195,7 @@ def test_what_is_no_folder_of_this_sweep_is_left_as_it_is(tmp_path: Path, what: 
 
 def test_one_process_at_a_time_works_on_a_sweep(tmp_path: Path, snapshot: SnapshotAssertion) -> None:
     folder = in_tasks(tmp_path / "sweep", planar(), SIZE)
-    with sweep_result.marking(sweep_folder.open_folder(folder)), refused(kind=sl.FileError, file=folder) as caught:
+    with sweep_result.open_marks(sweep_folder.open_folder(folder)), refused(kind=sl.FileError, file=folder) as caught:
         sl.sweep.run(planar(), folder, workers=1)
     assert str(caught.value).replace(str(folder), "FOLDER") == snapshot
 

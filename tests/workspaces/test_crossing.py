@@ -3,7 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from sagline.core.arrays import Array
-from sagline.workspaces.crossing import brackets, crossings, way_to_box
+from sagline.workspaces.crossing import brackets, crossings, distance_to_box
 from tests.workspaces.shapes import Counted, Level
 
 LINES = 200
@@ -63,4 +63,4 @@ def test_brackets_are_found_to_either_side_and_within_their_limits() -> None:
 
 def test_way_to_the_box() -> None:
     directions = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.6, 0.8]])
-    assert_allclose(way_to_box(np.array([0.5, 0.0, 0.0]), directions, -np.ones(3), np.ones(3)), [0.5, 1.0, 1.25])
+    assert_allclose(distance_to_box(np.array([0.5, 0.0, 0.0]), directions, -np.ones(3), np.ones(3)), [0.5, 1.0, 1.25])

@@ -74,7 +74,7 @@ def sweep(
     from sagline.cli.values import whole_of
     from sagline.sweep.cluster import check_address
     from sagline.sweep.file import load_sweep
-    from sagline.sweep.running import MOST_WORKERS, opened_for, run
+    from sagline.sweep.running import MOST_WORKERS, open_matching_folder, run
 
     count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
     if scheduler is not None:
@@ -86,7 +86,7 @@ def sweep(
     check_folder(folder)
     create_folder(folder.absolute().parent)
     if (folder / "done").exists():  # another's is refused here, where nobody is told that it could be gone on with
-        opened_for(folder, request)
+        open_matching_folder(folder, request)
     again = _again(file, folder, workers, scheduler)
     what = f"{len(request):,} requests"
     try:

@@ -1,1 +1,1 @@
-"""What comes too near to what: cables as they hang, the platform, and what stands around."""
+"""Interference: clearances between cables, platform and obstacles."""

@@ -1,4 +1,4 @@
-"""How near a robot's cables and platform come to each other and to what stands around."""
+"""Least distances between a robot's cables, its platform and obstacles."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BLOCK = 1024  # poses
 
 
 class Distances(NamedTuple):
-    """Of N poses and P pairs.
+    """Distances of P pairs at N poses.
 
     Attributes:
         value: Distances less radii [m], shape (N, P); NaN where a cable has no tension.
@@ -44,7 +44,7 @@ class Distances(NamedTuple):
 
 
 class ClearanceRows:
-    """What is measured at every pose of a robot, made once.
+    """Distances at batches of poses, with everything but the poses prepared once.
 
     Attributes:
         pairs: Names, numbers and what is left out.
@@ -60,7 +60,7 @@ class ClearanceRows:
         platform: Box | Mesh | None = None,
         from_anchor: float | None = None,
     ) -> None:
-        """Make ready; arguments are checked already, as of `clearance`."""
+        """Prepare; the arguments are those of `clearance`, checked."""
         self._precision = precision
         self._radius = cable_radius
         self._from_anchor = 0.0 if from_anchor is None else from_anchor
@@ -105,7 +105,7 @@ class ClearanceRows:
         return out
 
     def least(self, state: Equilibrium) -> tuple[Array, Indices]:
-        """Least distance of all pairs at every pose: a third of the time that every pair takes.
+        """Least distance of all pairs at every pose, in a third of the time of `distances`.
 
         Args:
             state: The equilibrium, a batch of N poses.
@@ -122,7 +122,7 @@ class ClearanceRows:
         return np.where(lost, np.nan, found.min(axis=1)), pair
 
     def _moving(self, state: Equilibrium) -> Array:
-        """Rows of what moves: the parts of cables, and the platform or what stands for it."""
+        """Rows of the moving bodies: parts of cables, and the platform or a placeholder."""
         diameter = state.cables.cable.diameter
         known = np.zeros(1) if diameter is None else 0.5 * diameter
         cables = cable_rows(state, known if self._radius is None else self._radius)
@@ -134,12 +134,12 @@ class ClearanceRows:
 
 
 def _box_row(one: Box | Mesh) -> Array:
-    """The row of a box; of a mesh one that stands for it, so that obstacles keep their numbers."""
+    """Row of a box; of a mesh a placeholder, so that obstacles keep their numbers."""
     return box_rows(one if isinstance(one, Box) else Box(np.ones(3)))
 
 
 def platform_of(robot: Robots) -> Box | None:
-    """The platform as a box of its size around its anchors, as it is drawn; None where no size is given.
+    """Platform as a box of its size around its anchors; None where no size is given.
 
     Raises:
         InvalidValueError: If several robots have platforms of several forms.
@@ -195,16 +195,16 @@ class Clearances(Result):
 
     @property
     def low(self) -> Array:
-        """Proved: nothing is nearer to anything [m], shape () or (N,)."""
+        """Proved lower bound of all distances [m], shape () or (N,)."""
         return self._least(self.pair_low)
 
     @property
     def between(self) -> Any:
-        """What is nearest to what: two names, or N times two for N poses; a sentence where nothing is known."""
+        """Nearest pair: two names, or N times two for N poses; a sentence where nothing is known."""
         return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
 
     def __str__(self) -> str:
-        """The nearest pairs, in a few lines."""
+        """Nearest pairs, in a few lines."""
         rows = np.atleast_2d(self.pair_distance)
         lost = int(np.isnan(rows).any(axis=1).sum())
         least = np.where(np.isnan(rows), np.inf, rows)
@@ -304,18 +304,7 @@ def clearance(
 
 
 def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
-    """What stands around a robot, one thing or several, checked.
-
-    Args:
-        given: As of `clearance`.
-        robot: The robot.
-
-    Returns:
-        All of them.
-
-    Raises:
-        InvalidValueError: If it is something else, or a mesh is 100 times as large as the robot.
-    """
+    """Obstacles as a tuple, checked; a mesh 100 times as large as the robot is refused."""
     found = obstacles_of(given, "obstacles")
     for one in found:
         if isinstance(one, Mesh):

@@ -80,7 +80,7 @@ class Mesh(Result):
 
     @property
     def volume(self) -> float:
-        """What it encloses [m^3]; negative for a room."""
+        """Enclosed volume [m^3]; negative for a room."""
         a, b, c = np.moveaxis(self.vertices[self.faces] - self.bounds.mean(axis=0), 1, 0)
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
@@ -101,7 +101,7 @@ class Mesh(Result):
         return Mesh(pose.transform(self.vertices), self.faces, self.name)
 
     def encloses(self, points: ArrayLike) -> Flags:
-        """Whether points lie in the solid.
+        """True for points in the solid.
 
         By how often the surface winds around them, which is right on edges and corners' shadows too.
 
@@ -140,7 +140,7 @@ def _faces(given: Any, corners: int) -> Indices:
 
 
 def open_edges(faces: Indices) -> int:
-    """How many edges are not run along as often one way as the other."""
+    """Number of edges without a neighbor in the opposite direction."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = int(faces.max()) + 1
     ways = np.concatenate((start * count + end, end * count + start))
@@ -150,13 +150,13 @@ def open_edges(faces: Indices) -> int:
 
 
 def extent_text(corners: Array) -> str:
-    """How large something is, for a message."""
+    """Extent as text for a message."""
     edges = " x ".join(f"{edge:.4g}" for edge in np.ptp(corners, axis=0))
     return f"{edges} m"
 
 
 def _winding(triangles: Array, points: Array) -> Array:
-    """How often a surface (F, 3, 3) winds around points (K, 3): solid angles over 4 pi (van Oosterom 1983)."""
+    """Winding number of a surface (F, 3, 3) around points (K, 3): solid angles over 4 pi (van Oosterom 1983)."""
     a, b, c = np.moveaxis(triangles - points[:, None, None], 2, 0)
     la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
     volume = np.einsum("kfi,kfi->kf", a, np.cross(b, c))

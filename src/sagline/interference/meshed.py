@@ -53,7 +53,7 @@ class Solid(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """A distance [m], what is proved of it, and the points between which it is."""
+    """Distance [m], its proved lower bound, and the nearest points."""
 
     value: float
     low: float
@@ -62,19 +62,10 @@ class Nearest(NamedTuple):
 
 
 class Meshed:
-    """The pairs of which at least one is a mesh, made ready once."""
+    """The pairs of which at least one is a mesh, prepared once."""
 
     def __init__(self, pairs: Pairs, forms: tuple[Form | None, ...], precision: float) -> None:
-        """Make ready.
-
-        Args:
-            pairs: What is measured.
-            forms: The platform, or None, and what stands around, in the order of their numbers.
-            precision: How far the lower bound may stay below a distance [m].
-
-        Raises:
-            SaglineError: If python-fcl is missing.
-        """
+        """Prepare the forms, which are the platform, or None, and the obstacles in the order of their numbers."""
         self._fcl = package()
         self._pairs, self._precision, self._parts = pairs, precision, len(pairs.parts)
         taking_part = {int(number) for number in pairs.with_mesh.ravel() if number >= self._parts}
@@ -142,7 +133,7 @@ class Meshed:
         return Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
 
     def _within(self, point: Array, of: int, number: int, at: dict[int, tuple[Array, Array]]) -> bool:
-        """Whether a point of a body, in its own frame, lies in another's solid."""
+        """True if a point of a body, in its own frame, lies in another's solid."""
         mesh = self._solids[number].mesh
         if mesh is None:
             return False
@@ -158,7 +149,7 @@ class Meshed:
         return self._known[key]
 
     def _of_cable(self, row: Array, number: int, at: dict[int, tuple[Array, Array]], enough: float) -> Nearest:
-        """A cable, by its pieces: those that may be nearer than what is known are split."""
+        """Distance of a cable, by branch and bound over its pieces."""
         body, radius = self._object(number, at), float(row[shapes.RADIUS])
         enough += radius
         nearest = (inf, 0.0, np.zeros(3), np.zeros(3))  # of the cable's own points
@@ -203,11 +194,7 @@ class Meshed:
 
 
 def package() -> ModuleType:
-    """python-fcl, loaded on first use.
-
-    Raises:
-        SaglineError: If it is missing; the message says how to install it.
-    """
+    """python-fcl, loaded on first use; the error says how to install it."""
     try:
         import fcl
     except ImportError:
@@ -223,7 +210,7 @@ def _pieces(row: Array, ranges: list[tuple[float, float]]) -> Array:
 
 
 def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
-    """Where a capsule of fcl, which lies along z around its middle, lies between two points, and how long it is."""
+    """Placement of a capsule of fcl (along z around its middle) between two points, and its length."""
     run = end - start
     length = sqrt(float(run @ run))
     x, y, z = (run / length).tolist() if length > 0.0 else (0.0, 0.0, 1.0)
@@ -232,7 +219,7 @@ def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
 
 
 def _proved(low: float, value: float, place: Array) -> float:
-    """A lower bound less what rounding may have done, and not below 0."""
+    """Lower bound less the rounding errors, >= 0."""
     return max(min(low, value) - ROUNDING * (1.0 + value + float(np.abs(place).max())), 0.0)
 
 
@@ -241,7 +228,7 @@ def _polished(
     nearest: tuple[float, float, Array, Array],
     row: Array,
 ) -> tuple[float, float, Array, Array]:
-    """The nearest point around one that is near, by golden sections and parabolas (Brent)."""
+    """Nearest point of a cable around a near one, by golden sections and parabolas (Brent)."""
     from scipy.optimize import minimize_scalar
 
     reach = 0.02 * float(row[shapes.LAST] - row[shapes.FIRST])

@@ -1,4 +1,4 @@
-"""What stands around a robot and has a simple form: boxes, capsules and spheres, at rest in the world."""
+"""Obstacles of simple form: boxes, capsules and spheres at rest in the world, and the beams of a frame."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Box(Result):
 
 
 def _rotation(matrix: Array) -> Array:
-    """A rotation as it is, or the nearest one of what is a rotation but for rounding; then it is the same again."""
+    """Rotation matrix as given, or the nearest one where it differs by more than rounding."""
     nearest = Pose(np.zeros(3), matrix).matrix
     return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
 

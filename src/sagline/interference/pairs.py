@@ -19,7 +19,7 @@ from sagline.robot.several import Robots, anchors_of
 
 
 class Part(NamedTuple):
-    """What of a cable counts: all of it, or all but its beginning at the frame, its end at the platform, or both."""
+    """A whole cable, or a cable without an end at the frame, at the platform, or both."""
 
     cable: int
     off_frame: bool = False
@@ -27,15 +27,7 @@ class Part(NamedTuple):
 
 
 def cable_rows(state: Equilibrium, radius: Array) -> Array:
-    """Every cable as it hangs at every pose, from where it leaves the frame; NaN where it has no tension.
-
-    Args:
-        state: The equilibrium, single or N poses.
-        radius: Half the diameters [m], shape (m,) or (N, m).
-
-    Returns:
-        Shape (m, shapes.COLUMNS) or (N, m, shapes.COLUMNS).
-    """
+    """Rows of cables from the exit point on, radius (m,) or (N, m) [m]; NaN where there is no tension."""
     cables, ends = state.cables, platform_ends(state)
     exits = state.exit_point
     out = np.zeros((*cables.shape, shapes.COLUMNS))
@@ -70,17 +62,7 @@ def platform_ends(state: Equilibrium) -> Array:
 
 
 def parts_of(cables: Array, lengths: Array, parts: tuple[Part, ...], left_out: float) -> Array:
-    """Rows of parts of cables: so much unstrained length of an end left out, of a shorter cable all but its other end.
-
-    Args:
-        cables: Of `cable_rows`, shape (N, m, COLUMNS).
-        lengths: Unstrained lengths [m], shape (N, m).
-        parts: Which.
-        left_out: How much [m].
-
-    Returns:
-        Shape (N, len(parts), COLUMNS).
-    """
+    """Rows (N, len(parts), COLUMNS) of parts of cables, without an unstrained length `left_out` [m] of an end."""
     out = cables[:, [part.cable for part in parts]]
     for k, part in enumerate(parts):
         share = np.minimum(left_out / lengths[:, part.cable], 0.5 if part.off_frame and part.off_platform else 1.0)
@@ -92,7 +74,7 @@ def parts_of(cables: Array, lengths: Array, parts: tuple[Part, ...], left_out: f
 
 
 def rod_row(rod: Capsule | Sphere) -> Array:
-    """A capsule or sphere, shape (COLUMNS,)."""
+    """Row of a capsule or sphere, shape (COLUMNS,)."""
     start, end = (rod.start, rod.end) if isinstance(rod, Capsule) else (rod.center, rod.center)
     out = np.zeros(shapes.COLUMNS)
     run = end - start
@@ -105,7 +87,7 @@ def rod_row(rod: Capsule | Sphere) -> Array:
 
 
 def box_rows(box: Box, pose: Pose | None = None) -> Array:
-    """A box at rest, shape (COLUMNS,), or taken along by a pose or N of them, shape (N, COLUMNS)."""
+    """Row of a box at rest, (COLUMNS,), or of one that moves with N poses, (N, COLUMNS)."""
     shape = () if pose is None else pose.shape
     out = np.zeros((*shape, shapes.COLUMNS))
     turn = box.orientation if pose is None else pose.matrix @ box.orientation
@@ -124,7 +106,7 @@ _NO_LENGTH = "cables and platform: give from_anchor, how much of a cable next to
 
 
 class Pairs(NamedTuple):
-    """What is measured. Bodies are numbered: parts of cables, the platform whether there is one or not, obstacles.
+    """Pairs of bodies. Their numbers count parts of cables, then the platform (with or without form), then obstacles.
 
     Attributes:
         parts: Parts of cables that take part.
@@ -144,17 +126,7 @@ class Pairs(NamedTuple):
 def pairs_of(
     robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
 ) -> Pairs:
-    """All pairs of a robot and what stands around.
-
-    Args:
-        robot: The robot or robots.
-        obstacles: What stands around.
-        platform: The platform's form, or None.
-        from_anchor: Whether pairs that share an anchor are measured from some way on; else they are left out.
-
-    Returns:
-        Pairs.
-    """
+    """All pairs of a robot and its obstacles; pairs that share an anchor are left out unless `from_anchor`."""
     at_frame, at_platform = (_together(anchors) for anchors in anchors_of(robot))
     cables = range(len(at_frame))
     found: list[tuple[Part | int, Part | int]] = []  # a cable's part, -1 the platform, or the number of an obstacle
@@ -196,14 +168,14 @@ def pairs_of(
 
 
 def _together(anchors: Array) -> NDArray[np.bool_]:
-    """Which cables share an anchor, of any of several robots, shape (m, m)."""
+    """Mask of cables that share an anchor in any of several robots, shape (m, m)."""
     apart = np.linalg.norm(anchors[..., :, None, :] - anchors[..., None, :, :], axis=-1)
     same: NDArray[np.bool_] = (apart <= _SAME * max(1.0, float(np.abs(anchors).max()))).reshape(-1, *apart.shape[-2:])
     return np.asarray(same.any(axis=0))
 
 
 def _names(obstacles: tuple[Obstacle, ...]) -> list[str]:
-    """Names of the obstacles; of those that bear one name the second is called so, and 2."""
+    """Names of the obstacles; a repeated name gets a number."""
     names: list[str] = []
     for one in obstacles:
         again = sum(other.name == one.name for other in obstacles[: len(names)])

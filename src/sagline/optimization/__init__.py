@@ -1,1 +1,1 @@
-"""Better robots: what may change, what is wanted, and who searches."""
+"""Design optimization: design variables, goals, optimizers and results."""

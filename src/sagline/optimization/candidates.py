@@ -1,4 +1,4 @@
-"""Candidates: points of the unit cube, the numbers that these stand for, and the robots that have them."""
+"""Candidates of a design search: points of the unit cube, their design variables, and the robots."""
 
 from __future__ import annotations
 
@@ -22,19 +22,10 @@ TWINS = 1e-9  # m: two cables whose ends are nearer than this are one
 
 
 class Candidates:
-    """All robots that differ from one in its free parts."""
+    """All robots that differ from one in its design variables."""
 
     def __init__(self, robot: Robot, free: Sequence[Free], item: str = "free") -> None:
-        """Bind the free parts to the robot.
-
-        Args:
-            robot: The robot that the search begins with.
-            free: What may change.
-            item: How messages call it.
-
-        Raises:
-            InvalidValueError: If the robot does not have a part, or two are the same.
-        """
+        """Bind the design variables to the robot that the search begins with; `item` names them in messages."""
         self.robot = robot
         self.free = free_parts(free, item)
         self._bound: list[Bound] = [one.bound(robot, f"{item}[{k}]") for k, one in enumerate(self.free)]
@@ -50,28 +41,28 @@ class Candidates:
 
     @property
     def start(self) -> Array:
-        """What the robot itself has, shape (d,)."""
+        """Design variables of the first robot, shape (d,)."""
         return np.array([part.start for part in self.parts])
 
     def units(self, values: Array) -> Array:
-        """Points of the unit cube that stand for numbers, both (N, d); a choice is the middle of its share."""
+        """Points of the unit cube of design variables, both (N, d); a choice is the middle of its interval."""
         span = np.where(self._choices > 0, self._choices, self._high - self._low)
         return np.asarray((values - self._low + 0.5 * (self._choices > 0)) / span)
 
     def values(self, points: Array) -> Array:
-        """Numbers of points of the unit cube, both (N, d)."""
+        """Design variables of points of the unit cube, both (N, d)."""
         inside = np.minimum(self._low + points * (self._high - self._low), self._high)
         chosen = np.minimum(np.floor(points * self._choices), self._choices - 1)
         return np.asarray(np.where(self._choices > 0, chosen, inside))
 
     def cables(self, values: Array) -> Array:
-        """Tables of cables of numbers (N, d), shape (N, m, CABLE_COLUMNS)."""
+        """Cable tables (N, m, CABLE_COLUMNS) of design variables (N, d)."""
         found = np.repeat(self._table[None], len(values), axis=0)
         self.write(found, values)
         return found
 
     def write(self, cables: Array, values: Array) -> None:
-        """Change tables of cables (N, m, CABLE_COLUMNS) in place, by numbers (N, d)."""
+        """Set design variables (N, d) in cable tables (N, m, CABLE_COLUMNS), in place."""
         first = 0
         for bound in self._bound:
             last = first + len(bound.parts)
@@ -79,7 +70,7 @@ class Candidates:
             first = last
 
     def costs(self, values: Array) -> Array | None:
-        """What a meter of cable costs, shape (N,); None where no catalogue says it.
+        """Cost of a meter of cable, shape (N,); None without a catalogue.
 
         Raises:
             InvalidValueError: If a cable of the catalogue has no cost.
@@ -95,15 +86,7 @@ class Candidates:
         return None
 
     def robots(self, values: Array, names: Sequence[str]) -> tuple[Robot, ...]:
-        """Candidates as robots, checked like any.
-
-        Args:
-            values: Their numbers, shape (N, d).
-            names: What they are called.
-
-        Raises:
-            InvalidValueError: If a robot is none.
-        """
+        """Robots of design variables (N, d), checked like any robot."""
         return tuple(
             self._robot(table, own, name) for table, own, name in zip(self.cables(values), values, names, strict=True)
         )
@@ -135,15 +118,7 @@ class Candidates:
 
 
 def free_parts(free: object, item: str) -> tuple[Free, ...]:
-    """Free parts as a tuple.
-
-    Args:
-        free: One, or a sequence of them.
-        item: How messages call it.
-
-    Raises:
-        InvalidValueError: If there is something else among them.
-    """
+    """Design variables as a tuple, checked; `item` names them in messages."""
     given = [free] if isinstance(free, Free) else free
     step = 'Give [FreeAnchors("frame", low, high), ...].'
     allowed = "a sequence of FreeAnchors, FreeCable and FreeLimit"
@@ -156,7 +131,7 @@ def free_parts(free: object, item: str) -> tuple[Free, ...]:
 
 
 def impossible(cables: Array) -> Flags:
-    """Which tables of cables (N, m, CABLE_COLUMNS) are no robot's: two cables are one, or limits are crossed, (N,)."""
+    """Mask (N,) of cable tables (N, m, CABLE_COLUMNS) with coincident cables or crossed tension limits."""
     ends = cables[..., : tables.PLATFORM_Z + 1]
     first, second = np.triu_indices(cables.shape[1], 1)
     apart = np.abs(ends[:, first] - ends[:, second]).max(axis=-1, initial=0.0)
@@ -165,15 +140,10 @@ def impossible(cables: Array) -> Flags:
 
 
 class Solid:
-    """The platform as a box, at poses: no frame anchor may be inside it."""
+    """Platform as a box at G poses, which no frame anchor may enter."""
 
     def __init__(self, robot: Robot, poses: Pose) -> None:
-        """Take the platform's size, or else what its anchors span.
-
-        Args:
-            robot: The robot.
-            poses: A batch of G.
-        """
+        """Take the platform's size, or else the extent of its anchors."""
         low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
         self._half = 0.5 * ((high - low) if robot.platform_size is None else robot.platform_size)
         self._middle = 0.5 * (low + high)
@@ -181,14 +151,7 @@ class Solid:
         self._reach = float(np.linalg.norm(np.abs(self._middle) + self._half))
 
     def holds(self, points: Array) -> Indices:
-        """At which pose a point is inside the platform, -1 where at none.
-
-        Args:
-            points: World axes [m], shape (..., 3).
-
-        Returns:
-            Shape (...).
-        """
+        """Index of the first pose at which a point (..., 3) [m] is inside the platform, -1 for none, shape (...)."""
         flat = points.reshape(-1, 3)
         found = np.full(len(flat), -1)
         low, high = self._position.min(axis=0) - self._reach, self._position.max(axis=0) + self._reach
@@ -220,7 +183,7 @@ class AnchorErrors:
     seed: int
 
     def __init__(self, deviation: float, *, samples: int = 8, take: str = "worst", seed: int = 0) -> None:
-        """Check them.
+        """Check deviation, samples, take and seed.
 
         Args:
             deviation: Standard deviation of each coordinate [m], > 0.
@@ -245,7 +208,7 @@ class AnchorErrors:
         )
 
     def added(self, cables: Array) -> Array:
-        """Tables of robots whose anchors err.
+        """Cable tables of robots with anchor errors.
 
         Args:
             cables: Tables of candidates, shape (N, m, CABLE_COLUMNS).

@@ -1,4 +1,4 @@
-"""A better robot: what is free of it is searched for what it should be better at."""
+"""Design search: the design variables of a robot are optimized for goals."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sagline.optimization.folder import open_record
 from sagline.optimization.free import Free
 from sagline.optimization.front import Front, Ledger
 from sagline.optimization.goals import Goal
-from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, poses_of, requested
+from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, checked_request, poses_of
 from sagline.optimization.search import SEARCHES, Task, latin_hypercube, population_of
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
@@ -93,7 +93,7 @@ def design(
     """
     callback(progress, "progress")
     places = poses_of(instance(robot, Robot, "robot"), poses, box, grid)
-    request = requested(robot, free, goals, wrenches, places, model, inner, robust, optimizer, seed)
+    request = checked_request(robot, free, goals, wrenches, places, model, inner, robust, optimizer, seed)
     candidates = request.candidates
     dimensions = len(candidates.parts)
     population = population_of(optimizer, dimensions)

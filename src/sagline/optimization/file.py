@@ -1,4 +1,4 @@
-"""Design files: what of a robot is free, and what it should be better at, in YAML."""
+"""Design files: design variables and goals, in YAML."""
 
 from __future__ import annotations
 
@@ -84,11 +84,11 @@ class _Part(Entry):
     """A mapping in a design file."""
 
     def si(self, key: str, unit: str) -> Any:
-        """A key's quantity in SI."""
+        """Quantity of a key in SI."""
         return in_si(getattr(self, key), unit, key)
 
     def given(self, units: dict[str, str]) -> dict[str, Any]:
-        """Quantities of those keys that are given."""
+        """Quantities of the keys that are given."""
         return {key: self.si(key, unit) for key, unit in units.items() if key in self.model_fields_set}
 
 
@@ -135,7 +135,7 @@ class _Free(_Part):
     cable: list[_Choice] = []  # noqa: RUF012 - pydantic copies it
 
     def free(self, item: str) -> Free:
-        """The one thing that it names."""
+        """Design variable of the entry."""
         keys = list(_Free.model_fields)
         given = [key for key in keys if getattr(self, key)]
         if len(given) != 1:
@@ -160,11 +160,11 @@ class _Goal(_Part):
     @model_validator(mode="before")
     @classmethod
     def _accept_name(cls, data: object) -> object:
-        """A word is the goal's name."""
+        """Accept the name of a goal alone."""
         return {"goal": data} if isinstance(data, str) else data
 
     def wanted(self) -> Goal:
-        """The goal."""
+        """Goal of the entry."""
         given = [way for way in WAYS if getattr(self, way) is not None]
         if len(given) != 1:
             value = f"given by {' and '.join(given)}" if given else "missing"
@@ -181,7 +181,7 @@ class _Accelerations(_Part):
     angular: Any = 0.0
 
     def loads(self) -> WrenchSet:
-        """Their loads."""
+        """Loads of the accelerations."""
         return Accelerations(linear=self.si("linear", "m/s^2"), angular=self.si("angular", "rad/s^2"))
 
 
@@ -192,7 +192,7 @@ class _Wrenches(_Part):
     accelerations: _Accelerations | None = None
 
     def wrenches(self) -> WrenchSet:
-        """A box, and loads of accelerations added to it."""
+        """Box of wrenches, plus loads of accelerations."""
         center = self.center
         if isinstance(center, list) and len(center) == 6:
             center = [in_si(one, "N" if k < 3 else "N*m", f"center[{k}]") for k, one in enumerate(center)]
@@ -205,7 +205,7 @@ class _Box(_Part):
     high: Any
 
     def box(self) -> PoseBox:
-        """The box."""
+        """Box of positions."""
         return PoseBox(self.si("low", "m"), self.si("high", "m"))
 
 
@@ -216,7 +216,7 @@ class _Robust(_Part):
     seed: int = 0
 
     def errors(self) -> AnchorErrors:
-        """The sample."""
+        """Sample of anchor errors."""
         return AnchorErrors(self.si("deviation", "m"), samples=self.samples, take=self.take, seed=self.seed)
 
 
@@ -233,7 +233,7 @@ class _Design(_Part):
     seed: int = 0
 
     def arguments(self) -> dict[str, Any]:
-        """Those of `design` that the file gives."""
+        """Arguments of `design` that the file gives."""
         found: dict[str, Any] = {
             "free": [one.free(f"free[{k}]") for k, one in enumerate(self.free)],
             "goals": [_made(f"goals[{k}]", one.wanted) for k, one in enumerate(self.goals)],
@@ -255,11 +255,7 @@ class _Design(_Part):
 
 
 def _made(item: str, make: Callable[[], T]) -> T:
-    """What a part of the file makes; its errors name the part.
-
-    Raises:
-        InvalidValueError: If it makes none.
-    """
+    """Object made from a part of the file; its errors name the part."""
     try:
         return make()
     except InvalidValueError as error:

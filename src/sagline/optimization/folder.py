@@ -1,4 +1,4 @@
-"""The folder of a search for better robots: what was rated, to go on from there; and in the end the robots.
+"""Folder of a design search: rated candidates, from which the search continues, and the resulting robots.
 
 `design.json` says which search it is, by a digest of all that was asked but for how many evaluations. `evaluations.csv`
 has a line a candidate, appended generation by generation, each with a checksum: a line that a crash or a full disk cut
@@ -37,27 +37,14 @@ ANOTHER: Final = "Name another folder, or remove this one."
 
 
 class DesignFolder:
-    """What a search knows, and where it adds to it."""
+    """Record of a design search: known candidates (K, d + g), and the file to which others are appended."""
 
     def __init__(self, file: Path, handle: int, known: Array) -> None:
-        """Adopt an open file.
-
-        Args:
-            file: Its path, for messages.
-            handle: Open for appending.
-            known: Numbers and goals in it, shape (K, d + g).
-        """
+        """Adopt an open file."""
         self._file, self._handle, self.known = file, handle, known
 
     def add(self, rows: Array) -> None:
-        """Append rows, down to the disk.
-
-        Args:
-            rows: Numbers and goals of candidates, shape (N, d + g).
-
-        Raises:
-            FileError: If the disk takes no more; what was there before stays.
-        """
+        """Append design variables and goals of candidates, shape (N, d + g), and flush them to the disk."""
         self.add_lines([repr(float(x)) for x in row] for row in rows)
 
     def add_lines(self, lines: Iterable[list[str]]) -> None:
@@ -78,7 +65,7 @@ class DesignFolder:
 
 @contextmanager
 def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
-    """The record of a search in a folder, begun or gone on with.
+    """Open the record of a search in a folder, new or continued.
 
     Args:
         folder: The folder; created if missing.
@@ -116,19 +103,12 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
 
 
 def digest_of(request: Request) -> str:
-    """A digest of all that a search is asked, but for how many evaluations.
-
-    Args:
-        request: The request.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Digest of a request, 64 hexadecimal digits; the number of evaluations does not enter."""
     return sha256(_canonical(request).encode()).hexdigest()
 
 
 def _canonical(value: Any) -> str:
-    """A text in which any two values that differ, differ."""
+    """Text that differs for any two values that differ."""
     if isinstance(value, np.ndarray):
         return f"array({value.dtype.str}, {value.shape}, {np.ascontiguousarray(value).tobytes().hex()})"
     if is_dataclass(value) or attrs.has(type(value)):
@@ -165,7 +145,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
 
 
 def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
-    """Rows of whole lines, and how many bytes these take; a cut off end is left out.
+    """Rows of complete lines, and their size in bytes; an incomplete last line is ignored.
 
     Raises:
         FileError: If another line is damaged.
@@ -192,7 +172,7 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
 
 
 def _line(cells: list[str]) -> str:
-    """A line of CSV whose last cell is a checksum over those before."""
+    """Line of CSV whose last cell is a checksum of the others."""
     text = StringIO()
     csv.writer(text, lineterminator="").writerow(cells)
     return f"{text.getvalue()},{crc32(text.getvalue().encode()):08x}\n"

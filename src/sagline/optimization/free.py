@@ -19,7 +19,7 @@ from sagline.robot.robot import Robot
 
 
 class Part(NamedTuple):
-    """One number that may change.
+    """One design variable.
 
     Attributes:
         name: What it is, as messages and tables call it.
@@ -39,7 +39,7 @@ class Part(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """A `Free` of a robot.
+    """Design variables of a given robot.
 
     Attributes:
         parts: The K numbers that may change.
@@ -51,12 +51,12 @@ class Bound(NamedTuple):
 
 
 class Free(ByFields):
-    """A part of a robot that may change: `FreeAnchors`, `FreeCable` or `FreeLimit`."""
+    """Design variables: `FreeAnchors`, `FreeCable` or `FreeLimit`."""
 
     __slots__ = ()
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """What it means for a robot.
+        """Design variables of a given robot.
 
         Args:
             robot: The robot that the search begins with.
@@ -77,7 +77,7 @@ def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -
 
 
 def cable_numbers(cables: Any, item: str) -> tuple[int, ...]:
-    """Numbers of cables that a caller gives, each once."""
+    """Cable numbers given by a caller, each once, checked."""
     given = list(cables) if isinstance(cables, Sequence | np.ndarray) and not isinstance(cables, str) else []
     found = [integer(one) for one in given]
     if not found or any(one is None or one < 0 for one in found) or len(set(found)) < len(found):
@@ -87,7 +87,7 @@ def cable_numbers(cables: Any, item: str) -> tuple[int, ...]:
 
 
 def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices:
-    """Those of a robot, all of them for none."""
+    """Cable numbers checked against a robot; all cables if none is given."""
     wrong = [one for one in cables if one >= robot.cable_count]
     if wrong:
         step = f"{robot.name} has {robot.cable_count} cables, numbered from 0."
@@ -96,7 +96,7 @@ def cables_of_robot(cables: tuple[int, ...], robot: Robot, item: str) -> Indices
 
 
 def whose_text(cables: Indices, count: int) -> str:
-    """How names say which cables are meant; nothing for all."""
+    """Suffix of a name for some of the cables; empty for all."""
     return "" if len(cables) == count else f"[{' '.join(map(str, cables))}]"
 
 
@@ -120,7 +120,7 @@ class CableChoice:
     tension_max: float | None
 
     def __init__(self, name: str, cable: Cable, *, cost: float | None = None, tension_max: float | None = None) -> None:
-        """Check them.
+        """Check name, cable, cost and limit.
 
         Args:
             name: What it is called.
@@ -152,7 +152,7 @@ class FreeCable(Free):
     catalogue: tuple[CableChoice, ...]
 
     def __init__(self, catalogue: Sequence[CableChoice]) -> None:
-        """Check it.
+        """Check the catalogue.
 
         Args:
             catalogue: Two cables or more; the robot's own is among them.
@@ -171,7 +171,7 @@ class FreeCable(Free):
         object.__setattr__(self, "catalogue", entries)
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """What it means for a robot."""
+        """Design variables of a given robot."""
         own = robot.cables
         for k, one in enumerate(self.catalogue):
             pairs = ((own.linear_density, one.cable.linear_density), (own.axial_stiffness, one.cable.axial_stiffness))
@@ -215,7 +215,7 @@ class FreeLimit(Free):
     cables: tuple[int, ...]
 
     def __init__(self, which: str, low: float, high: float, *, cables: Sequence[int] | None = None) -> None:
-        """Check them.
+        """Check limit, bounds and cables.
 
         Args:
             which: "tension_min" or "tension_max".
@@ -237,7 +237,7 @@ class FreeLimit(Free):
         set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=named)
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """What it means for a robot."""
+        """Design variables of a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         own = getattr(robot, self.which)[cables]
         name = f"{self.which}{whose_text(cables, robot.cable_count)}"

@@ -25,18 +25,14 @@ _ON_PLANE: Final = 1e-9  # of the extent of the anchors
 
 
 def symmetry_of(given: Any) -> Symmetry | None:
-    """One of the symmetries, or None.
-
-    Raises:
-        InvalidValueError: If it is neither.
-    """
+    """Symmetry, checked, or None."""
     return None if given is None else str(choice(given, "symmetry", NAMES))
 
 
-def followed(
+def symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
-    """How far each anchor is shifted along each direction, per meter of shift of the one that leads.
+    """Shifts of all anchors per meter of shift of the leading one, along each direction.
 
     Args:
         symmetry: One of `NAMES`, or None for anchors that move by themselves.
@@ -76,7 +72,7 @@ def _turned(anchors: Array, along: Array, item: str) -> Array:
 
 
 def _mirrored(symmetry: str, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str) -> Array:
-    """The side on which an anchor is says which way it goes; on the plane it stays there."""
+    """Mirrored shifts (K, c, 3): the side of an anchor gives the sign; an anchor on the plane stays on it."""
     shifts = np.repeat(along[:, None, :], len(anchors), axis=1)
     for axis in ("xyz".index(name) for name in symmetry):
         low, high = float(anchors[:, axis].min()), float(anchors[:, axis].max())
@@ -136,7 +132,7 @@ class FreeAnchors(Free):
         cables: Sequence[int] | None = None,
         symmetry: str | None = None,
     ) -> None:
-        """Check them.
+        """Check end, shifts, directions, cables and symmetry.
 
         Args:
             end: "frame" or "platform".
@@ -176,13 +172,13 @@ class FreeAnchors(Free):
         )
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """What it means for a robot."""
+        """Design variables of a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         anchors = robot.frame_anchors if self.end == "frame" else robot.platform_anchors
         parts: list[Part] = []
         rates: list[Array] = []
         names = _direction_names(self.along)
-        shifts = followed(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
+        shifts = symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
         for which, moved in shifts:  # moved: of each cable, for each direction (K, c, 3)
             for k, name in enumerate(names):
                 rate = np.zeros((robot.cable_count, tables.CABLE_COLUMNS))
@@ -222,7 +218,7 @@ def _shifts(value: ArrayLike, item: str, count: int) -> Array:
 
 
 def _direction_names(along: Array) -> list[str]:
-    """x, y and z where that is what they are, else the vector."""
+    """Axis names x, y, z, or the components of the direction."""
     names = []
     for vector in along:
         axis = np.flatnonzero(np.abs(vector) > 1.0 - _UNIT)

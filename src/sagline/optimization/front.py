@@ -1,4 +1,4 @@
-"""What a search for better robots found."""
+"""Result of a design search, and the ledger of its rated candidates."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Front(Result):
 
     @property
     def text(self) -> str:
-        """What came out, in a sentence."""
+        """Summary in a sentence."""
         count, name = len(self.evaluated), self.start.name
         if not self.better:
             return f"None of {count:,} robots is better than {name}: widen what is free, or allow more evaluations."
@@ -109,21 +109,12 @@ class Front(Result):
         return [place / name for name in names]
 
     def __str__(self) -> str:
-        """The sentence."""
+        """Summary in a sentence."""
         return self.text
 
 
 def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
-    """Values of goals as costs, of which the least are wanted, each in what counts as one of it.
-
-    Args:
-        values: Shape (N, g), NaN where a candidate is no robot.
-        goals: The goals.
-        start: Values of the first robot, shape (g,).
-
-    Returns:
-        Shape (N, g), finite: no worse than PENALTY, which is what a candidate gets that is no robot.
-    """
+    """Costs (N, g) to minimize from goal values (N, g), scaled and limited to PENALTY; twice that for NaN."""
     signs = np.array([-1.0 if goal.maximize else 1.0 for goal in goals])
     scales = np.array([scale_of(goal, value) for goal, value in zip(goals, start, strict=True)])
     costs = np.nan_to_num(signs * values / scales, nan=2.0 * PENALTY, posinf=PENALTY, neginf=-PENALTY)
@@ -134,20 +125,20 @@ PENALTY = 1e9  # what a goal counts at most, many times more than any is worth
 
 
 def scale_of(goal: Goal, start: float) -> float:
-    """What counts as one of a goal, in its unit: its own scale, or what the first robot has."""
+    """Scale of a goal, in its unit: its own, or the value of the first robot."""
     if goal.scale is not None:
         return goal.scale
     return abs(float(start)) if np.isfinite(start) and start != 0.0 else 1.0
 
 
-def weighted(costs: Array, goals: tuple[Goal, ...]) -> Array:
-    """Costs (N, g) as one, by the goals' weights, shape (N,)."""
+def weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
+    """Weighted sum (N,) of costs (N, g)."""
     weights = np.array([goal.weight for goal in goals])
     return np.asarray(np.einsum("ng,g->n", costs, weights / weights.sum()))
 
 
-def best_of_front(costs: Array) -> Indices:
-    """Candidates that no other beats in one goal without losing in another, of costs (N, g); of equals the first."""
+def pareto_front(costs: Array) -> Indices:
+    """Indices of the Pareto-optimal candidates of costs (N, g); of equal ones the first."""
     _, first = np.unique(costs, axis=0, return_index=True)
     kept = np.sort(first)
     own = costs[kept]
@@ -176,17 +167,7 @@ class Ledger:
         evaluations: int,
         progress: Progress | None,
     ) -> None:
-        """Begin.
-
-        Args:
-            request: What is asked.
-            candidates: Its candidates.
-            evaluations: How many there will be.
-            progress: Told after each generation.
-
-        Raises:
-            InvalidValueError: If a goal says nothing of the first robot.
-        """
+        """Prepare, and refuse goals that are not finite for the first robot."""
         self._request, self._candidates = request, candidates
         self.record: DesignFolder | None = None
         self._evaluations, self._progress = evaluations, progress
@@ -203,11 +184,11 @@ class Ledger:
 
     @property
     def costs(self) -> int:
-        """How many costs a candidate has: one, or for a front one a goal."""
+        """Number of costs of a candidate: one a goal for a front, else one."""
         return len(self._request.goals) if self._request.optimizer == "nsga2" else 1
 
     def rate(self, points: Array) -> Array:
-        """Costs of points of the unit cube (N, d), shape (N, costs); the first ever is the first robot."""
+        """Costs (N, costs) of points of the unit cube (N, d); the first of all is the first robot."""
         values = self._candidates.values(points)
         values[(points == self._start).all(axis=1)] = self._candidates.start
         known = self._recalled(values)
@@ -221,19 +202,19 @@ class Ledger:
         if self._progress is not None:
             self._progress(len(self._rows), self._evaluations)
         costs = self._costs(known)
-        return costs if self.costs > 1 else weighted(costs, self._request.goals)[:, None]
+        return costs if self.costs > 1 else weighted_costs(costs, self._request.goals)[:, None]
 
     def front(self) -> Front:
-        """The best of them."""
+        """Result: the best candidates as robots."""
         request, costs = self._request, self._costs(self._rows)
         goals = self._rows[:, self._width :]
         if request.optimizer == "nsga2":
-            which = best_of_front(costs)
+            which = pareto_front(costs)
             which = which[which != 0]
             which = which[np.isfinite(goals[which]).all(axis=1)]
             which = which[np.argsort(costs[which, 0], kind="stable")]
         else:
-            total = weighted(costs, request.goals)
+            total = weighted_costs(costs, request.goals)
             which = np.array([np.argmin(total)])
             which = which[total[which] < total[0]]
         better = bool(len(which))
@@ -260,7 +241,7 @@ class Ledger:
         return costs_of(rows[:, self._width :], self._request.goals, self._first)
 
     def _recalled(self, values: Array) -> Array:
-        """Rows of the record for the first of these candidates, as far as it goes."""
+        """Rows of the record for the first of these candidates, as far as known."""
         if self.record is None:
             return np.zeros((0, self._rows.shape[1]))
         first = len(self._rows)
@@ -274,7 +255,7 @@ class Ledger:
         return known
 
     def _check_first(self) -> None:
-        """Refuse goals that say nothing of the first robot."""
+        """Refuse goals that are not finite for the first robot."""
         for goal, value in zip(self._request.goals, self._first, strict=True):
             if np.isinf(value):
                 item = f"{goal.kind} of {self._request.robot.name}"

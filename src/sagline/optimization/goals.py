@@ -1,4 +1,4 @@
-"""What a better robot is better at."""
+"""Goals of a design search."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sagline.core.results import set_fields
 
 
 class Measured(NamedTuple):
-    """What is known of candidates, each with S samples of its anchors (one where these are exact) at G poses.
+    """Quantities of candidates, each with S samples of its anchors (one where these are exact) at G poses.
 
     Attributes:
         margin: Of the wrench set [N], shape (N, S, G); -inf where a pose is singular or a cable has no length.
@@ -34,7 +34,7 @@ class Measured(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """A quantity that a robot may be better at.
+    """A kind of goal.
 
     Attributes:
         unit: Its unit; "" for a share or a currency.
@@ -111,7 +111,7 @@ class Goal:
     def __init__(
         self, kind: str, *, maximize: bool | None = None, weight: float = 1.0, scale: float | None = None
     ) -> None:
-        """Check them.
+        """Check kind, direction, weight and scale.
 
         Args:
             kind: One of the seven.
@@ -145,11 +145,11 @@ class Goal:
 
     @property
     def needs(self) -> str:
-        """The field of `Measured` that it is taken from."""
+        """Field of `Measured` that it is computed from."""
         return KINDS[self.kind].needs
 
     def values(self, measured: Measured, *, worst: bool) -> Array:
-        """Its value of each candidate.
+        """Value of the goal of each candidate.
 
         Args:
             measured: What is known of them.

@@ -1,4 +1,4 @@
-"""One robot whose anchors move: at each pose to where its margin is largest."""
+"""Moving anchors: at each pose placed for the largest margin."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagline.core.results import Result
 from sagline.optimization.candidates import Candidates, free_parts
 from sagline.optimization.free import Free, Part
 from sagline.optimization.goals import Goal
-from sagline.optimization.rating import Rating, best_moved
+from sagline.optimization.rating import Rating, move_anchors
 from sagline.optimization.request import COUNTS, poses_of
 from sagline.robot.pose import Pose
 from sagline.robot.pose_box import PoseBox
@@ -53,13 +53,13 @@ class MovingAnchors(Result):
     moving: tuple[Free, ...]
 
     def __str__(self) -> str:
-        """What moving is worth."""
+        """Mean gain of margin."""
         gain = n(np.mean(self.margin - self.fixed_margin), unit="N") if len(self.moved) else "–"
         return f"{self.robot.name}, {counted(len(self.moved), 'pose')}: the margin is {gain} larger on average"
 
     @property
     def robots(self) -> tuple[Robot, ...]:
-        """The robot at each pose, for `inverse` and whatever else takes one robot a pose."""
+        """Robot at each pose, for `inverse` and other functions that take one robot a pose."""
         names = [self.robot.name] * len(self.moved)
         return Candidates(self.robot, self.moving, "moving").robots(self.moved, names)
 
@@ -119,6 +119,6 @@ def moving_anchors(
     moved, margin = np.empty((count, len(inner.parts))), np.empty(count)
     for part in blocks(count, BLOCK, progress):
         own = np.repeat(table, part.stop - part.start, axis=0)
-        moved[part], margin[part] = best_moved(inner, rating.margins, own, rating.rows[part])
+        moved[part], margin[part] = move_anchors(inner, rating.margins, own, rating.rows[part])
     fixed = rating.margins(table, rating.rows)
     return MovingAnchors(robot, places, inner.parts, locked(moved), locked(margin), locked(fixed), parts)

@@ -1,4 +1,4 @@
-"""What candidates reach of the goals: whole generations at once, from tables of cables."""
+"""Ratings of candidates: goals of whole generations at once, from cable tables."""
 
 from __future__ import annotations
 
@@ -109,11 +109,11 @@ Margins: TypeAlias = Callable[[Array, Array], Array]  # of tables (R, m, CABLE_C
 
 SPREAD: Final = 4  # points a number that are tried first
 STEP: Final = 0.25  # of the bounds' distance, at first
-ROUNDS: Final = 14  # each halves the step
+ITERATIONS: Final = 14  # each halves the step
 
 
-def best_moved(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
-    """Move the anchors of each robot at its pose to where the margin is largest.
+def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
+    """Move the anchors of each robot at its pose to the largest margin.
 
     A sample, the same for all, then steps along one number after another, halved from round to round: from the best of
     the sample it climbs to a maximum of its own surroundings.
@@ -147,7 +147,7 @@ def best_moved(inner: Candidates, margins: Margins, cables: Array, poses: Array)
     for point in latin_hypercube(SPREAD * q, q, 0):
         keep(np.repeat(point[None], count, axis=0))
     step = STEP
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         for k in range(q):
             for way in (-step, step):
                 points = best.copy()
@@ -161,7 +161,7 @@ ROWS: Final = 1 << 14  # poses of candidates at once: a tenth of a second, and l
 
 
 class Rating:
-    """Made once for a search; then called for each generation."""
+    """Goals of candidates, prepared once for a search."""
 
     def __init__(
         self,
@@ -173,7 +173,7 @@ class Rating:
         robust: AnchorErrors | None,
         inner: Candidates | None,
     ) -> None:
-        """Prepare it.
+        """Prepare the ratings.
 
         Args:
             candidates: The robots.
@@ -233,7 +233,7 @@ class Rating:
         return found
 
     def _measured(self, cables: Array, values: Array) -> Measured:
-        """Everything that the goals need of candidates that are robots."""
+        """Quantities of feasible candidates that the goals need."""
         many = cables[:, None] if self._robust is None else self._robust.added(cables)
         shape = (*many.shape[:2], len(self.rows))
         robots = many.reshape(-1, *many.shape[2:])
@@ -241,7 +241,7 @@ class Rating:
         margin, each = np.zeros(shape), robots
         if self._inner is not None:
             each = np.repeat(robots, len(self.rows), axis=0)
-            shifts, margin = best_moved(self._inner, self.margins, each, rows)
+            shifts, margin = move_anchors(self._inner, self.margins, each, rows)
             self._inner.write(each, shifts)
         elif "margin" in self._needs:
             margin = self.margins(robots, rows)
@@ -270,11 +270,11 @@ class Rating:
         return np.asarray(costs[:, None] * chords.max(axis=2).sum(axis=-1))
 
     def _in_platform(self, cables: Array) -> Flags:
-        """Whether a frame anchor of tables (N, m, CABLE_COLUMNS) is inside the platform at a pose, (N,)."""
+        """Mask (N,) of cable tables (N, m, CABLE_COLUMNS) with a frame anchor inside the platform at a pose."""
         return np.asarray((self._solid.holds(cables[..., : tables.FRAME_Z + 1]) >= 0).any(axis=-1))
 
     def _held_at(self, cables: Array) -> Flags:
-        """The poses at which a robot has tensions, shape (G,)."""
+        """Mask of poses at which a robot has tensions, shape (G,)."""
         each = np.repeat(cables, len(self.rows), axis=0)
         found = distribute(self._candidates.robot, self._model, each, self.rows, self._wrench, stiffness=False)
         held = ~np.isnan(found[0])

@@ -1,4 +1,4 @@
-"""What is asked of a search, checked: robot, free parts, goals, loads and poses."""
+"""Request of a design search, checked: robot, design variables, goals, loads and poses."""
 
 from __future__ import annotations
 
@@ -28,21 +28,7 @@ MOST: Final = 100_000  # poses
 
 
 def poses_of(robot: Robot, poses: Pose | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
-    """The given poses, or level ones evenly over a box.
-
-    Args:
-        robot: The robot.
-        poses: One pose or a batch; None for a grid.
-        box: Where the grid lies; None for the robot's test box.
-        grid: Poses along x, y and z; one where the box has no extent.
-
-    Returns:
-        A batch.
-
-    Raises:
-        InvalidValueError: If poses and box are given, or neither while the robot names no box; if the box is tilted;
-            if there are too many, or the robot's motion pattern does not lead there.
-    """
+    """Given poses as a batch, or a grid of level poses over a box, by default the robot's test box."""
     if poses is not None:
         if box is not None:
             raise InvalidValueError("box", "given beside poses", "one of the two", "Leave one of them out.")
@@ -93,7 +79,7 @@ _SEED: Final = 2**31 - 1  # the largest that all optimizers take
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Request:
-    """A search, but for how long it goes on.
+    """A design search, without its number of evaluations.
 
     Attributes:
         robot: The robot that it begins with.
@@ -125,11 +111,11 @@ class Request:
         return Candidates(self.robot, self.free)
 
 
-def requested(
+def checked_request(
     robot: Any, free: Any, goals: Any, wrenches: Any, poses: Pose, model: Any, inner: Any, robust: Any,
     optimizer: Any, seed: Any,
 ) -> Request:  # fmt: skip
-    """The arguments of `design`, checked.
+    """Request from the arguments of `design`, checked.
 
     Raises:
         InvalidValueError: If one is of the wrong kind; the message names it.
@@ -163,7 +149,7 @@ def requested(
 
 
 def _goals(given: Any) -> tuple[Goal, ...]:
-    """Goals, also from their names."""
+    """Goals, checked; a name stands for its goal."""
     many = [given] if isinstance(given, Goal | str) else given
     if not isinstance(many, Sequence) or not many:
         step = 'Give [Goal("workspace_share")] for instance.'
@@ -186,7 +172,7 @@ def _refuse_weights(goals: tuple[Goal, ...]) -> None:
 
 
 def _check_platform(request: Request) -> None:
-    """Refuse frame anchors that are inside the platform, or can get there."""
+    """Refuse frame anchors that are or can get inside the platform."""
     for name, free in (("free", request.free), ("inner", request.inner)):
         if not free:
             continue

@@ -14,17 +14,7 @@ from sagline.core.errors import InvalidValueError
 
 
 def extra(module: str) -> Any:
-    """A module of one of the packages of `sagline[design]`.
-
-    Args:
-        module: Its full name.
-
-    Returns:
-        The module.
-
-    Raises:
-        InvalidValueError: If its package is not installed; the message says how to get it.
-    """
+    """Module of an optional package of `sagline[design]`; the error says how to install it."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
@@ -39,7 +29,7 @@ Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) to 
 
 
 class Task(NamedTuple):
-    """What is searched.
+    """Problem of an optimizer.
 
     Attributes:
         rate: Gives the costs of points of the unit cube; a generation at once.
@@ -59,7 +49,7 @@ class Task(NamedTuple):
 
 
 def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
-    """Points of which every coordinate has one in each of `count` equal intervals.
+    """Latin hypercube sample: each coordinate has one point in each of `count` equal intervals.
 
     Args:
         count: How many points.
@@ -110,7 +100,7 @@ def search_cma(task: Task) -> None:
 
 
 def _strategy(cma: Any, start: Array, random: np.random.Generator, population: int | None) -> Any:
-    """One run; its random numbers are its own, so that numpy's global ones stay as the caller has them."""
+    """One run of CMA-ES with its own random numbers; numpy's global generator is untouched."""
     padded = np.concatenate((start, np.full(max(LEAST_DIMENSIONS - len(start), 0), 0.5)))
     options = {
         "bounds": [0.0, 1.0],

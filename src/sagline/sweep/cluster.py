@@ -39,7 +39,7 @@ Finish = Callable[[int, float, tuple[int, ...]], None]
 
 
 def cores() -> int:
-    """Processors that this process may use."""
+    """Number of processors available to this process."""
     with suppress(AttributeError):  # not on every system
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -47,7 +47,7 @@ def cores() -> int:
 
 @contextmanager
 def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
-    """Processes of this machine, which listen to it alone.
+    """Worker processes of this machine, not reachable from others.
 
     Args:
         workers: How many.
@@ -59,7 +59,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
     Raises:
         SaglineError: If they cannot be started.
     """
-    with quiet():
+    with silence_dask():
         import dask.config
         import distributed
 
@@ -103,7 +103,7 @@ def remote_workers(address: str) -> Iterator[Any]:
         SaglineError: If nobody answers there, or has workers.
     """
     check_address(address)
-    with quiet():
+    with silence_dask():
         import distributed
 
         api: Any = distributed
@@ -123,11 +123,7 @@ def remote_workers(address: str) -> Iterator[Any]:
 
 
 def check_address(address: object) -> str:
-    """Refuse what is no address of a scheduler.
-
-    Raises:
-        InvalidValueError: If it is none.
-    """
+    """Address of a scheduler, checked."""
     if isinstance(address, str) and address.isprintable() and address.isascii():
         scheme = next((each for each in SCHEMES if address.startswith(each)), None)
         host, _, port = address.removeprefix(scheme or "").rpartition(":")
@@ -136,8 +132,8 @@ def check_address(address: object) -> str:
     raise InvalidValueError("scheduler", repr(address), "an address, tcp://HOST:PORT", "Take the one it prints.")
 
 
-def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
-    """Have tasks done by the workers, a few of them at a time.
+def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
+    """Run tasks on the workers, a few ahead of each worker.
 
     Where something fails, or Ctrl-C comes, the tasks that are with the workers are finished, and no others begun.
 
@@ -195,8 +191,8 @@ def spread(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: 
 
 
 @contextmanager
-def quiet() -> Iterator[None]:
-    """While inside, Dask and what it is made of say nothing; nor after a failure, of which their threads speak late."""
+def silence_dask() -> Iterator[None]:
+    """Silence Dask's loggers and warnings inside, and its loggers after a failure, when its threads report late."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     levels = [logger.level for logger in loggers]
     with warnings.catch_warnings():
@@ -238,11 +234,7 @@ def _first_line(error: BaseException) -> str:
 
 
 def dask_setup(worker: object) -> None:
-    """Hear no Ctrl-C: the task that runs is finished.
-
-    Args:
-        worker: Of Dask, which asks for this function by its name.
-    """
+    """Ignore SIGINT in a worker process, so that it finishes its task; Dask calls this by its name as it starts."""
     if threading.current_thread() is threading.main_thread():
         with suppress(ValueError, OSError):
             signal.signal(signal.SIGINT, signal.SIG_IGN)

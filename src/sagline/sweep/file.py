@@ -1,4 +1,4 @@
-"""Files that ask for a sweep: robots, poses, wrenches and quantities in YAML, with units."""
+"""Sweep files: robots, poses, wrenches and quantities in YAML, with units."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class _SweepEntry(Entry):
 
 
 def load_sweep(file: os.PathLike[str] | str) -> Request:
-    """Read what a file asks of a sweep.
+    """Read the request of a sweep from a file.
 
     A sweep file is YAML; a quantity is a number in SI or a text with its unit, and what varies is an axis with its ends
     and how many points there are from one to the other:
@@ -144,7 +144,7 @@ def _robots(given: Any, folder: Path) -> list[Robot]:
 
 
 def _beside(name: str, folder: Path) -> str | Path:
-    """A file's name as seen from the folder of the sweep's file; what is no file's name stays what it is."""
+    """Path relative to the folder of the sweep file, for names of robot files; other names unchanged."""
     return folder / name if Path(name).suffix.lower() in (".yaml", ".yml") else name
 
 
@@ -194,7 +194,7 @@ def _one(given: Any, item: str, unit: str) -> float:
 
 
 def _axis(given: Any, item: str, unit: str) -> Array:
-    """The points of an axis, or the one value."""
+    """Points of an axis, or its one value."""
     if not isinstance(given, dict):
         return np.array([_one(given, item, unit)])
     if set(given) != set(KEYS):
@@ -216,7 +216,7 @@ def _product(axes: dict[str, Array]) -> Array:
 
 
 def _named(word: str, item: str, kinds: Mapping[str, type[Choice]]) -> type[Choice]:
-    """A model or method by the word that the command has for it: minimum-norm."""
+    """Model or method by its word on the command line: minimum-norm."""
     words = {_word(name): kind for name, kind in kinds.items()}
     if word not in words:
         raise InvalidValueError(item, brief(word), ", ".join(words), f"Choose one of them as {item}.")

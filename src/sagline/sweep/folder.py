@@ -61,14 +61,14 @@ STEP: Final = "Free some space or correct the permissions, and run the same agai
 
 
 class TaskSize(NamedTuple):
-    """How many poses and wrenches of one robot a task has; fixed when the folder is made."""
+    """Numbers of poses and wrenches of one robot in a task; fixed when the folder is made."""
 
     poses: int
     wrenches: int
 
 
 class SweepFolder(NamedTuple):
-    """A folder that is open.
+    """An open folder of a sweep.
 
     Attributes:
         path: Where it is.
@@ -88,17 +88,17 @@ class SweepFolder(NamedTuple):
 
     @property
     def grid(self) -> tuple[int, int, int]:
-        """How many tasks there are along robots, poses and wrenches."""
+        """Numbers of tasks along robots, poses and wrenches."""
         robots, poses, wrenches = self.request.shape
         return robots, math.ceil(poses / self.size.poses), math.ceil(wrenches / self.size.wrenches)
 
     @property
     def tasks(self) -> int:
-        """How many tasks there are."""
+        """Number of tasks."""
         return math.prod(self.grid)
 
     def part(self, number: int) -> Part:
-        """The box of requests of a task."""
+        """Box of requests of a task."""
         _, poses, wrenches = self.request.shape
         robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
         first, left = row * self.size.poses, column * self.size.wrenches
@@ -106,7 +106,7 @@ class SweepFolder(NamedTuple):
         return Part(robot, rows, slice(left, min(left + self.size.wrenches, wrenches)))
 
     def write(self, number: int, numbers: Mapping[str, NDArray[np.generic]]) -> None:
-        """Write the chunks of a task, each whole.
+        """Write the chunks of a task, each atomically.
 
         Raises:
             FileError: If the disk is full, or the folder cannot be written.
@@ -121,7 +121,7 @@ class SweepFolder(NamedTuple):
             raise FileError(self.path, f"cannot be written ({error.strerror or error})", STEP) from None
 
     def read(self, number: int) -> dict[str, NDArray[np.generic]] | None:
-        """The numbers of a task; None where a chunk is missing or torn."""
+        """Numbers of a task; None where a chunk is missing or damaged."""
         robot, rows, columns = self.part(number)
         numbers = {}
         for variable in variables_of(self.request.quantities):
@@ -135,7 +135,7 @@ class SweepFolder(NamedTuple):
         return numbers
 
     def _chunk(self, number: int, variable: Variable) -> Path:
-        """The file of a chunk, as Zarr names it."""
+        """File of a chunk, as Zarr names it."""
         place: list[Any] = [*np.unravel_index(number, self.grid), *[0] * variable.a_cable]
         return self.path.joinpath(GROUP, variable.name, "c", *map(str, place))
 
@@ -220,12 +220,12 @@ def open_folder(path: Path) -> SweepFolder:
 
 
 def digest_of(request: Request) -> str:
-    """What tells a request from all others: the same robots, poses, wrenches, quantities and methods have the same."""
+    """Digest of a request: equal for the same robots, poses, wrenches, quantities and methods."""
     return _digest([dump_robot(robot) for robot in request.robots], _options(request), request)
 
 
 def check_made_here(folder: SweepFolder) -> None:
-    """Refuse to go on with what another sagline began: its numbers need not be the same.
+    """Refuse to continue the sweep of another version: its numbers may differ.
 
     Raises:
         FileError: If it was another version.
@@ -253,7 +253,7 @@ def check_package(name: str, purpose: str) -> None:
 
 
 def _options(request: Request) -> dict[str, Any]:
-    """What of a request is neither robot nor array, as JSON has it."""
+    """JSON values of a request besides robots and arrays."""
     options = {
         "quantities": list(request.quantities),
         **choice_attributes("model", request.model, MODELS),
@@ -265,7 +265,7 @@ def _options(request: Request) -> dict[str, Any]:
 
 
 def _set_of(written: Mapping[str, Any]) -> WrenchSet:
-    """The set of loads that `_options` wrote."""
+    """Wrench set written by `_options`."""
     kinds = {name: np.int64 if name == "sizes" else np.float64 for name in SHAPES}
     return WrenchSet(*(locked(np.array(written[name], kinds[name]).reshape(SHAPES[name])) for name in SHAPES))
 
@@ -278,7 +278,7 @@ def _digest(texts: list[str], options: Mapping[str, Any], request: Request) -> s
 
 
 def _arrays(request: Request) -> dict[str, NDArray[np.float64]]:
-    """In the order of GIVEN."""
+    """Arrays of a request, in the order of GIVEN."""
     return dict(zip(GIVEN, (request.poses.position, request.poses.quaternion, request.wrenches), strict=True))
 
 
@@ -313,7 +313,7 @@ def _fill(place: Path, request: Request, size: TaskSize, attributes: dict[str, A
 
 
 def _attributes(variable: Variable) -> dict[str, Any]:
-    """As the CF conventions want them."""
+    """Attributes of a variable by the CF conventions."""
     found: dict[str, Any] = {"long_name": variable.long_name}
     if variable.unit:
         found["units"] = variable.unit

@@ -1,4 +1,4 @@
-"""What a sweep is asked: robots x poses x wrenches, and which numbers of each."""
+"""Requests of sweeps: robots x poses x wrenches, and the quantities asked of each."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Variable(NamedTuple):
 
     @property
     def type(self) -> str:
-        """The type of its values."""
+        """Type of its values."""
         return "int8" if self.whole or self.codes is not None else "float64"
 
 
@@ -77,14 +77,7 @@ QUANTITIES: Final = MappingProxyType(
 
 
 def variables_of(quantities: Iterable[str]) -> tuple[Variable, ...]:
-    """The variables of some quantities, each once.
-
-    Args:
-        quantities: Names of QUANTITIES.
-
-    Returns:
-        The variables, in the order of the quantities.
-    """
+    """Variables of some quantities, each once, in the order of the quantities."""
     return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
 
 
@@ -95,7 +88,7 @@ _MINIMUM_NORM: Final = MinimumNorm()
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Request(Result):
-    """Every robot at every pose under every wrench, and what is asked of each.
+    """Every robot at every pose under every wrench, and the quantities asked of each.
 
     Attributes:
         robots: R of them.
@@ -130,7 +123,7 @@ class Request(Result):
         around: WrenchSet | None = None,
         moment_arm: float | None = None,
     ) -> None:
-        """Check what is asked.
+        """Check the request.
 
         Args:
             robots: A robot, or a sequence of them; they need not have equally many cables.
@@ -183,11 +176,11 @@ class Request(Result):
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """How many robots, poses and wrenches."""
+        """Numbers of robots, poses and wrenches."""
         return len(self.robots), len(self.poses), len(self.wrenches)
 
     def __str__(self) -> str:
-        """How many robots, poses and wrenches."""
+        """Numbers of robots, poses and wrenches."""
         return " x ".join(map(counted, self.shape, ("robot", "pose", "wrench")))
 
     @property
@@ -222,11 +215,11 @@ class Part(NamedTuple):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many poses and wrenches."""
+        """Numbers of poses and wrenches."""
         return self.poses.stop - self.poses.start, self.wrenches.stop - self.wrenches.start
 
     def pieces(self, most: int) -> Iterator[Part]:
-        """The same box in boxes of at most so many requests."""
+        """Parts of the box with at most `most` requests."""
         wide = min(self.shape[1], most)
         tall = max(1, most // wide)
         for first in range(self.poses.start, self.poses.stop, tall):

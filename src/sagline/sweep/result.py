@@ -1,4 +1,4 @@
-"""A sweep on the disk, as far as it is done."""
+"""State of a sweep on the disk: its results, and the file `done` with a line for each task that is done."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     los
 
 
 class Mark(NamedTuple):
-    """What is known of a task that is done.
+    """Record of a task that is done.
 
     Attributes:
         seconds: Time it took a worker [s]; 0 where the chunk was found on the disk.
@@ -45,17 +45,7 @@ class Mark(NamedTuple):
 
 
 def read_marks(folder: SweepFolder) -> dict[int, Mark]:
-    """The tasks that are done, by their numbers.
-
-    Args:
-        folder: The folder.
-
-    Returns:
-        The marks; lines that are torn or of no task are none.
-
-    Raises:
-        FileError: If the file cannot be read.
-    """
+    """Tasks that are done, by their numbers; damaged lines are ignored."""
     try:
         lines = (folder.path / NAME).read_bytes().decode("ascii", "replace").splitlines(keepends=True)
     except FileNotFoundError:
@@ -67,24 +57,15 @@ def read_marks(folder: SweepFolder) -> dict[int, Mark]:
 
 
 class Marks:
-    """The file while a sweep runs; one process at a time has it."""
+    """The file `done` while a sweep runs, locked against other processes."""
 
     def __init__(self, folder: SweepFolder, file: IO[bytes], marks: dict[int, Mark]) -> None:
-        """Go on with what is marked; use `marking`."""
+        """Continue from the marks that were read; use `open_marks`."""
         self._folder, self._file = folder, file
         self.marks = marks
 
     def add(self, number: int, mark: Mark, left: float | None) -> None:
-        """Mark a task.
-
-        Args:
-            number: Its number.
-            mark: What is known of it.
-            left: Time that the rest will take [s]; None where nobody knows.
-
-        Raises:
-            FileError: If the disk is full.
-        """
+        """Add the mark of a task, with the remaining time [s] if known."""
         self.marks[number] = mark
         counts = mark.counts
         progress = f"{len(self.marks)} of {self._folder.tasks}"
@@ -94,7 +75,7 @@ class Marks:
         self._write(text)
 
     def begin(self) -> None:
-        """Say what the columns are, on a line of its own."""
+        """Write the head of the columns on a line of its own."""
         size = self._file.seek(0, 2)
         torn = False
         if size:
@@ -113,8 +94,8 @@ class Marks:
 
 
 @contextmanager
-def marking(folder: SweepFolder) -> Iterator[Marks]:
-    """Have the marks of a folder, alone.
+def open_marks(folder: SweepFolder) -> Iterator[Marks]:
+    """Open the marks of a folder with a lock.
 
     Args:
         folder: The folder.
@@ -139,13 +120,13 @@ def marking(folder: SweepFolder) -> Iterator[Marks]:
 
 
 def total_of(marks: Mapping[int, Mark]) -> Counts:
-    """All counts together."""
+    """Sum of all counts."""
     counts = np.array([mark.counts for mark in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
     return Counts(*counts.sum(axis=0).tolist())
 
 
 def time_text(seconds: float) -> str:
-    """A time as people read it: 1:02:03, or 0:07."""
+    """Time as text: 1:02:03, or 0:07."""
     whole = max(0, round(seconds))
     hours, minutes = whole // 3600, whole // 60 % 60
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
@@ -162,7 +143,7 @@ def _mark(line: str) -> tuple[int, Mark] | None:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Sweep(Result):
-    """A sweep as its folder has it; numbers are read when they are asked for.
+    """Sweep in a folder; numbers are read when they are used.
 
     Attributes:
         folder: Where it is.
@@ -182,17 +163,17 @@ class Sweep(Result):
 
     @property
     def complete(self) -> bool:
-        """Whether all is done."""
+        """True if all tasks are done."""
         return self.done == self.tasks
 
     def __str__(self) -> str:
-        """What was asked, how far it is, and how the requests ended."""
+        """Request, number of tasks done, and outcome of the requests."""
         ends = ", ".join(f"{count:,} {name}" for name, count in self.counts._asdict().items() if count)
         return f"{self.request}; {self.done:,} of {counted(self.tasks, 'task')} done" + f": {ends}" * bool(ends)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the variables that there are."""
+        """Names of the variables."""
         return tuple(variable.name for variable in variables_of(self.request.quantities))
 
     def values(self, name: str, index: Any = ()) -> NDArray[Any]:

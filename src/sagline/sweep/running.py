@@ -1,4 +1,4 @@
-"""Runs a sweep: on the workers of Dask, or task after task; and goes on with one that was stopped."""
+"""Runs of sweeps on Dask workers or task by task, also continued ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any, Final
 from sagline.core.arguments import callback, file_path, instance, whole_number
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.progress import Progress
-from sagline.sweep.cluster import check_address, cores, local_workers, remote_workers, spread
+from sagline.sweep.cluster import check_address, cores, local_workers, remote_workers, run_tasks
 from sagline.sweep.folder import (
     SweepFolder,
     check_made_here,
@@ -24,7 +24,7 @@ from sagline.sweep.folder import (
     open_folder,
 )
 from sagline.sweep.request import Request
-from sagline.sweep.result import Mark, Marks, Sweep, load, marking
+from sagline.sweep.result import Mark, Marks, Sweep, load, open_marks
 from sagline.sweep.work import Counts, found_counts, measured_size, task
 
 MOST_WORKERS: Final = 1024
@@ -41,7 +41,7 @@ def run(
     progress: Progress | None = None,
     tell: Tell | None = None,
 ) -> Sweep:
-    """Run a sweep into a folder, or go on with it where it stopped.
+    """Run a sweep into a folder, or continue it.
 
     The folder has partial results from the first minute, and a file `done` with a line for each task that is done. It
     is taken up again by the same call: what is done, and whole on the disk, is not done again. Ctrl-C stops when the
@@ -85,7 +85,7 @@ def run(
     told, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
     check_package("zarr", "sweeps")
     opened = _made(path, request)
-    with marking(opened) as marks:
+    with open_marks(opened) as marks:
         waiting = _waiting(opened, marks)
         start, done = 0.0, 0
 
@@ -103,26 +103,15 @@ def run(
         with _workers(count, scheduler, len(waiting), say) as client:
             start = time.monotonic()
             if client is not None:
-                spread(client, job, waiting, finish, say)
+                run_tasks(client, job, waiting, finish, say)
             else:
                 for number in waiting:
                     finish(number, *task(*job, number))
     return load(path)
 
 
-def opened_for(path: Path, request: Request) -> SweepFolder:
-    """Open the folder of a request.
-
-    Args:
-        path: The folder.
-        request: What it has to be of.
-
-    Returns:
-        The folder.
-
-    Raises:
-        FileError: If it is no folder of a sweep, damaged, or of another request.
-    """
+def open_matching_folder(path: Path, request: Request) -> SweepFolder:
+    """Open the folder of a request; the folder of another request is refused."""
     opened = open_folder(path)
     if opened.digest != digest_of(request):
         step = "Give this one another folder, or remove that one."
@@ -131,20 +120,20 @@ def opened_for(path: Path, request: Request) -> SweepFolder:
 
 
 def _made(path: Path, request: Request) -> SweepFolder:
-    """The folder with this request in it, made where there is none."""
+    """Folder of a request, created if missing."""
     try:
         empty = not path.exists() or not any(path.iterdir())
     except OSError as error:
         raise FileError(path, f"cannot be used ({error.strerror or error})", "Name another folder.") from None
     if empty:
         make_folder(path, request, measured_size(request))
-    opened = opened_for(path, request)
+    opened = open_matching_folder(path, request)
     check_made_here(opened)
     return opened
 
 
 def _waiting(folder: SweepFolder, marks: Marks) -> list[int]:
-    """Tasks that are still to be done: those whose chunks are whole on the disk are marked, and not done again."""
+    """Tasks to be done; those whose chunks are complete on the disk are marked as done."""
     waiting = []
     for number in range(folder.tasks):
         counts = found_counts(folder, number)
@@ -158,7 +147,7 @@ def _waiting(folder: SweepFolder, marks: Marks) -> list[int]:
 
 @contextmanager
 def _workers(count: int, scheduler: str | None, tasks: int, tell: Tell) -> Iterator[Any]:
-    """The client of Dask; None where tasks are done one after the other."""
+    """Client of Dask; None where tasks are done one after the other."""
     if scheduler is not None and tasks:
         with remote_workers(scheduler) as client:
             yield client
@@ -173,6 +162,6 @@ def _workers(count: int, scheduler: str | None, tasks: int, tell: Tell) -> Itera
 
 
 def _check_not_imported() -> None:
-    """End the worker that imports a script which runs a sweep as it is imported; whoever started it tells why."""
+    """End a worker that imports the script which runs the sweep; the parent process reports the reason."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)

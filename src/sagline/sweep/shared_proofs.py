@@ -1,4 +1,4 @@
-"""Verdicts of many loads at each of some poses: the proof of one load holds for all that lie beyond it.
+"""Verdicts of many loads at each pose, with shared proofs: the proof of one load holds for all beyond it.
 
 What proves a load w infeasible is a direction y along which the cables give too little, by a gap. That does not depend
 on the load; for another load w' of the same pose the gap is that of w less y (w' - w). Where it is above zero it proves
@@ -18,13 +18,13 @@ from sagline.robot.robot import Robot
 from sagline.robot.several import anything_behind
 from sagline.tension.options import Options
 
-ROUNDS: Final = 32  # loads of each pose whose proofs are tried on the others
+ITERATIONS: Final = 32  # loads of each pose whose proofs are tried on the others
 TRUST: Final = 1e-8  # of the forces at hand: ten times of what a verdict takes for none; rounding is far below
 PROVED: Final = 0  # column of the brackets
 
 
 def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: Found) -> Array:
-    """Decide the requests that the rounds of sharing left open; fills the answers of those that are feasible.
+    """Decide the requests that the tension distribution left open; complete the feasible ones.
 
     Args:
         robot: The robot.
@@ -42,7 +42,7 @@ def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found:
     waiting = np.isin(found.pose_status, UNDECIDED).reshape(len(poses), len(loads))
     along = loads @ robot.freedom.T
     size = _forces_at_hand(robot, loads)
-    for _ in range(ROUNDS if _shares(robot, loads) else 0):
+    for _ in range(ITERATIONS if _shares(robot, loads) else 0):
         rows = np.flatnonzero(waiting.any(axis=1))
         if not rows.size:
             return proof
@@ -60,12 +60,12 @@ def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found:
 
 
 def _shares(robot: Robot, loads: Array) -> bool:
-    """Whether there are loads to share a proof; without upper limits what cables give is bounded by the load's size."""
+    """True if proofs can be shared: there are several loads, and upper tension limits."""
     return len(loads) > 1 and bool(np.isfinite(robot.tension_max).all())
 
 
 def _forces_at_hand(robot: Robot, loads: Array) -> Array:
-    """The forces at each load [N], moments over the least lever arm that there is, (W,): no less than in a verdict."""
+    """Size of the forces at each load [N], (W,), moments divided by the least lever arm; no less than in a verdict."""
     arms = np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1)
     arm = float(arms[arms > 0.0].min(initial=np.inf))
     moments = np.abs(loads[:, 3:]).sum(axis=1) / arm
@@ -75,7 +75,7 @@ def _forces_at_hand(robot: Robot, loads: Array) -> Array:
 
 
 def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) -> Array:
-    """By how much the cables give too little for each load (K, W), along the proof of one load a pose; or -inf."""
+    """Infeasibility gap of each load (K, W) [N] along the proof of one load a pose; -inf without proof."""
     proved, direction, known = verdicts
     own = proved + np.einsum("kn,kn->k", direction, along[columns])
     gap = own[:, None] - direction @ along.T
@@ -85,7 +85,7 @@ def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) 
 def _decide(
     robot: Robot, options: Options, poses: Array, loads: Array, found: Found, which: Indices, proof: Array
 ) -> tuple[Array, Array, Flags]:
-    """Decide some requests; their proved least changes, proofs, and whether these are known."""
+    """Decide some requests: proved least changes, Farkas directions, and a mask of those that are proofs."""
     rows = locked(poses[which // len(loads)])
     wrenches = locked(loads[which % len(loads)])
     n, m = robot.degrees_of_freedom, robot.cable_count

@@ -1,4 +1,4 @@
-"""The numbers of a part of a sweep: a pure function of the request and the part."""
+"""Tasks of a sweep: pure functions of the request and the number of the task."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ROWS: Final = 1 << 14  # requests solved at once: what they take stays in the ca
 
 
 class Counts(NamedTuple):
-    """How many requests ended how.
+    """Numbers of requests by outcome.
 
     Attributes:
         feasible: With tensions within their limits.
@@ -95,14 +95,7 @@ def numbers_of(request: Request, part: Part) -> dict[str, NDArray[np.generic]]:
 
 
 def counts_of(numbers: dict[str, NDArray[np.generic]]) -> Counts:
-    """How the requests of a part ended.
-
-    Args:
-        numbers: Its variables.
-
-    Returns:
-        The counts.
-    """
+    """Counts of a part from its variables."""
     name, ends = (STATUS.name, INVERSE_ENDS) if STATUS.name in numbers else (MARGIN_STATUS.name, MARGIN_ENDS)
     status = numbers[name]
     feasible, infeasible, left, lost = (int(np.count_nonzero(status == int(code))) for code in ends)
@@ -110,14 +103,14 @@ def counts_of(numbers: dict[str, NDArray[np.generic]]) -> Counts:
 
 
 class _Inverse:
-    """Statuses, tensions and lengths of one robot of a request, set up once."""
+    """Statuses, tensions and lengths of one robot, prepared once."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request, self._robot = request, robot
         self._options = kernel_options(robot, request.model, request.tension)
 
     def answers(self, part: Part) -> dict[str, NDArray[Any]]:
-        """Variables of a few requests, (N,) or (N, m)."""
+        """Variables of a part, (N,) or (N, m)."""
         request = self._request
         poses, loads = _rows(request.poses, part.poses), request.wrenches[part.wrenches]
         rows = locked(np.repeat(poses, len(loads), axis=0))
@@ -138,14 +131,14 @@ class _Inverse:
 
 
 class _Margins:
-    """Margins of one robot of a request."""
+    """Margins of one robot, prepared once."""
 
     def __init__(self, request: Request, robot: Robot) -> None:
         self._request = request
         self._rows = MarginRows(robot, request.around, request.model, request.moment_arm)
 
     def answers(self, part: Part) -> dict[str, NDArray[Any]]:
-        """Variables of a few requests, (N,)."""
+        """Variables of a part, (N,)."""
         poses = _rows(self._request.poses, part.poses)
         found = [self._rows.about(load).rows(poses) for load in self._request.wrenches[part.wrenches]]
         columns: dict[str, list[NDArray[Any]]] = {
@@ -159,7 +152,7 @@ class _Margins:
 
 
 def _rows(poses: Pose, part: slice) -> Array:
-    """Some of the poses as the kernels take them, to the bit: a Pose of them would be normalized once more."""
+    """Pose rows to the last bit: a new Pose would normalize the quaternions again."""
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
@@ -184,7 +177,7 @@ TIMED: Final = 0.5  # s: what has been timed for so long is known well enough
 
 
 def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]:
-    """Work out one task and write its chunk; whoever has the folder can do it.
+    """Compute one task and write its chunks, on any machine that sees the folder.
 
     Args:
         folder: The folder of the sweep, as this machine sees it.
@@ -208,7 +201,7 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
 
 @lru_cache(maxsize=4)
 def _opened(folder: str, digest: str) -> SweepFolder:
-    """The folder, kept open from task to task."""
+    """Open folder, kept from task to task."""
     found = open_folder(Path(folder))
     if found.digest != digest:
         step = "Let all workers see the same folder under the same name."
@@ -224,14 +217,7 @@ def found_counts(folder: SweepFolder, number: int) -> Counts | None:
 
 
 def measured_size(request: Request) -> TaskSize:
-    """Size of tasks that take long enough, from the time that a few requests take.
-
-    Args:
-        request: The request.
-
-    Returns:
-        The size.
-    """
+    """Task size of suitable duration, from the measured time of some requests."""
     places = np.linspace(0, len(request) - 1, min(SAMPLES, len(request))).astype(np.int64)
     parts = [_sample(place, request) for place in np.transpose(np.unravel_index(places, request.shape))]
     numbers_of(request, parts[0])  # loads the machine code
@@ -251,13 +237,13 @@ def measured_size(request: Request) -> TaskSize:
 
 
 def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
-    """So many requests as a task: rather wrenches than poses, because the proof of one holds for others of its pose."""
+    """Task size of so many requests: wrenches before poses, because the loads of a pose share proofs."""
     wide = min(wrenches, rows)
     return TaskSize(min(poses, max(1, rows // wide)), wide)
 
 
 def _sample(place: Indices, request: Request) -> Part:
-    """A few requests from one on: robot, pose and wrench, (3,)."""
+    """A few requests from one place on: robot, pose and wrench, (3,)."""
     robot, pose, wrench = (int(k) for k in place)
     _, poses, wrenches = request.shape
     tall, wide = _size(SAMPLE, poses, wrenches)

@@ -1,1 +1,1 @@
-"""Where a robot can work: loads, margins, the boundary, and proofs of it."""
+"""Workspaces: wrench sets, margins, criteria, boundaries, and proofs for boxes of poses."""

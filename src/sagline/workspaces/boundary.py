@@ -1,4 +1,4 @@
-"""The boundary of a set that a function describes: its surface, its volume with an error bar, its pieces."""
+"""Boundary of a set described by a function: its surface, its volume with an error bar, its components."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Flags, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
-from sagline.workspaces.crossing import Brackets, brackets, crossings, way_to_box
-from sagline.workspaces.grid import Grid, Level, Net, evaluate, merged, net_of, refined, sampled
+from sagline.workspaces.crossing import Brackets, brackets, crossings, distance_to_box
+from sagline.workspaces.grid import Grid, Level, Net, evaluate, merge_vertices, refine_grid, sample_grid, triangulate
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region
 from sagline.workspaces.surface import Components, Surface, components_of, normals_of, volumes_of
@@ -51,7 +51,7 @@ class Boundary(Result):
 
 
 class _Counted:
-    """A level function, and at how many positions it has been evaluated."""
+    """Level function that counts the positions at which it is evaluated."""
 
     def __init__(self, level: Level) -> None:
         self._level = level
@@ -101,16 +101,18 @@ def boundary(
     most = min(MOST_HALVINGS, (MOST_HALVED // max(numbers)).bit_length() - 1)
     halvings = whole_number(int(refine) if isinstance(refine, bool) else refine, "refine", 0, most)
     counted = _Counted(level)
-    first = grid = sampled(counted, *corners, numbers)
+    first = grid = sample_grid(counted, *corners, numbers)
     for _ in range(halvings):
-        grid = refined(grid, counted)
-    net, vertices, slope = placed(net_of(grid.inside), grid, counted)
+        grid = refine_grid(grid, counted)
+    net, vertices, slope = place_vertices(triangulate(grid.inside), grid, counted)
     surface = Surface(locked(vertices), locked(net.faces))
     on_box = faces_on_box(surface, grid)
     open_faces = tuple(name for name, flat in zip(FACES, on_box, strict=True) if flat.any())
     curved = np.flatnonzero(~np.logical_or.reduce(on_box))
     faces = net.faces[curved]
-    between, errors = bulge(counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid)
+    between, errors = bulge_volumes(
+        counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid
+    )
     volumes = volumes_of(surface.vertices, surface.faces)
     volumes[curved] += between
     volume, error = float(volumes.sum()), float(errors.sum())
@@ -128,22 +130,10 @@ def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int,
     return x, y, z
 
 
-def placed(
+def place_vertices(
     net: Net, grid: Grid, level: Level, *, precision: float = 1e-10, narrow: float = 1e-12
 ) -> tuple[Net, Array, Array]:
-    """Vertices on the exact boundary.
-
-    Args:
-        net: Triangles between the nodes of the grid.
-        grid: The function there.
-        level: The function.
-        precision: As of `crossings`.
-        narrow: Likewise.
-
-    Returns:
-        The net, in which vertices at one node are one; where its vertices are [m], shape (V, 3); and how fast the
-        function falls along the edge of each [1/m], shape (V,), NaN where that is not known.
-    """
+    """Net, vertices on the exact boundary (V, 3) [m], and fall of the function along their edges (V,) [1/m]."""
     inner, outer = grid.positions(net.inner), grid.positions(net.outer)
     at_inner, at_outer = grid.values[tuple(net.inner.T)], grid.values[tuple(net.outer.T)]
     k = np.flatnonzero((net.inner != net.outer).any(axis=1))
@@ -154,7 +144,7 @@ def placed(
     vertices = inner + np.where(at_node, 0.0, share)[:, None] * (outer - inner)
     if not at_node[k].any():
         return net, vertices, slope
-    one = merged(net.inner, np.where(at_node[:, None], net.inner, net.outer), net.faces, grid.values.shape)
+    one = merge_vertices(net.inner, np.where(at_node[:, None], net.inner, net.outer), net.faces, grid.values.shape)
     kept = Surface(vertices[one.first], one.faces)
     if not kept.closed:  # a sheet without thickness: its two sides stay apart
         return net, vertices, slope
@@ -162,7 +152,7 @@ def placed(
 
 
 def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:
-    """How fast the function falls along the normal of each triangle, by least squares from its vertices' edges."""
+    """Fall of the function along the normal of each triangle [1/m], by least squares from its vertices' edges."""
     normals = normals_of(vertices, faces)
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = np.abs(normals) / np.linalg.norm(normals, axis=1)[:, None]
@@ -175,15 +165,7 @@ def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:
 
 
 def faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
-    """Which triangles lie on each face of the box.
-
-    Args:
-        surface: The triangles.
-        grid: The grid that fills the box.
-
-    Returns:
-        Masks of shape (F,), one for each of `FACES`.
-    """
+    """Triangles on each face of the box: masks of shape (F,), in the order of `FACES`."""
     corners = surface.vertices[surface.faces]
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]
 
@@ -193,45 +175,24 @@ MISSED: Final = 5.0 / 12.0  # of it at most
 FLAT: Final = 1e-6  # of the reach: a distance that adds nothing
 
 
-def bulge(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
-    """What lies between a net and the boundary.
-
-    Args:
-        level: The function.
-        vertices: Those of the net, on the boundary [m], shape (V, 3).
-        faces: Its triangles, shape (F, 3).
-        slope: How fast the function falls there along the normal, about [1/m], shape (F,); NaN where that is not known.
-        grid: The grid of the net: the boundary is looked for as far as a step from a triangle, within the grid's box.
-
-    Returns:
-        Bulge.
-    """
+def bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
+    """Volume between each triangle and the boundary [m^3], negative inward, and its error bar; both (F,)."""
     normals = normals_of(vertices, faces)
     area = np.linalg.norm(normals, axis=1)
     normals = normals / np.maximum(area, np.finfo(np.float64).tiny)[:, None]
     points = vertices[faces].mean(axis=1)
     low, high = (np.array([axis[end] for axis in grid.axes]) for end in (0, -1))
-    reach = [np.minimum(grid.step.max(), way_to_box(points, side * normals, low, high)) for side in (1.0, -1.0)]
-    distance = distances(level, points, normals, slope, reach[0], reach[1])
+    reach = [np.minimum(grid.step.max(), distance_to_box(points, side * normals, low, high)) for side in (1.0, -1.0)]
+    distance = distances_to_boundary(level, points, normals, slope, reach[0], reach[1])
     found = ~np.isnan(distance)
     volume = np.where(found, MEAN * area * distance, 0.0)
     return volume, area * np.where(found, MISSED * np.abs(distance), np.maximum(*reach))
 
 
-def distances(level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array) -> Array:
-    """How far the boundary is from points along their normals, to some percent.
-
-    Args:
-        level: The function.
-        points: Where [m], shape (N, 3).
-        normals: Outward, of length 1, shape (N, 3).
-        slope: How fast the function falls along them, about [1/m], shape (N,); NaN where that is not known.
-        outward: How far to look outward [m], shape (N,).
-        inward: How far to look inward [m], shape (N,).
-
-    Returns:
-        Distances [m], negative inward, NaN beyond reach, shape (N,).
-    """
+def distances_to_boundary(
+    level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array
+) -> Array:
+    """Distances of points (N, 3) from the boundary along normals [m], (N,), to some percent; NaN beyond reach."""
     at_points = evaluate(level, points)
     reach = np.where(at_points >= 0.0, outward, inward)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -248,7 +209,7 @@ def distances(level: Level, points: Array, normals: Array, slope: Array, outward
 
 
 def _between(level: Level, ends: Brackets) -> Array:
-    """Where the sign changes, in brackets that have it: by their chord, or looking closer where an end is infinite."""
+    """Position of the sign change in brackets: by their chord, or by iteration where an end is infinite."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
         share = at_inner / (at_inner - at_outer)
@@ -263,7 +224,7 @@ PRECISE: Final = 1e-4  # of the level at the nearer node, and of an edge of the 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline(Result):
-    """Where a robot can work, to be looked at.
+    """Boundary of a workspace for display, without error bar.
 
     Attributes:
         surface: The boundary, closed along the faces of the box.
@@ -287,7 +248,7 @@ class Outline(Result):
 
     @property
     def shares(self) -> dict[int, float]:
-        """Which share of the boundary within the box each cable limits, the largest first; a third at each corner."""
+        """Share of the boundary within the box that each cable limits, the largest first; a third at each corner."""
         faces = self.surface.faces[~self.on_box]
         area = np.linalg.norm(normals_of(self.surface.vertices, faces), axis=1)
         whole = max(float(area.sum()), np.finfo(np.float64).tiny)
@@ -297,22 +258,11 @@ class Outline(Result):
 
 
 def outline(levels: Levels, region: Region) -> Outline:
-    """The boundary of where levels are not negative, as the nodes of a grid see it.
-
-    Args:
-        levels: Tells where.
-        region: The box, and how many cells the grid has along each of its axes.
-
-    Returns:
-        The outline, without triangles where no node is inside.
-
-    Raises:
-        FileError: If scikit-image is not installed.
-    """
+    """Boundary of the set of positions whose level is not negative, from the nodes of the region's grid."""
     from scipy.ndimage import label  # a third of a second to load
 
-    grid = sampled(levels, region.low, region.high, region.cells)
-    net, vertices, _ = placed(net_of(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)
+    grid = sample_grid(levels, region.low, region.high, region.cells)
+    net, vertices, _ = place_vertices(triangulate(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)
     surface = Surface(locked(vertices), locked(net.faces))
     decided = levels.details(vertices)
     on_box = faces_on_box(surface, grid)

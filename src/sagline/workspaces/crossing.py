@@ -1,4 +1,4 @@
-"""Where a function of positions changes its sign along many lines at once."""
+"""Sign changes of a function of positions along many lines at once."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Level, evaluate
 
 TRIAL = 3  # steps of regula falsi, after which a bracket is to be an eighth
-ROUNDS = 100  # a jump takes some 45, by halving; what is continuous ends after 5 to 8
+ITERATIONS = 100  # a jump takes some 45, by halving; what is continuous ends after 5 to 8
 
 
 class Brackets(NamedTuple):
-    """Between which two positions on N rays a function changes its sign.
+    """Pairs of positions on N rays between which a function changes its sign.
 
     Attributes:
         inner: The one inside [m], shape (N, 3).
@@ -34,14 +34,14 @@ class Brackets(NamedTuple):
 
     @property
     def k(self) -> Indices:
-        """The rays on which it does."""
+        """Indices of the rays with a sign change."""
         return np.flatnonzero(self.found)
 
 
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Look from points outward where they are inside, inward where not, in steps that triple, for a change of sign.
+    """Search from points outward where they are inside, inward where not, in steps that triple.
 
     Args:
         level: The function.
@@ -84,20 +84,7 @@ def crossings(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Where lines leave the inside of one function: `crossings_of` with the same function for all.
-
-    Args:
-        level: The function.
-        inner: One end of each line, inside [m], shape (V, 3).
-        outer: The other end, outside [m], shape (V, 3).
-        at_inner: The function there, >= 0, shape (V,).
-        at_outer: The same at the other ends, < 0.
-        precision: Largest value that is taken for zero, of that at the end where it is smaller.
-        narrow: Share of a line to which a jump is found.
-
-    Returns:
-        Share of each line that is inside, from 0 to 1, shape (V,): at a jump, the last that is known to be.
-    """
+    """Share of each line that is inside one function, (V,): `crossings_of` with the same function for all lines."""
 
     def values(_: Indices, positions: Array) -> Array:
         return evaluate(level, positions)
@@ -115,7 +102,7 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Where each of V lines leaves the inside, by regula falsi that weighs an end less that stays.
+    """Share of each of V lines that is inside, by regula falsi with reduced weight of an end that stays.
 
     All lines that are not done are evaluated together, once a round. The bracket of a line is halved where an end is
     infinite, and some times where regula falsi has not kept up with halving, as at jumps.
@@ -141,14 +128,14 @@ def crossings_of(
     small = np.minimum(at_low, -at_high)
     small = np.where(np.isinf(small), 0.0, precision * small)
     low_stays, high_stays = np.zeros((2, len(inner)), dtype=np.bool_)
-    pace = _Pace(len(inner))
+    schedule = _BisectionSchedule(len(inner))
     k = np.flatnonzero(at_low > small)
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         if not len(k):
             break
         with np.errstate(invalid="ignore"):
             share = at_low[k] / (at_low[k] - at_high[k])
-        halved = pace.halves(k) | np.isinf(at_low[k]) | np.isinf(at_high[k])
+        halved = schedule.due(k) | np.isinf(at_low[k]) | np.isinf(at_high[k])
         share = low[k] + np.where(halved, 0.5, share) * (high[k] - low[k])
         found = values(k, inner[k] + share[:, None] * (outer[k] - inner[k]))
         is_inside = found >= 0.0
@@ -159,28 +146,28 @@ def crossings_of(
         at_high[k] = np.where(~is_inside, found, np.where(high_stays[k], weight * at_high[k], at_high[k]))
         low[k], high[k] = np.where(is_inside, share, low[k]), np.where(is_inside, high[k], share)
         low_stays[k], high_stays[k] = ~is_inside & ~halved, is_inside & ~halved
-        pace.judge(k, halved, high[k] - low[k])
+        schedule.update(k, halved, high[k] - low[k])
         hit = np.abs(found) <= small[k]
         low[k[hit]] = share[hit]
         k = k[~hit & (high[k] - low[k] > narrow)]
     return low
 
 
-class _Pace:
-    """Which brackets to halve: those that a trial of regula falsi narrows less; each time twice as often."""
+class _BisectionSchedule:
+    """Bisection steps due for each bracket, doubled each time a trial of regula falsi is slower than bisection."""
 
     def __init__(self, count: int) -> None:
         self._width = np.ones(count)  # at the beginning of a trial
         self._steps, self._due = np.zeros((2, count), dtype=np.int64)
         self._next = np.ones(count, dtype=np.int64)
 
-    def halves(self, k: Indices) -> NDArray[np.bool_]:
-        """Whether it is the turn of brackets k to be halved."""
+    def due(self, k: Indices) -> NDArray[np.bool_]:
+        """True for brackets k that are to be bisected next."""
         turn: NDArray[np.bool_] = self._due[k] > 0
         return turn
 
-    def judge(self, k: Indices, halved: NDArray[np.bool_], width: Array) -> None:
-        """Take note of what a step made of brackets k."""
+    def update(self, k: Indices, halved: NDArray[np.bool_], width: Array) -> None:
+        """Update the counters of brackets k after a step."""
         self._due[k] = np.maximum(self._due[k] - halved, 0)
         self._steps[k] = np.where(halved, 0, self._steps[k] + 1)
         over = self._steps[k] == TRIAL
@@ -191,18 +178,8 @@ class _Pace:
         self._width[k] = np.where(over | halved, width, self._width[k])
 
 
-def way_to_box(points: Array, directions: Array, low: Array, high: Array) -> Array:
-    """How far it is from positions in a box to its surface.
-
-    Args:
-        points: Positions [m], shape (3,) or (N, 3).
-        directions: Directions of length 1, shape (N, 3).
-        low: Lower corner of the box [m], shape (3,).
-        high: Upper corner [m].
-
-    Returns:
-        Lengths [m], >= 0, shape (N,).
-    """
+def distance_to_box(points: Array, directions: Array, low: Array, high: Array) -> Array:
+    """Distances from positions (3,) or (N, 3) in a box to its surface along unit directions (N, 3) [m], (N,)."""
     walls = np.where(directions > 0.0, high - points, low - points)
     with np.errstate(divide="ignore", invalid="ignore"):
         lengths: Array = np.where(directions != 0.0, walls / directions, np.inf).min(axis=1)

@@ -52,7 +52,7 @@ class Grid(Result):
 
     @property
     def inside(self) -> Mask:
-        """Which nodes are inside, shape (nx, ny, nz)."""
+        """Mask of the nodes inside, shape (nx, ny, nz)."""
         inside: Mask = self.values >= 0.0
         return inside
 
@@ -62,19 +62,12 @@ class Grid(Result):
         return np.array([(axis[-1] - axis[0]) / (len(axis) - 1) for axis in self.axes])
 
     def positions(self, nodes: NDArray[np.int64]) -> Array:
-        """Where nodes are.
-
-        Args:
-            nodes: Their indices along x, y and z, shape (N, 3).
-
-        Returns:
-            Positions [m], shape (N, 3).
-        """
+        """Positions [m], shape (N, 3), of nodes given by their indices along x, y and z, shape (N, 3)."""
         return np.stack([axis[nodes[:, k]] for k, axis in enumerate(self.axes)], axis=1)
 
 
 def evaluate(level: Level, positions: Array) -> Array:
-    """The values of a level function, as they have to be.
+    """Values of a level function, checked.
 
     Args:
         level: The function.
@@ -100,26 +93,16 @@ def evaluate(level: Level, positions: Array) -> Array:
     return values
 
 
-def sampled(level: Level, low: Array, high: Array, cells: tuple[int, int, int]) -> Grid:
-    """A function at all nodes of a grid.
-
-    Args:
-        level: The function.
-        low: Lower corner of the box that the grid fills [m], shape (3,).
-        high: Upper corner [m], shape (3,).
-        cells: Number of cells along each axis.
-
-    Returns:
-        Grid.
-    """
+def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, int]) -> Grid:
+    """Values of a function at all nodes of a grid of cells between two corners of a box [m], shape (3,)."""
     axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     shape = tuple(n + 1 for n in cells)
     return _grid(axes, evaluate(level, positions).reshape(shape), np.ones(shape, dtype=np.bool_))
 
 
-def refined(grid: Grid, level: Level) -> Grid:
-    """The grid of half the step, evaluated anew only in cells that the boundary passes through.
+def refine_grid(grid: Grid, level: Level) -> Grid:
+    """Grid of half the step, evaluated only in cells that the boundary crosses.
 
     A cell that turns out to be passed through because a finer neighbor is, is evaluated too.
 
@@ -134,7 +117,7 @@ def refined(grid: Grid, level: Level) -> Grid:
     nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
     fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
     fine.evaluated[::2, ::2, ::2] = grid.evaluated
-    cells = mixed(grid.inside, _CELL, 1)
+    cells = crossed_cells(grid.inside, _CELL, 1)
     while True:
         wanted = np.zeros_like(fine.evaluated)
         for part in _views(wanted, _HALVED, 2):
@@ -145,27 +128,18 @@ def refined(grid: Grid, level: Level) -> Grid:
         where = tuple(nodes.T)
         fine.values[where] = evaluate(level, fine.positions(nodes))
         fine.evaluated[where] = True
-        cells = mixed(fine.inside, _HALVED, 2)
+        cells = crossed_cells(fine.inside, _HALVED, 2)
 
 
-def mixed(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
-    """Which cells the boundary passes through: some of their nodes are inside, and some are not.
-
-    Args:
-        inside: Which nodes are, shape (nx, ny, nz).
-        nodes: Those of a cell, from its lowest on.
-        stride: Nodes from a cell to the next.
-
-    Returns:
-        Mask of cells.
-    """
+def crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
+    """Mask of the cells that the boundary crosses: some of their nodes are inside, and some are not."""
     parts = list(_views(inside, nodes, stride))
     mask: Mask = np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts)
     return mask
 
 
 def _views(nodes: Mask, offsets: tuple[tuple[int, ...], ...], stride: int) -> list[Mask]:
-    """For each node of a cell, that node of all cells."""
+    """Views of a mask of nodes: one for each node of a cell, over all cells."""
     count = [(n - 1) // stride for n in nodes.shape]
     return [
         nodes[tuple(slice(a, a + stride * (n - 1) + 1, stride) for a, n in zip(offset, count, strict=True))]
@@ -195,7 +169,7 @@ class Net:
     first: Indices
 
 
-def net_of(inside: Mask) -> Net:
+def triangulate(inside: Mask) -> Net:
     """The triangles between inside and outside, closed along the border of the grid.
 
     Args:
@@ -224,21 +198,11 @@ def net_of(inside: Mask) -> Net:
     is_low = padded[tuple((low + 1).T)] > 0.0
     inner, outer = np.where(is_low[:, None], (low, high), (high, low))
     outer = np.where(((outer < 0) | (outer >= inside.shape)).any(axis=1)[:, None], inner, outer)
-    return merged(inner, outer, faces.astype(np.int64), inside.shape)
+    return merge_vertices(inner, outer, faces.astype(np.int64), inside.shape)
 
 
-def merged(inner: Indices, outer: Indices, faces: Indices, shape: tuple[int, ...]) -> Net:
-    """A net with one vertex for each edge or node of the grid, and without the triangles that this flattens.
-
-    Args:
-        inner: The node inside, of the edge of each vertex, shape (V, 3).
-        outer: The node outside; the same as inner where the vertex is at the node.
-        faces: The vertices of each triangle, shape (F, 3).
-        shape: Nodes of the grid along each axis.
-
-    Returns:
-        Net.
-    """
+def merge_vertices(inner: Indices, outer: Indices, faces: Indices, shape: tuple[int, ...]) -> Net:
+    """Net with one vertex for each edge or node of the grid, without the triangles that this makes degenerate."""
     node = np.ravel_multi_index(tuple(np.minimum(inner, outer).T), shape)
     direction = np.abs(outer - inner) @ np.array([1, 2, 3])
     _, first, place = np.unique(4 * node.astype(np.int64) + direction, return_index=True, return_inverse=True)

@@ -1,4 +1,4 @@
-"""The function of the position whose sign says whether the robot can work there."""
+"""Signed feasibility function of the position."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ BLOCK: Final = 1 << 12  # poses at once: a tenth of a second, after which an int
 
 
 class Details(NamedTuple):
-    """What decides at N positions.
+    """Level and deciding criterion at N positions.
 
     Attributes:
         level: >= 0 inside, shape (N,).
@@ -66,18 +66,7 @@ class Levels:
         moment_arm: float | None,
         held: tuple[int, float] | None = None,
     ) -> None:
-        """Prepare the margin.
-
-        Args:
-            robot: The robot.
-            wrenches: Loads that it has to bear.
-            orientations: In which it is held.
-            criteria: What has to be met, the margin first.
-            model: Cable model.
-            tension: How the load is shared.
-            moment_arm: As of `margin`.
-            held: An axis along which all positions are the same, and where that is [m]; None for none.
-        """
+        """Prepare the margin; `moment_arm` as of `margin`, `held` an axis of constant coordinate and its value [m]."""
         self.robot, self.wrenches, self.orientations, self.criteria = robot, wrenches, orientations, criteria
         self.model, self.tension, self.middle = model, tension, middle_of(wrenches)
         self.told: Callable[[int], None] | None = None
@@ -86,25 +75,11 @@ class Levels:
         self._scales = [one.scale(robot) for one in criteria]
 
     def __call__(self, positions: Array) -> Array:
-        """Levels alone.
-
-        Args:
-            positions: Of the platform origin [m], shape (N, 3).
-
-        Returns:
-            Shape (N,); -inf where no number says how far outside a position is.
-        """
+        """Levels at positions (N, 3) of the platform origin [m], shape (N,); -inf where no distance is known."""
         return self.details(positions).level
 
     def details(self, positions: Array) -> Details:
-        """Levels, and what decides them.
-
-        Args:
-            positions: Of the platform origin [m], shape (N, 3).
-
-        Returns:
-            Details.
-        """
+        """Levels, and deciding criterion, cable and rotation, at positions (N, 3) of the platform origin [m]."""
         count = len(positions)
         found = Details(*np.empty((2, count)), *np.full((3, count), -1))
         for part in blocks(count, BLOCK):
@@ -116,14 +91,7 @@ class Levels:
         return Details(*map(locked, found))
 
     def _in_plane(self, positions: Array) -> Array:
-        """Positions as they count: of a plane, those in it.
-
-        Args:
-            positions: [m], shape (N, 3).
-
-        Returns:
-            Of the same shape.
-        """
+        """Positions (N, 3) [m]; of a planar workspace their projections into the plane."""
         if self._held is None:
             return positions
         axis, where = self._held
@@ -132,30 +100,21 @@ class Levels:
         return flat
 
     def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
-        """Margins of another wrench set.
-
-        Args:
-            wrenches: The set.
-            positions: Of the platform origin [m], shape (N, 3).
-            rotation: In which of the rotations each, shape (N,).
-
-        Returns:
-            Margins [N], shape (N,).
-        """
+        """Margins of another wrench set [N], (N,), at positions (N, 3) [m] in the rotations of these indices (N,)."""
         rows = np.hstack((self._in_plane(positions), self.orientations.quaternion[rotation]))
         return MarginRows(self.robot, wrenches, self.model, self._moment_arm).rows(rows).value
 
     def _block(self, positions: Array) -> Details:
-        found = self._turned(positions, 0)
+        found = self._in_rotation(positions, 0)
         for k in range(1, len(self.orientations)):
-            other = self._turned(positions, k)
+            other = self._in_rotation(positions, k)
             worse = other.level < found.level
             taken = worse if self.orientations.need == "all" else ~worse
             found = Details(*(np.where(taken, theirs, ours) for theirs, ours in zip(other, found, strict=True)))
         return found
 
-    def _turned(self, positions: Array, rotation: int) -> Details:
-        """In one rotation."""
+    def _in_rotation(self, positions: Array, rotation: int) -> Details:
+        """Details in one of the rotations."""
         rows = self.orientations.at(positions, rotation)
         bracket = self._margins.rows(rows)
         given = Given(self.robot, self.model, self.tension, self.middle, rows, bracket.value, bracket.cable)
@@ -176,14 +135,7 @@ class Levels:
 
 
 def middle_of(wrenches: WrenchSet) -> Array:
-    """The wrench in the middle of a set: of polytopes the mean of the corners.
-
-    Args:
-        wrenches: The set.
-
-    Returns:
-        Force [N], then moment [N m], shape (6,).
-    """
+    """Middle of a wrench set, of polytopes the mean of the corners: force [N], moment [N m], shape (6,)."""
     ends = np.cumsum(wrenches.sizes)
     means = [wrenches.corners[end - size : end].mean(axis=0) for end, size in zip(ends, wrenches.sizes, strict=True)]
     return locked(wrenches.center + sum(means, start=np.zeros(6)))

@@ -1,4 +1,4 @@
-"""How much more load a pose can take than a whole set of loads, signed: above zero inside the workspace."""
+"""Signed margin of a wrench set: the further load that a pose can bear; above zero inside the workspace."""
 
 from __future__ import annotations
 
@@ -95,11 +95,11 @@ class Margin(Result):
 
     @property
     def feasible(self) -> Flags:
-        """Where every load of the set is proved feasible, shape () or (N,)."""
+        """True where every load of the set is proved feasible, shape () or (N,)."""
         return locked(np.asarray(self.status == MarginStatus.FEASIBLE))
 
     def __str__(self) -> str:
-        """The margin of a pose in words; of many how many there are of each status, and the least and largest."""
+        """Margin of a single pose, or of many the number of each status, and the least and largest."""
         if self.value.ndim == 0:
             cable = f", cable {int(self.limiting_cable)}" * (int(self.limiting_cable) >= 0)
             status = MarginStatus(int(self.status))
@@ -118,7 +118,7 @@ class Margin(Result):
 
 
 def _newtons(value: ArrayLike) -> str:
-    """A margin, also an infinite one."""
+    """Text of a margin, infinite ones included."""
     number = float(np.asarray(value))
     return n(number, unit="N") if np.isfinite(number) else f"{number:g} N".replace("-", "−")
 
@@ -132,7 +132,7 @@ def margin(
     moment_arm: float | None = None,
     progress: Progress | None = None,
 ) -> Margin:
-    """How much more load than a set of loads each pose can take, signed, with a bracket for the cables' sag.
+    """Signed margin of a set of loads at each pose, with a bracket for the cables' sag.
 
     Works where no tensions balance the platform too. With sag the bracket is proved, whatever the tensions:
     low >= 0 means that every load of the set can be balanced within the limits, high < 0 that one cannot.

@@ -1,4 +1,4 @@
-"""Margins in rows: robots and poses as the kernels take them, prepared once for loops that ask again and again."""
+"""Margins of rows of poses: robots and wrench sets prepared once for repeated calls."""
 
 from __future__ import annotations
 
@@ -99,14 +99,7 @@ class MarginRows:
         )
 
     def about(self, wrench: Array) -> MarginRows:
-        """The same for the set of loads moved by a wrench.
-
-        Args:
-            wrench: What every load is more [N, N m], shape (6,), unchecked.
-
-        Returns:
-            Margins that share all else with these.
-        """
+        """Margins of the set of loads moved by a wrench [N, N m], shape (6,), unchecked; all else is shared."""
         model, limits, terms, (center, half, others, ellipsoids, corners, sizes, rates, inertias), arms = self._given
         there = _locked(center + wrench)
         moved = object.__new__(MarginRows)
@@ -154,29 +147,21 @@ class MarginRows:
 
 
 def mean_arms(table: Array, bodies: Array) -> Array:
-    """Mean distance of the platform anchors from the center of mass.
-
-    Args:
-        table: Of the cables, (R, m, CABLE_COLUMNS).
-        bodies: Of the platforms, (1 or R, BODY_COLUMNS).
-
-    Returns:
-        Lever arm [m], shape (R,).
-    """
+    """Mean distance of the platform anchors from the center of mass [m], (R,), from cable and body tables."""
     anchors = table[:, :, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
     centers = bodies[:, None, tables.CENTER_X : tables.CENTER_Z + 1]
     return np.asarray(np.linalg.norm(anchors - centers, axis=-1).mean(axis=-1))
 
 
 def _arms(table: Array, bodies: Array, moment_arm: float | None) -> tuple[Array, Array]:
-    """Lever arms of the norm, and those by which moments are divided, which are never zero [m]."""
+    """Lever arms of the norm, and positive lever arms by which moments are divided [m]."""
     means = mean_arms(table, bodies)
     own = means if moment_arm is None else np.array([number(moment_arm, "moment_arm", "m", low=0.0)])
     return locked(own), locked(np.where(means > 0.0, means, 1.0))
 
 
 def _set_terms(wrenches: WrenchSet, inertias: Array) -> SetTerms:
-    """A set of loads as the kernel takes it: of its segments those along one axis are a box."""
+    """Wrench set as the kernel takes it: segments along one axis become a box."""
     segments = np.abs(wrenches.segments)
     straight = np.count_nonzero(segments, axis=1) <= 1
     half = segments[straight].sum(axis=0)

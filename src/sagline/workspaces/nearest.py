@@ -1,4 +1,4 @@
-"""Of a robot that can work nowhere: the pose that comes nearest to it."""
+"""Pose nearest to a feasible one, for a robot whose workspace is empty."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _UNHELD: Final = 1e3  # what levels are lowered by where the platform cannot be 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Nearest(Result):
-    """The pose nearest to one where the robot can work.
+    """Pose nearest to a feasible one.
 
     Attributes:
         pose: A single pose.
@@ -51,36 +51,26 @@ class Nearest(Result):
 
 
 def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
-    """The position of greatest level: the best points of a grid, and up from there.
-
-    Args:
-        levels: The level.
-        grid: Of levels; none is inside.
-        low: Lowest corner of the box [m], shape (3,).
-        high: Highest corner; where it is as low along an axis, positions stay there.
-
-    Returns:
-        The pose, in the rotation that decides.
-    """
+    """Pose of greatest level: the best nodes of a grid, then a simplex search in the box from low to high [m], (3,)."""
     nodes = np.stack(np.unravel_index(np.arange(grid.values.size), grid.values.shape), axis=1)
     positions = np.clip(grid.positions(nodes), low, high)
-    values = _preferred(levels, positions)
+    values = _merit(levels, positions)
     order = np.argsort(values)[::-1][:_STARTS]
     best, found = positions[order[0]], float(values[order[0]])
     for start in positions[order][values[order] > -_FAR]:
-        place, value = _climbed(levels, start, low, high)
+        place, value = _simplex_search(levels, start, low, high)
         if value > found:
             best, found = place, value
     details = levels.details(best[None])
     rows = levels.orientations.at(best[None], int(details.rotation[0]))
     pose = Pose._adopt(rows[0, :3].copy(), rows[0, 3:].copy())
-    cables, reason = _why(levels, pose, details)
+    cables, reason = _reason(levels, pose, details)
     margin, criterion = float(details.margin[0]), int(details.criterion[0])
     return Nearest(pose, float(details.level[0]), margin, criterion, cables, reason)
 
 
-def _preferred(levels: Levels, positions: Array) -> Array:
-    """How near positions are, finite: levels, and where the platform cannot be held the share of the load that can.
+def _merit(levels: Levels, positions: Array) -> Array:
+    """Finite merit of positions: levels, and the share of the load that is borne where not all of it can be.
 
     Margins alone would lead to singular poses, at which all of them are small.
     """
@@ -99,8 +89,8 @@ def _share(bare: Array, margin: Array) -> Array:
     return np.asarray(bare / (bare - margin))
 
 
-def _climbed(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
-    """A position of a level that is a local maximum, as far as a simplex search finds it, and the level."""
+def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
+    """Position of a local maximum of the merit, by simplex search, and the merit."""
     from scipy.optimize import minimize  # a quarter of a second to load
 
     free = np.flatnonzero(high > low)
@@ -111,7 +101,7 @@ def _climbed(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Arr
     def below(part: Array) -> float:
         place = start.copy()
         place[free] = part
-        return -float(_preferred(levels, place[None])[0])
+        return -float(_merit(levels, place[None])[0])
 
     options = {"maxfev": _EVALUATIONS, "initial_simplex": simplex, "xatol": _PRECISION, "fatol": 0.0}
     bounds = list(zip(low[free], high[free], strict=True))
@@ -121,8 +111,8 @@ def _climbed(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Arr
     return place, -float(answer.fun)
 
 
-def _why(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...], str]:
-    """The cables that stand against a pose, and the reason in words."""
+def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ...], str]:
+    """Cables that make a pose infeasible, and the reason as a sentence."""
     place = ", ".join(n(x, ".3f") for x in pose.position)
     at = f"at ({place}) m"
     if details.level[0] >= 0.0:
@@ -160,7 +150,7 @@ def _of(cables: tuple[int, ...]) -> str:
 
 
 def _moments_of(wrenches: WrenchSet) -> WrenchSet:
-    """The set without its forces."""
+    """Wrench set without its forces."""
     parts = (wrenches.center, wrenches.segments, wrenches.ellipsoids, wrenches.corners, wrenches.accelerations)
     center, segments, ellipsoids, corners, accelerations = (part.copy() for part in parts)
     center[:3] = segments[:, :3] = ellipsoids[:, :3] = corners[:, :3] = accelerations[0] = 0.0

@@ -1,4 +1,4 @@
-"""Orientations that a platform has to be held in: level, or all of some rotations, or any of them."""
+"""Orientations in which the platform is held: level, all of some rotations, or any of them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Orientations:
     need: Need
 
     def __init__(self, rotations: Rotation | ArrayLike, need: Need = "all") -> None:
-        """Check both.
+        """Check rotations and need.
 
         Args:
             rotations: scipy Rotation, or rotation matrices of shape (3, 3) or (K, 3, 3).
@@ -67,17 +67,17 @@ class Orientations:
 
     @classmethod
     def _of(cls, quaternion: Array, need: Need) -> Orientations:
-        """Around quaternions of our own making."""
+        """Orientations of unit quaternions, unchecked."""
         made = object.__new__(cls)
         set_fields(made, quaternion=locked(quaternion), need=need)
         return made
 
     def __len__(self) -> int:
-        """How many rotations there are."""
+        """Number of rotations."""
         return len(self.quaternion)
 
     def __str__(self) -> str:
-        """In words."""
+        """Description in a line."""
         if len(self) > 1:
             most = 2.0 * np.arctan2(np.linalg.norm(self.quaternion[:, :3], axis=1), np.abs(self.quaternion[:, 3])).max()
             return f"{self.need} of {len(self)} sampled rotations, by up to {n(np.degrees(most), unit='°')}"
@@ -127,7 +127,7 @@ class Tilts:
         object.__setattr__(self, "angle", angle)
 
     def sampled(self, robot: Robot) -> Orientations:
-        """The rotations that stand for all of them.
+        """Rotations that sample all tilts up to the angle.
 
         Args:
             robot: The robot, whose pattern says about which axes its platform turns.
@@ -150,21 +150,12 @@ class Tilts:
 
 
 def level() -> Orientations:
-    """The one rotation of a level platform."""
+    """Level orientation alone."""
     return Orientations._of(LEVEL[None].copy(), "all")
 
 
 def check_tilt(robot: Robot, angle: float, item: str) -> None:
-    """Refuse to tilt a platform that does not turn.
-
-    Args:
-        robot: The robot.
-        angle: By how much [rad], 0 for none.
-        item: The name a message uses.
-
-    Raises:
-        InvalidValueError: If its motion pattern has no rotation.
-    """
+    """Refuse to tilt a platform by an angle [rad] if its motion pattern has no rotation; `item` is for messages."""
     if angle > 0.0 and robot.motion_pattern not in ROTATING:
         value, step = f"{np.degrees(angle):.4g} deg", "Leave the tilt out."
         allowed = f"none, by motion_pattern {robot.motion_pattern}: its platform does not turn"
@@ -172,19 +163,7 @@ def check_tilt(robot: Robot, angle: float, item: str) -> None:
 
 
 def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
-    """The orientations that a caller wants of a robot.
-
-    Args:
-        robot: The robot.
-        given: What was given; None for level, or what the box says.
-        tilt: Of the box [rad].
-
-    Returns:
-        Rotations within the robot's motions.
-
-    Raises:
-        InvalidValueError: If box and caller both say, what was given is neither, or the platform does not turn so.
-    """
+    """Orientations of a workspace from the argument, or from the tilt of the box [rad]; checked against the robot."""
     if given is not None and tilt > 0.0:
         step = "Give the tilt of the box, or orientations."
         value = f"given with a box of tilt {np.degrees(tilt):.4g} deg"
@@ -201,7 +180,7 @@ def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
 
 
 def _check_turns(robot: Robot, given: Orientations) -> None:
-    """Refuse turns that the robot's motion pattern does not have; level is where they begin."""
+    """Refuse rotations, counted from level, that the robot's motion pattern does not have."""
     turns = forbidden_turn(robot, Pose.from_quaternion(np.zeros(3), given.quaternion), LEVEL)
     wrong = np.flatnonzero(np.linalg.norm(turns, axis=1) > ROUNDING)
     if wrong.size:

@@ -28,7 +28,7 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 
 class ProofVerdict(Status):
-    """What is proved of a box of poses, or of a part of one."""
+    """Verdict on a box of poses, or on a part of one."""
 
     OPEN = OPEN, "neither is proved of all of the box: see the shares; a longer budget decides more"
     PROVED_INSIDE = INSIDE, "at every pose every load is balanced by tensions within the limits"
@@ -44,7 +44,7 @@ PRECISION: Final = (1.0, 1e-12)  # all that slopes leave out counts; a sum of a 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells(Result):
-    """Boxes that together are the whole one, K of them.
+    """Cells into which a box of poses is divided, K of them.
 
     Attributes:
         low: Lowest position of each [m], shape (K, 3).
@@ -178,7 +178,7 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
 
 
 def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
-    """The cubes of each cube that meet the ball of tilts, with the cell that each belongs to.
+    """Parts of each cube that meet the ball of tilts, with the cell that each belongs to.
 
     Half the edges of the cube around the whole ball are given, one a row.
     """
@@ -192,7 +192,7 @@ def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, mor
 
 
 def _children(half: Array) -> tuple[Array, Array]:
-    """Middles of the parts of a box, from its own, and their half edges: all long edges are halved."""
+    """Middles of the parts of a box, from its own, and their half edges: all long edges are bisected."""
     long = (half >= OBLONG * half.max()) & (half > 0.0)
     halved = np.where(long, 0.5 * half, half)
     steps = [np.array([-1.0, 1.0]) * halved[k] if long[k] else np.zeros(1) for k in range(3)]
@@ -200,7 +200,7 @@ def _children(half: Array) -> tuple[Array, Array]:
 
 
 def _load_terms(wrenches: WrenchSet, robot: Robot) -> tuple[Any, ...]:
-    """The set as the kernel takes it: corners from their mean, and the loads of accelerations of a level platform."""
+    """Wrench set as the kernel takes it: corners from their mean, accelerations as loads of a level platform."""
     center, corners, first = wrenches.center.copy(), wrenches.corners.copy(), 0
     for size in wrenches.sizes:
         mean = corners[first : first + size].mean(axis=0)
@@ -286,7 +286,7 @@ def prove(
     smallest: float | None = None,
     progress: Progress | None = None,
 ) -> Proof:
-    """Prove that a robot can work at every pose of a box, or at none of them, or where in it which holds.
+    """Prove that a robot can work at every pose of a box, or at none; or divide the box into cells of both kinds.
 
     Poses are level; with a tilt of the box a position is inside where every orientation tilted by no more is, about any
     axis, and outside where one of them is; a planar platform turns about the normal of its plane alone. The box is
@@ -346,14 +346,7 @@ def prove(
 
 
 def check_robot(robot: Robot) -> None:
-    """Refuse robots of which nothing can be proved yet.
-
-    Args:
-        robot: The robot.
-
-    Raises:
-        InvalidValueError: If it has pulleys, or fewer cables than degrees of freedom.
-    """
+    """Refuse robots for which there is no proof: with pulleys, or with fewer cables than degrees of freedom."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     if m < n:
         step = "Add cables, or choose a motion pattern with fewer freedoms."

@@ -1,4 +1,4 @@
-"""The hull that rays from one point see: what others take for the boundary, for comparison.
+"""Hull of the points seen along rays from one point, for comparison with the boundary.
 
 It is the boundary only of a set that the center sees all of; the boundary of any set is found by
 `sagline.workspaces.boundary`.
@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
-from sagline.workspaces.crossing import Brackets, brackets, crossings, crossings_of, way_to_box
+from sagline.workspaces.crossing import Brackets, brackets, crossings, crossings_of, distance_to_box
 from sagline.workspaces.grid import Level, evaluate
 from sagline.workspaces.surface import Surface
 
-ROUNDS: Final = 100  # of facets that replace one another along a ray: three are usual
+ITERATIONS: Final = 100  # of facets that replace one another along a ray: three are usual
 SHARP: Final = 1e-5  # of the level at a bracket's ends, which are a hundredth of a ray apart and less
 CLOSE: Final = 1e-7  # a level that is taken for zero from below
 
@@ -61,7 +61,7 @@ def generations(divisions: int) -> tuple[list[tuple[Array, Indices]], Indices]:
 
 
 def ray_hull(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike, divisions: int = 5) -> Surface:
-    """Where rays from a center leave a set, joined to a closed surface.
+    """Closed surface of the points where rays from a center leave a set.
 
     The rays of each generation are looked for near the chord between their parents' ends.
 
@@ -83,7 +83,7 @@ def ray_hull(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike, d
     length, slope = np.zeros(0), np.zeros(0)
     directions = np.zeros((0, 3))
     for new, parents in steps:
-        limit = way_to_box(origin, new, np.asarray(low), np.asarray(high))
+        limit = distance_to_box(origin, new, np.asarray(low), np.asarray(high))
         if not len(parents):
             start, at_start, step = np.zeros(len(new)), np.full(len(new), at_center), limit
         else:
@@ -124,9 +124,9 @@ def ray_hull_by_facets(
     origin, _ = _origin(lambda positions: facets(positions)[0], center, low, high)
     steps, faces = generations(whole_number(divisions, "divisions", 0, 8))
     directions = np.concatenate([new for new, _ in steps])
-    length = way_to_box(origin, directions, np.asarray(low), np.asarray(high))
+    length = distance_to_box(origin, directions, np.asarray(low), np.asarray(high))
     k = np.arange(len(directions))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         ends = origin + length[k, None] * directions[k]
         value, facet = facets(ends)
         n = np.flatnonzero(value < -CLOSE)
@@ -138,7 +138,7 @@ def ray_hull_by_facets(
 
 
 def _origin(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike) -> tuple[Array, float]:
-    """The center, and the level there."""
+    """Center, checked, and the level there."""
     origin = exactly(center, "center", "m", (3,))
     outside = (origin <= exactly(low, "low", "m", (3,))) | (origin >= exactly(high, "high", "m", (3,)))
     value = float(evaluate(level, origin[None])[0])
@@ -149,14 +149,14 @@ def _origin(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike) ->
 
 
 def _chords(directions: Array, length: Array, parents: Indices, new: Array) -> Array:
-    """How far along new directions the chords between the ends of their parents' rays are [m]."""
+    """Distances along new directions to the chords between the ends of their parents' rays [m]."""
     a, b = length[parents].T
     middle: Array = 2.0 * a * b / np.maximum(a + b, np.finfo(np.float64).tiny)
     return _along(middle[:, None] * directions[parents[:, 0]], new)
 
 
 def _ends(level: Level, origin: Array, directions: Array, ends: Brackets, precision: float) -> Array:
-    """How far along its ray each change of sign is [m]."""
+    """Distance along its ray of each sign change [m]."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     share = crossings(level, inner, outer, at_inner, at_outer, precision=precision)
     return _along(inner + share[:, None] * (outer - inner) - origin, directions[ends.k])
@@ -168,7 +168,7 @@ def _along(positions: Array, directions: Array) -> Array:
 
 
 def _slope(ends: Brackets) -> Array:
-    """How fast the level falls along each ray, about [1/m]."""
+    """Fall of the level along each ray, about [1/m]."""
     width = np.linalg.norm(ends.outer - ends.inner, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         slope: Array = (ends.at_inner - ends.at_outer) / width

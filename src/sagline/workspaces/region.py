@@ -21,7 +21,7 @@ AXES: Final = "xyz"
 
 
 class Region(NamedTuple):
-    """Where positions are looked at.
+    """Region of positions, and its grid.
 
     Attributes:
         box: As given, or the robot's own.
@@ -42,12 +42,12 @@ class Region(NamedTuple):
 
     @property
     def unit(self) -> str:
-        """Of what the region holds."""
+        """Unit of its volume or area."""
         return "m³" if self.flat is None else "m²"
 
 
 def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
-    """The region of a robot.
+    """Region of a robot, from a box or by default from the robot's frame.
 
     Args:
         robot: The robot.
@@ -88,7 +88,7 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
 
 
 def _own(robot: Robot) -> tuple[Array, Array]:
-    """Where the robot stands, and the poses that it is meant for."""
+    """Corners of the frame and of the test box together [m]."""
     low, high = bounds(robot)
     if robot.test_box is None:
         return low.copy(), high.copy()
@@ -96,24 +96,13 @@ def _own(robot: Robot) -> tuple[Array, Array]:
 
 
 def flat_axis(box: PoseBox) -> tuple[int, float] | None:
-    """The axis along which a box has no extent, and where it is [m].
-
-    Args:
-        box: The box.
-
-    Returns:
-        The first such axis; None where there is none.
-    """
+    """First axis along which a box has no extent, and its coordinate there [m]; None if there is none."""
     flat = np.flatnonzero(box.high - box.low <= ROUNDING)
     return (int(flat[0]), float(box.low[flat[0]])) if flat.size else None
 
 
 def _plane_axis(robot: Robot) -> int | None:
-    """The axis along which a planar robot's plane has its normal.
-
-    Raises:
-        InvalidValueError: If it is along none.
-    """
+    """Axis of a planar robot's plane normal; refused if it is along none."""
     if robot.plane_normal is None:
         return None
     axis = int(np.argmax(np.abs(robot.plane_normal)))
@@ -125,7 +114,7 @@ def _plane_axis(robot: Robot) -> int | None:
 
 
 def _place_of_plane(robot: Robot, axis: int) -> float:
-    """Where along its normal a planar platform has to be for its cables to lie in the plane [m]."""
+    """Coordinate along the normal at which a planar robot's cables lie in the plane [m]."""
     return float(robot.frame_anchors[:, axis].mean() - robot.platform_anchors[:, axis].mean())
 
 
@@ -145,23 +134,15 @@ class Plane(NamedTuple):
 
     @property
     def axes(self) -> tuple[int, int]:
-        """The axes that go across and up in a drawing of it."""
+        """Horizontal and vertical axis of a drawing of the plane."""
         return _IN_PLANE[self.normal]
 
     def __str__(self) -> str:
-        """As an equation."""
+        """Equation of the plane."""
         return f"{AXES[self.normal]} = {self.at:.3g} m"
 
     def positions(self, across: Array, up: Array) -> Array:
-        """The points of a grid on it, row by row.
-
-        Args:
-            across: Coordinates of the columns [m], shape (C,).
-            up: Coordinates of the rows [m], shape (U,).
-
-        Returns:
-            Positions [m], shape (U C, 3).
-        """
+        """Positions (U C, 3) [m] of a grid on it, row by row, from columns (C,) and rows (U,) [m]."""
         places = np.empty((up.size, across.size, 3))
         first, second = self.axes
         places[..., self.normal] = self.at
@@ -197,18 +178,7 @@ class Slice:
 
 
 def slice_of(find: Find, plane: Plane, low: Array, high: Array, shape: tuple[int, int]) -> Slice:
-    """What is found on a plane, between two corners of a box.
-
-    Args:
-        find: Given positions (N, 3) [m], what is found there: `levels().details` of a workspace.
-        plane: The plane.
-        low: Lowest corner of the box [m], shape (3,).
-        high: Highest corner [m], shape (3,).
-        shape: How many columns and rows.
-
-    Returns:
-        The slice.
-    """
+    """Slice of a function of positions, `Levels.details` for instance, between two corners of a box [m], shape (3,)."""
     first, second = plane.axes
     across, up = np.linspace(low[first], high[first], shape[0]), np.linspace(low[second], high[second], shape[1])
     found = find(plane.positions(across, up))

@@ -1,4 +1,4 @@
-"""The workspace: where a robot can work, how much that is, and what limits it where."""
+"""Workspace of a robot: positions, volume, and the criteria that limit it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _HEAD: Final = 12  # of them, before each line
 
 
 class Limit(NamedTuple):
-    """A share of the surface that has one reason.
+    """Share of the surface with one deciding criterion and cable.
 
     Attributes:
         criterion: Its title.
@@ -46,7 +46,7 @@ class Limit(NamedTuple):
     number: int
 
     def __str__(self) -> str:
-        """In words."""
+        """Criterion and cable."""
         return self.criterion if self.cable < 0 else f"{self.criterion}, cable {self.cable}"
 
 
@@ -115,7 +115,7 @@ class Workspace(Result, Saved):
 
     @property
     def limits(self) -> tuple[Limit, ...]:
-        """What limits the workspace, the largest share of its surface first."""
+        """Criteria and cables that limit the workspace, the largest share of its surface first."""
         areas: dict[tuple[int, int], float] = {}
         faces, vertices = self.surface.faces, self.surface.vertices
         sides = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
@@ -141,7 +141,7 @@ class Workspace(Result, Saved):
         return formats().module_of(self).field_of(self)
 
     def levels(self) -> Levels:
-        """The function of the position whose sign says whether the robot can work there.
+        """Signed feasibility function of the position.
 
         Returns:
             A function of positions (N, 3) [m] that gives levels (N,), with `details`.
@@ -158,19 +158,12 @@ class Workspace(Result, Saved):
         )
 
     def __str__(self) -> str:
-        """What a person wants to know of it, in lines of at most 80 columns."""
-        return "\n".join(lines_of(self)).replace(SPACE, " ")
+        """Summary in lines of at most 80 columns."""
+        return "\n".join(summary_lines(self)).replace(SPACE, " ")
 
 
-def lines_of(space: Workspace) -> list[str]:
-    """What a person wants to know of a workspace.
-
-    Args:
-        space: The workspace.
-
-    Returns:
-        Lines of at most 80 columns.
-    """
+def summary_lines(space: Workspace) -> list[str]:
+    """Summary of a workspace in lines of at most 80 columns."""
     lines = [f"Workspace of {space.robot.name}: {amount_of(space)}"]
     for head, text in facts_of(space):
         lines += wrap(text, _WIDTH, initial_indent=f"  {head:<{_HEAD}}", subsequent_indent=" " * (_HEAD + 2))
@@ -185,11 +178,7 @@ def lines_of(space: Workspace) -> list[str]:
 
 
 def amount_of(space: Workspace) -> str:
-    """Volume or area with its error bar, "789.4 ± 0.2 m³", and in how many parts.
-
-    Args:
-        space: The workspace.
-    """
+    """Volume or area with its error bar, "789.4 ± 0.2 m³", and the number of parts."""
     if space.nearest is not None:
         return f"empty, 0 {space.unit}"
     if space.volume_error <= 1e-9 * space.volume:  # all of the box
@@ -201,14 +190,7 @@ def amount_of(space: Workspace) -> str:
 
 
 def facts_of(space: Workspace) -> list[tuple[str, str]]:
-    """What it is the workspace of, and what else is to be known.
-
-    Args:
-        space: The workspace.
-
-    Returns:
-        A word, and what is to be said of it.
-    """
+    """Box, loads, orientations, model and criteria of a workspace, as pairs of a word and a text."""
     facts = [("box", f"{span_of(space.box)} m"), ("loads", str(space.wrenches))]
     facts += [("platform", str(space.orientations)), ("cables", type(space.model).__name__)]
     if asked := [str(one) for one in space.criteria if not one.always]:
@@ -225,10 +207,6 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
 
 
 def span_of(box: PoseBox) -> str:
-    """From where to where a box of positions reaches along x, y and z [m].
-
-    Args:
-        box: The box.
-    """
+    """Range of a box of positions along x, y and z [m], as text."""
     ends = zip(box.low, box.high, strict=True)
     return ", ".join(f"{n(low)} to {n(high)}" if low < high else n(low) for low, high in ends)

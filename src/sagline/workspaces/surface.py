@@ -29,24 +29,24 @@ class Surface(Result):
 
     @property
     def volume(self) -> float:
-        """What it encloses [m^3], by the divergence theorem; cavities are subtracted."""
+        """Enclosed volume [m^3], by the divergence theorem; cavities are subtracted."""
         return float(volumes_of(self.vertices, self.faces).sum())
 
     @property
     def area(self) -> float:
-        """Its area [m^2]."""
+        """Area [m^2]."""
         return float(np.linalg.norm(normals_of(self.vertices, self.faces), axis=1).sum())
 
     @property
     def closed(self) -> bool:
-        """Whether each edge of a triangle is that of one other, which runs along it the other way."""
+        """True if each edge of a triangle is that of exactly one other, in the opposite direction."""
         edges = np.concatenate([self.faces[:, [i, (i + 1) % 3]] for i in range(3)])
         count = len(self.vertices)
         there, back = edges @ [count, 1], edges @ [1, count]
         return len(np.unique(there)) == len(there) and bool(np.array_equal(np.sort(there), np.sort(back)))
 
     def __str__(self) -> str:
-        """How many corners and triangles, and how large."""
+        """Numbers of vertices and triangles, and extent."""
         counts = f"{counted(len(self.faces), 'triangle')} with {len(self.vertices):,} vertices"
         if not len(self.vertices):
             return counts
@@ -69,30 +69,14 @@ class Surface(Result):
 
 
 def normals_of(vertices: Array, faces: Indices) -> Array:
-    """Outward normals of triangles, each as long as its triangle's area [m^2].
-
-    Args:
-        vertices: Positions [m], shape (V, 3).
-        faces: Vertices of each triangle, shape (F, 3).
-
-    Returns:
-        Normals, shape (F, 3).
-    """
+    """Outward normals (F, 3) of triangles, each as long as its triangle's area [m^2]."""
     first, second, third = (vertices[faces[:, k]] for k in range(3))
     normals: Array = np.cross(second - first, third - first) / 2.0
     return normals
 
 
 def volumes_of(vertices: Array, faces: Indices) -> Array:
-    """What each triangle adds to the volume that all of a closed surface enclose: that of a pyramid over it.
-
-    Args:
-        vertices: Positions [m], shape (V, 3).
-        faces: Vertices of each triangle, shape (F, 3).
-
-    Returns:
-        Volumes [m^3], negative where the top of the pyramids lies outside, shape (F,).
-    """
+    """Contribution of each triangle to the enclosed volume [m^3], (F,): the signed volume of a pyramid over it."""
     if not len(faces):
         return np.zeros(0)
     top = vertices.mean(axis=0)  # near the surface, so that little cancels
@@ -105,7 +89,7 @@ _TOLD: Final = 8  # volumes that are printed
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Components(Result):
-    """The separate pieces of a set, the largest first; a cavity belongs to the piece around it.
+    """The components of a set, the largest first; a cavity belongs to the component around it.
 
     Attributes:
         volume: Of each piece, as of the whole [m^3], shape (K,).
@@ -125,17 +109,17 @@ class Components(Result):
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of components."""
         return len(self.volume)
 
     def __str__(self) -> str:
-        """How many there are, and how large."""
+        """Number of components and their volumes."""
         sizes = ", ".join(n(volume) for volume in self.volume[:_TOLD])
         more = ", …" * (self.count > _TOLD)
         return f"{counted(self.count, 'piece')}" + f", volume {sizes}{more}" * (self.count > 0)
 
     def label(self, position: ArrayLike) -> NDArray[np.int32]:
-        """Which piece positions belong to, to within a cell of the grid.
+        """Component of positions, to within a cell of the grid.
 
         Args:
             position: Positions [m], shape (..., 3), each in the set.
@@ -164,17 +148,7 @@ class Components(Result):
 
 
 def components_of(grid: Grid, inner: Indices, faces: Indices, volumes: Array) -> Components:
-    """The separate pieces of a set.
-
-    Args:
-        grid: Its grid.
-        inner: The node inside next to each vertex of its surface, shape (V, 3).
-        faces: The triangles of the surface, shape (F, 3).
-        volumes: What each triangle adds to the volume, with what bulges over it [m^3], shape (F,).
-
-    Returns:
-        Components.
-    """
+    """Components of a set, from its grid, the inner nodes and triangles of its net, and volumes (F,) [m^3]."""
     from scipy.ndimage import label  # a third of a second to load
 
     nodes, count = label(grid.inside)  # neighbors along the axes: as the net joins them

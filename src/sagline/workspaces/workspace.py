@@ -1,4 +1,4 @@
-"""Where a robot can work: the boundary of the poses in which it meets what is asked of it."""
+"""Workspace: the set of positions at which all criteria are met."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def workspace(
     moment_arm: float | None = None,
     progress: Progress | None = None,
 ) -> Workspace:
-    """Where a robot can work: the positions at which its cables bear every load of a set, and all criteria are met.
+    """Workspace: the positions at which the cables bear every load of a set, and all criteria are met.
 
     The boundary is found with cables that sag, by the sign of `margin`, whatever its shape and in however many parts.
     Its vertices are exact; between them it is flat, and the error bar says what that makes. What is thinner than a
@@ -128,7 +128,7 @@ def workspace(
 
 
 def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[int], None]:
-    """Report poses as they are done, of about so many: all nodes, and those of cells that the boundary passes."""
+    """Progress of an estimated number of poses: all nodes, and those of cells that the boundary crosses."""
     x, y, z = cells
     about, done = (x + 1) * (y + 1) * (z + 1) + _CROSSED * (x * y + y * z + z * x), 0
 
@@ -143,7 +143,7 @@ def _progress_of(progress: Progress, cells: tuple[int, int, int]) -> Callable[[i
 def _checked(
     robot: Robot, criteria: Sequence[Criterion], model: CableModel, tension: TensionMethod
 ) -> tuple[Criterion, ...]:
-    """The criteria with the margin first; all arguments are of their kinds, and fit together."""
+    """Criteria, checked, with the margin first."""
     instance(robot, Robot, "robot")
     instance(model, CableModel, "model")
     instance(tension, TensionMethod, "tension")
@@ -158,12 +158,12 @@ def _checked(
 
 
 def _on_box(vertices: Array, region: Region) -> Flags:
-    """Which vertices are on a face of the region."""
+    """Mask of vertices on a face of the region."""
     near = ON_BOX * float((region.high - region.low).max())
     return np.asarray(((vertices - region.low < near) | (region.high - vertices < near)).any(axis=1))
 
 
 def _open_faces(faces: Sequence[str], region: Region) -> tuple[str, ...]:
-    """Those of the box alone: the faces of the slab around a plane are none."""
+    """Open faces of the box; the faces of the slab around a plane do not count."""
     flat = None if region.flat is None else AXES[region.flat]
     return tuple(face for face in faces if face[0] != flat)

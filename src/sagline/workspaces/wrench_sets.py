@@ -20,13 +20,13 @@ from sagline.core.results import ByFields, set_fields
 
 
 def _wrench(wrench: Array) -> str:
-    """One wrench, without what is zero of it."""
+    """Text of a wrench, without zero force or moment."""
     halves = ((wrench[:3], "N"), (wrench[3:], "N m"))
     return ", ".join(f"({', '.join(n(value) for value in half)}) {unit}" for half, unit in halves if half.any())
 
 
 def _segments(segments: Array) -> str:
-    """Those along the axes by their sizes, all others as so many."""
+    """Text of segments: sizes of those along the axes, number of the others."""
     along = np.count_nonzero(segments, axis=1) == 1
     sizes = np.abs(segments[along]).sum(axis=0)
     parts = [f"±{_each(own, unit)}" for own, unit in ((sizes[:3], "N"), (sizes[3:], "N m")) if own.any()]
@@ -35,7 +35,7 @@ def _segments(segments: Array) -> str:
 
 
 def _each(values: Array, unit: str) -> str:
-    """Three numbers, or one where they are the same."""
+    """Text of three numbers, or of one where they are equal."""
     if np.ptp(values) == 0.0:
         return n(values[0], unit=unit)
     return f"({', '.join(n(value) for value in values)}) {unit}"
@@ -66,7 +66,7 @@ class WrenchSet(ByFields):
     accelerations: Array
 
     def __add__(self, other: WrenchSet) -> WrenchSet:
-        """All sums of a wrench of this set and one of the other."""
+        """Minkowski sum with another set."""
         if not isinstance(other, WrenchSet):
             return NotImplemented
         return WrenchSet(
@@ -79,7 +79,7 @@ class WrenchSet(ByFields):
         )
 
     def __str__(self) -> str:
-        """What it consists of, in a line."""
+        """Description in a line, "±100 N, ±20 N m" for instance."""
         parts = [_wrench(self.center)] if self.center.any() else []
         parts += [_segments(self.segments)] if self.segments.any() else []
         parts += ["an ellipsoid"] * len(self.ellipsoids)
@@ -91,11 +91,11 @@ class WrenchSet(ByFields):
         return " + ".join(parts) or "its weight alone"
 
     def __repr__(self) -> str:
-        """Its kind, and the line."""
+        """Type and description."""
         return f"<{type(self).__name__}: {self}>"
 
     def _fill(self, **parts: Array) -> None:
-        """Let the set be these parts and no others."""
+        """Set the given parts; all others are empty."""
         none = {
             "center": np.zeros(6),
             "segments": np.zeros((0, 6)),
@@ -119,7 +119,7 @@ class WrenchBox(WrenchSet):
     __slots__ = ()
 
     def __init__(self, force: ArrayLike = 0.0, moment: ArrayLike = 0.0, center: ArrayLike | None = None) -> None:
-        """Check the three.
+        """Check force, moment and center.
 
         Args:
             force: Largest difference of each force component [N], a number or shape (3,), >= 0.
@@ -152,7 +152,7 @@ class WrenchEllipsoid(WrenchSet):
         *,
         matrix: ArrayLike | None = None,
     ) -> None:
-        """Check them.
+        """Check semi-axes, center and matrix.
 
         Args:
             force: Semi-axes along the force components [N], a number or shape (3,), >= 0.
@@ -185,7 +185,7 @@ class WrenchPolytope(WrenchSet):
     __slots__ = ()
 
     def __init__(self, corners: ArrayLike) -> None:
-        """Check them.
+        """Check the corners.
 
         Args:
             corners: Wrenches [N, N m], shape (C, 6), C >= 1; others between them do no harm.
@@ -217,7 +217,7 @@ class Accelerations(WrenchSet):
     __slots__ = ()
 
     def __init__(self, linear: float = 0.0, angular: float = 0.0) -> None:
-        """Check both.
+        """Check both accelerations.
 
         Args:
             linear: Largest acceleration of the center of mass along each world axis [m/s^2], >= 0.
@@ -234,17 +234,7 @@ NO_LOAD: Final[WrenchSet] = Accelerations()  # the one point 0: the weight alone
 
 
 def load_of(value: object) -> WrenchSet:
-    """An argument `wrenches`: a set, or None for the weight alone.
-
-    Args:
-        value: What was given.
-
-    Returns:
-        The set.
-
-    Raises:
-        InvalidValueError: If it is neither.
-    """
+    """Argument `wrenches`, checked: a set, or None for the weight alone."""
     if value is None:
         return NO_LOAD
     if not isinstance(value, WrenchSet):
@@ -258,12 +248,12 @@ def _center(center: ArrayLike | None) -> Array:
 
 
 def _six(force: ArrayLike, moment: ArrayLike) -> Array:
-    """Force and moment components, none negative."""
+    """Force and moment components, checked, >= 0, shape (6,)."""
     return np.concatenate([_three(force, "force", "N"), _three(moment, "moment", "N m")])
 
 
 def _three(value: ArrayLike, item: str, unit: str) -> Array:
-    """A number or three of them, none negative, as three."""
+    """One number or three, checked, >= 0, as shape (3,)."""
     given = checked(value, item, unit, low=0.0)
     if given.shape not in ((), (3,)):
         raise InvalidValueError(item, f"of shape {given.shape}", "a number, or shape (3,)", "Give one x, y, z.")
