@@ -6,9 +6,9 @@ from pathlib import Path
 import sagline as sl
 from sagline.cli.run import CELLS, ROBOTS
 from sagline.workspaces.boundary import boundary
-from sagline.workspaces.rays import ray_hull
 from tests.tiers import extended
 from tests.workspaces.levels import ipanema, level_of
+from tests.workspaces.rays import ray_hull
 
 pytestmark = extended
 

@@ -5,10 +5,10 @@ import pytest
 
 import sagline as sl
 from sagline.workspaces.boundary import boundary
-from sagline.workspaces.rays import ray_hull
 from tests.effort import least_seconds
 from tests.tiers import extended
 from tests.workspaces.levels import ipanema, level_of
+from tests.workspaces.rays import ray_hull
 
 TRUE = 9.774  # m^3, by rays extrapolated (9.7742) and by marching cubes extrapolated (9.7740)
 

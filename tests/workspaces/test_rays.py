@@ -5,8 +5,8 @@ from scipy.spatial import ConvexHull
 
 from sagline.core.arrays import Array
 from sagline.workspaces.boundary import boundary
-from sagline.workspaces.rays import generations, ray_hull, ray_hull_by_facets
 from tests.refusal import refused
+from tests.workspaces.rays import generations, ray_hull, ray_hull_by_facets
 from tests.workspaces.shapes import Counted, ball, both, brick, outside
 
 LOW, HIGH = [-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]

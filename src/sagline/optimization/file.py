@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final, TypeVar
 
 from pydantic import model_validator
@@ -87,8 +88,8 @@ class _Part(Entry):
         """Quantity of a key in SI."""
         return in_si(getattr(self, key), unit, key)
 
-    def given(self, units: dict[str, str]) -> dict[str, Any]:
-        """Quantities of the keys that are given."""
+    def given(self, **units: str) -> dict[str, Any]:
+        """Quantities in SI of the keys that are given, by the unit of each."""
         return {key: self.si(key, unit) for key, unit in units.items() if key in self.model_fields_set}
 
 
@@ -123,8 +124,8 @@ class _Choice(_Part):
     tension_max: Any = None
 
     def choice(self) -> CableChoice:
-        cable = Cable(**self.given({"linear_density": "kg/m", "axial_stiffness": "N", "diameter": "m"}))
-        return CableChoice(self.name, cable, **self.given({"cost": "", "tension_max": "N"}))
+        cable = Cable(**self.given(linear_density="kg/m", axial_stiffness="N", diameter="m"))
+        return CableChoice(self.name, cable, **self.given(cost="", tension_max="N"))
 
 
 class _Free(_Part):
@@ -180,10 +181,6 @@ class _Accelerations(_Part):
     linear: Any = 0.0
     angular: Any = 0.0
 
-    def loads(self) -> WrenchSet:
-        """Loads of the accelerations."""
-        return Accelerations(linear=self.si("linear", "m/s^2"), angular=self.si("angular", "rad/s^2"))
-
 
 class _Wrenches(_Part):
     force: Any = 0.0
@@ -197,16 +194,14 @@ class _Wrenches(_Part):
         if isinstance(center, list) and len(center) == 6:
             center = [in_si(one, "N" if k < 3 else "N*m", f"center[{k}]") for k, one in enumerate(center)]
         found = WrenchBox(self.si("force", "N"), self.si("moment", "N*m"), center)
-        return found if self.accelerations is None else found + self.accelerations.loads()
+        if self.accelerations is None:
+            return found
+        return found + Accelerations(**self.accelerations.given(linear="m/s^2", angular="rad/s^2"))
 
 
 class _Box(_Part):
     low: Any
     high: Any
-
-    def box(self) -> PoseBox:
-        """Box of positions."""
-        return PoseBox(self.si("low", "m"), self.si("high", "m"))
 
 
 class _Robust(_Part):
@@ -246,7 +241,7 @@ class _Design(_Part):
         if self.wrenches is not None:
             found["wrenches"] = _made("wrenches", self.wrenches.wrenches)
         if self.box is not None:
-            found["box"] = _made("box", self.box.box)
+            found["box"] = _made("box", partial(PoseBox, **self.box.given(low="m", high="m")))
         if self.grid:
             found["grid"] = tuple(self.grid)
         if self.robust is not None:

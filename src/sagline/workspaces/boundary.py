@@ -16,7 +16,7 @@ from sagline.workspaces.crossing import Brackets, brackets, crossings, distance_
 from sagline.workspaces.grid import Grid, Level, Net, evaluate, merge_vertices, refine_grid, sample_grid, triangulate
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region
-from sagline.workspaces.surface import Components, Surface, components_of, normals_of, volumes_of
+from sagline.workspaces.surface import Components, Surface, components_of, normals_of, vertex_areas, volumes_of
 
 MOST_CELLS: Final = 128  # along an axis
 MOST_HALVED: Final = 256  # along an axis: 17 million nodes, half a gigabyte
@@ -249,12 +249,11 @@ class Outline(Result):
     @property
     def shares(self) -> dict[int, float]:
         """Share of the boundary within the box that each cable limits, the largest first; a third at each corner."""
-        faces = self.surface.faces[~self.on_box]
-        area = np.linalg.norm(normals_of(self.surface.vertices, faces), axis=1)
-        whole = max(float(area.sum()), np.finfo(np.float64).tiny)
-        owners, index = np.unique(self.cable[faces], return_inverse=True)
-        sums = np.bincount(index.ravel(), np.repeat(area / 3.0, 3), minlength=len(owners)) / whole
-        return {int(owners[k]): float(sums[k]) for k in np.argsort(-sums, kind="stable")}
+        areas = vertex_areas(self.surface.vertices, self.surface.faces[~self.on_box])
+        k = np.flatnonzero(areas > 0.0)
+        cables, place = np.unique(self.cable[k], return_inverse=True)
+        sums = np.bincount(place.ravel(), areas[k], minlength=len(cables))
+        return {int(cables[i]): float(sums[i] / sums.sum()) for i in np.argsort(-sums, kind="stable")}
 
 
 def outline(levels: Levels, region: Region) -> Outline:

@@ -20,7 +20,7 @@ from sagline.workspaces.levels import Levels
 from sagline.workspaces.nearest import Nearest
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.region import flat_axis
-from sagline.workspaces.surface import Components, Surface
+from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet
 
 BY_BOX: Final = -1  # of `limiting`: the surface is the face of the box
@@ -116,20 +116,16 @@ class Workspace(Result, Saved):
     @property
     def limits(self) -> tuple[Limit, ...]:
         """Criteria and cables that limit the workspace, the largest share of its surface first."""
-        areas: dict[tuple[int, int], float] = {}
-        faces, vertices = self.surface.faces, self.surface.vertices
-        sides = np.cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
-        own = np.zeros(len(vertices))
-        inner = (self.limiting[faces] != BY_BOX).any(axis=1)  # a face with all corners on the box is the box's
-        np.add.at(own, faces[inner], (np.linalg.norm(sides, axis=1) / 6.0)[inner, None])
-        for criterion, cable, area in zip(self.limiting, self.limiting_cable, own, strict=True):
-            if criterion != BY_BOX:
-                key = (int(criterion), int(cable))
-                areas[key] = areas.get(key, 0.0) + float(area)
-        whole = sum(areas.values())
-        order = sorted(areas, key=lambda key: -areas[key])
+        inner = (self.limiting[self.surface.faces] != BY_BOX).any(axis=1)  # a face with all corners on the box is its
+        areas = vertex_areas(self.surface.vertices, self.surface.faces[inner])
+        k = np.flatnonzero((self.limiting != BY_BOX) & (areas > 0.0))
+        pairs, place = np.unique(
+            np.stack((self.limiting[k], self.limiting_cable[k]), axis=1), axis=0, return_inverse=True
+        )
+        sums = np.bincount(place.ravel(), areas[k], minlength=len(pairs))
         return tuple(
-            Limit(self.criteria[key[0]].title, key[1], areas[key] / whole, key[0]) for key in order if areas[key] > 0
+            Limit(self.criteria[pairs[i, 0]].title, int(pairs[i, 1]), float(sums[i] / sums.sum()), int(pairs[i, 0]))
+            for i in np.argsort(-sums, kind="stable")
         )
 
     @property

@@ -87,6 +87,12 @@ def volumes_of(vertices: Array, faces: Indices) -> Array:
 _TOLD: Final = 8  # volumes that are printed
 
 
+def vertex_areas(vertices: Array, faces: Indices) -> Array:
+    """Area of the surface that belongs to each vertex [m^2], (V,): a third of each of its triangles."""
+    areas = np.linalg.norm(normals_of(vertices, faces), axis=1) / 3.0
+    return np.asarray(np.bincount(faces.ravel(), np.repeat(areas, 3), minlength=len(vertices)), dtype=np.float64)
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Components(Result):
     """The components of a set, the largest first; a cavity belongs to the component around it.
