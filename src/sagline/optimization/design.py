@@ -7,6 +7,8 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.core.arguments import callback, instance, whole_number
@@ -102,8 +104,8 @@ def design(
         allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
         raise InvalidValueError("evaluations", f"{count:,}", allowed, "Allow more, or free less.")
     ledger = Ledger(request, candidates, count, progress)  # refuses before anything is written
-    point = candidates.units(candidates.start[None])[0]
     sample = latin_hypercube(population - 1, dimensions, request.seed)
+    first = np.concatenate((candidates.units(candidates.start[None]), sample))
     with nullcontext() if folder is None else open_record(folder, request) as ledger.record:
-        SEARCHES[request.optimizer](Task(ledger.rate, point, sample, ledger.costs, request.seed, count))
+        SEARCHES[request.optimizer](Task(ledger.rate, first, ledger.costs, request.seed, count))
         return ledger.front()

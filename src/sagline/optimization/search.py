@@ -33,16 +33,14 @@ class Task(NamedTuple):
 
     Attributes:
         rate: Gives the costs of points of the unit cube; a generation at once.
-        start: The robot that one begins with, shape (d,).
-        sample: Points to try besides, shape (K, d).
+        first: Points of the first generation, the robot itself first, shape (K, d).
         goals: How many costs there are, g.
         seed: Of the search.
-        evaluations: How many points may be rated; those of start and sample count.
+        evaluations: Number of points that may be rated, the first generation included.
     """
 
     rate: Rate
-    start: Array
-    sample: Array
+    first: Array
     goals: int
     seed: int
     evaluations: int
@@ -82,7 +80,7 @@ def search_cma(task: Task) -> None:
         Hansen & Ostermeier 2001; restarts with a growing population: Auger & Hansen 2005.
     """
     cma = extra("cma")
-    first = np.concatenate((task.start[None], task.sample))
+    first = task.first
     costs = task.rate(first)[:, 0]
     order = iter(np.argsort(costs, kind="stable"))
     left, population = task.evaluations - len(first), None
@@ -94,7 +92,7 @@ def search_cma(task: Task) -> None:
             return
         while left >= strategy.popsize and not strategy.stop():
             points = strategy.ask()
-            found = task.rate(np.clip(points, 0.0, 1.0)[:, : len(task.start)])[:, 0]
+            found = task.rate(np.clip(points, 0.0, 1.0)[:, : task.first.shape[1]])[:, 0]
             strategy.tell(points, found.tolist())
             left -= len(points)
 
@@ -123,16 +121,15 @@ def search_differential_evolution(task: Task) -> None:
     """
     from scipy.optimize import differential_evolution
 
-    population = np.concatenate((task.start[None], task.sample))
-    generations = task.evaluations // len(population) - 1
+    generations = task.evaluations // len(task.first) - 1
 
     def costs(points: Array) -> Array:  # scipy's points are columns
         return task.rate(np.ascontiguousarray(points.T))[:, 0]
 
     differential_evolution(
         costs,
-        [(0.0, 1.0)] * len(task.start),
-        init=population,
+        [(0.0, 1.0)] * task.first.shape[1],
+        init=task.first,
         maxiter=generations,
         vectorized=True,
         updating="deferred",
@@ -154,10 +151,9 @@ def search_nsga2(task: Task) -> None:
     """
     evaluator, problems = extra("pymoo.core.evaluator"), extra("pymoo.core.problem")
     static, termination = extra("pymoo.problems.static"), extra("pymoo.core.termination")
-    population = np.concatenate((task.start[None], task.sample))
-    dimensions = len(task.start)
+    dimensions = task.first.shape[1]
     problem = problems.Problem(n_var=dimensions, n_obj=task.goals, xl=np.zeros(dimensions), xu=np.ones(dimensions))
-    algorithm = extra("pymoo.algorithms.moo.nsga2").NSGA2(pop_size=len(population), sampling=population)
+    algorithm = extra("pymoo.algorithms.moo.nsga2").NSGA2(pop_size=len(task.first), sampling=task.first)
     algorithm.setup(problem, termination=termination.NoTermination(), seed=task.seed)
     left = task.evaluations
     while left > 0:

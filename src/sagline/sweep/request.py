@@ -55,23 +55,25 @@ class Variable(NamedTuple):
         return "int8" if self.whole or self.codes is not None else "float64"
 
 
-STATUS: Final = Variable("status", "", "how each request ended", codes=PoseStatus)
-PROOF: Final = Variable("proof", "N", "proved least change of the force that makes it feasible, 0 if it is")
-TENSION: Final = Variable("tension", "N", "tension along the chord, T_x / cos phi", a_cable=True)
-LENGTH: Final = Variable("length", "m", "unstrained length L, all cable off the drum", a_cable=True)
-ENOUGH: Final = Variable("enough", "N", "change of the force that suffices")
-MARGIN: Final = Variable("margin", "N", "how much more load the pose can take, below zero how much too much it is")
-LOW: Final = Variable("margin_low", "N", "lower end of the margin's bracket; feasible where it is not below zero")
-HIGH: Final = Variable("margin_high", "N", "upper end of the margin's bracket; infeasible where it is below zero")
-LIMITING: Final = Variable("limiting_cable", "", "cable whose limit moves the margin fastest, -1 for none", whole=True)
-MARGIN_STATUS: Final = Variable("margin_status", "", "what the margin's bracket says", codes=MarginStatus)
+_STATUS: Final = Variable("status", "", "how each request ended", codes=PoseStatus)
+_PROOF: Final = Variable("proof", "N", "proved least change of the force that makes it feasible, 0 if it is")
 
 QUANTITIES: Final = MappingProxyType(
     {
-        "tension": (STATUS, PROOF, TENSION),
-        "length": (STATUS, PROOF, LENGTH),
-        "shortfall": (STATUS, PROOF, ENOUGH),
-        "margin": (MARGIN_STATUS, MARGIN, LOW, HIGH, LIMITING),
+        "tension": (_STATUS, _PROOF, Variable("tension", "N", "tension along the chord, T_x / cos phi", a_cable=True)),
+        "length": (
+            _STATUS,
+            _PROOF,
+            Variable("length", "m", "unstrained length L, all cable off the drum", a_cable=True),
+        ),
+        "shortfall": (_STATUS, _PROOF, Variable("enough", "N", "change of the force that suffices")),
+        "margin": (
+            Variable("margin_status", "", "what the margin's bracket says", codes=MarginStatus),
+            Variable("margin", "N", "how much more load the pose can take, below zero how much too much it is"),
+            Variable("margin_low", "N", "lower end of the margin's bracket; feasible where it is not below zero"),
+            Variable("margin_high", "N", "upper end of the margin's bracket; infeasible where it is below zero"),
+            Variable("limiting_cable", "", "cable whose limit moves the margin fastest, -1 for none", whole=True),
+        ),
     }
 )
 

@@ -19,22 +19,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.sweep.folder import SweepFolder, TaskSize, check_made_here, open_folder
-from sagline.sweep.request import (
-    ENOUGH,
-    HIGH,
-    LENGTH,
-    LIMITING,
-    LOW,
-    MARGIN,
-    MARGIN_STATUS,
-    PROOF,
-    STATUS,
-    TENSION,
-    Part,
-    Request,
-    Variable,
-    variables_of,
-)
+from sagline.sweep.request import Part, Request, Variable, variables_of
 from sagline.sweep.shared_proofs import proofs_of
 from sagline.tension.options import kernel_options
 from sagline.workspaces.margin import MarginStatus
@@ -96,7 +81,7 @@ def numbers_of(request: Request, part: Part) -> dict[str, NDArray[np.generic]]:
 
 def counts_of(numbers: dict[str, NDArray[np.generic]]) -> Counts:
     """Counts of a part from its variables."""
-    name, ends = (STATUS.name, INVERSE_ENDS) if STATUS.name in numbers else (MARGIN_STATUS.name, MARGIN_ENDS)
+    name, ends = ("status", INVERSE_ENDS) if "status" in numbers else ("margin_status", MARGIN_ENDS)
     status = numbers[name]
     feasible, infeasible, left, lost = (int(np.count_nonzero(status == int(code))) for code in ends)
     return Counts(feasible, infeasible, status.size - feasible - infeasible - left - lost, left, lost)
@@ -120,13 +105,13 @@ class _Inverse:
         answers: dict[str, NDArray[Any]] = {}
         if "shortfall" in request.quantities:
             verdicts = decide_rows(self._robot, self._options, rows, wrenches, found)
-            answers[ENOUGH.name] = verdicts.shortfall
-            answers[PROOF.name] = verdicts.brackets[:, PROVED]
+            answers["enough"] = verdicts.shortfall
+            answers["proof"] = verdicts.brackets[:, PROVED]
         else:
-            answers[PROOF.name] = proofs_of(self._robot, self._options, poses, loads, found)
-        answers[STATUS.name] = found.pose_status
-        answers[TENSION.name] = found.results[tables.TENSION]
-        answers[LENGTH.name] = found.results[tables.LENGTH]
+            answers["proof"] = proofs_of(self._robot, self._options, poses, loads, found)
+        answers["status"] = found.pose_status
+        answers["tension"] = found.results[tables.TENSION]
+        answers["length"] = found.results[tables.LENGTH]
         return answers
 
 
@@ -142,11 +127,11 @@ class _Margins:
         poses = _rows(self._request.poses, part.poses)
         found = [self._rows.about(load).rows(poses) for load in self._request.wrenches[part.wrenches]]
         columns: dict[str, list[NDArray[Any]]] = {
-            MARGIN.name: [each.value for each in found],
-            LOW.name: [each.low for each in found],
-            HIGH.name: [each.high for each in found],
-            LIMITING.name: [each.cable for each in found],
-            MARGIN_STATUS.name: [each.status for each in found],
+            "margin": [each.value for each in found],
+            "margin_low": [each.low for each in found],
+            "margin_high": [each.high for each in found],
+            "limiting_cable": [each.cable for each in found],
+            "margin_status": [each.status for each in found],
         }
         return {name: np.stack(values, axis=1).ravel() for name, values in columns.items()}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -38,41 +39,41 @@ class Details(NamedTuple):
     rotation: Indices
 
 
+@dataclass(eq=False)
 class Levels:
     """Least value of all criteria, each over its scale, at positions of the platform: >= 0 inside.
 
-    Where the margin says that the platform cannot be held it decides alone: criteria that look at tensions have none
-    there. Over rotations the least counts, or the greatest where any of them will do.
+    A negative margin decides alone: other criteria have no tensions there. Over rotations the least level counts,
+    or the greatest where any of them will do.
 
     Attributes:
         robot: The robot.
-        wrenches: Loads that it has to bear.
-        orientations: In which it is held.
-        criteria: What has to be met, the margin first.
+        wrenches: Set of loads.
+        orientations: Orientations of the platform.
+        criteria: The criteria, the margin first.
         model: Cable model.
-        tension: How the load is shared.
-        middle: The wrench in the middle of the set, that tensions balance, shape (6,).
-        told: Called after each block: how many poses it had. None for nobody.
+        tension: Tension distribution method.
+        moment_arm: As of `margin` [m].
+        held: Axis along which all positions are the same, and their coordinate [m]; None for none.
+        told: Called after each block with its number of poses.
+        middle: Middle of the wrench set, which the tensions balance, shape (6,).
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        wrenches: WrenchSet,
-        orientations: Orientations,
-        criteria: tuple[Criterion, ...],
-        model: CableModel,
-        tension: TensionMethod,
-        moment_arm: float | None,
-        held: tuple[int, float] | None = None,
-    ) -> None:
-        """Prepare the margin; `moment_arm` as of `margin`, `held` an axis of constant coordinate and its value [m]."""
-        self.robot, self.wrenches, self.orientations, self.criteria = robot, wrenches, orientations, criteria
-        self.model, self.tension, self.middle = model, tension, middle_of(wrenches)
-        self.told: Callable[[int], None] | None = None
-        self._moment_arm, self._held = moment_arm, held
-        self._margins = MarginRows(robot, wrenches, model, moment_arm)
-        self._scales = [one.scale(robot) for one in criteria]
+    robot: Robot
+    wrenches: WrenchSet
+    orientations: Orientations
+    criteria: tuple[Criterion, ...]
+    model: CableModel
+    tension: TensionMethod
+    moment_arm: float | None
+    held: tuple[int, float] | None = None
+    told: Callable[[int], None] | None = None
+
+    def __post_init__(self) -> None:
+        """Prepare the margin."""
+        self.middle = middle_of(self.wrenches)
+        self._margins = MarginRows(self.robot, self.wrenches, self.model, self.moment_arm)
+        self._scales = [one.scale(self.robot) for one in self.criteria]
 
     def __call__(self, positions: Array) -> Array:
         """Levels at positions (N, 3) of the platform origin [m], shape (N,); -inf where no distance is known."""
@@ -92,9 +93,9 @@ class Levels:
 
     def _in_plane(self, positions: Array) -> Array:
         """Positions (N, 3) [m]; of a planar workspace their projections into the plane."""
-        if self._held is None:
+        if self.held is None:
             return positions
-        axis, where = self._held
+        axis, where = self.held
         flat = positions.copy()
         flat[:, axis] = where
         return flat
@@ -102,7 +103,7 @@ class Levels:
     def margins_of(self, wrenches: WrenchSet, positions: Array, rotation: Indices) -> Array:
         """Margins of another wrench set [N], (N,), at positions (N, 3) [m] in the rotations of these indices (N,)."""
         rows = np.hstack((self._in_plane(positions), self.orientations.quaternion[rotation]))
-        return MarginRows(self.robot, wrenches, self.model, self._moment_arm).rows(rows).value
+        return MarginRows(self.robot, wrenches, self.model, self.moment_arm).rows(rows).value
 
     def _block(self, positions: Array) -> Details:
         found = self._in_rotation(positions, 0)
