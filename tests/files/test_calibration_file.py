@@ -15,7 +15,7 @@ from sagline import dump_robot
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
 from sagline.files import calibration_file, format
 from sagline.files.calibration_file import FORMAT
-from sagline.files.netcdf import Seal, read_dataset
+from sagline.files.netcdf import read_dataset
 from sagline.files.robot_file import parse_robot
 from sagline.robot.provenance import Provenance
 from tests.calibration.made_up import made_up
@@ -156,7 +156,7 @@ def read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[xarray.Da
     monkeypatch.setattr(calibration_file, "parse_robot", cache(parse_robot))
 
     def load(data: xarray.Dataset) -> sl.Calibration:
-        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, Seal.WHOLE))
+        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, True))
         return sl.load_calibration(tmp_path / "edited.nc")
 
     return load

@@ -18,7 +18,6 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import FileError, SaglineWarning, dump_robot
 from sagline.files import format, netcdf
-from sagline.files.netcdf import Seal
 from sagline.files.robot_file import parse_robot
 from tests.files.plans import OUTSIDE, SUSPENDED, a_plan, assert_same
 from tests.files.wording import wording
@@ -52,7 +51,7 @@ def read(monkeypatch: pytest.MonkeyPatch) -> Reader:
     monkeypatch.setattr(netcdf, "parse_robot", cache(parse_robot))
 
     def load(data: xr.Dataset) -> sl.Plan:
-        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, Seal.MISSING))
+        monkeypatch.setattr(format, "read_dataset", lambda *_: (data, False))
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SaglineWarning)
             return sl.load_plan("run.nc")

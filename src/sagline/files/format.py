@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar
 
 from sagline.core.arguments import file_path, instance
+from sagline.core.errors import FileError
 from sagline.files.netcdf import Content, file_errors, read_dataset, write_dataset
 
 if TYPE_CHECKING:
@@ -41,11 +42,12 @@ class Format(Content, Generic[T]):
     def load(self, file: os.PathLike[str] | str, unsealed: Callable[[Path], None] | None = None) -> T:
         """Read a file that `save` wrote."""
         path = file_path(file)
-        data, found = read_dataset(path, self)
-        if self.format_of(path, data.attrs) >= self.sealed_from:
-            self.check_sealed(path, found)
-        elif unsealed is not None:
-            unsealed(path)
+        data, sealed = read_dataset(path, self)
+        if self.format_of(path, data.attrs) < self.sealed_from:
+            if unsealed is not None:
+                unsealed(path)
+        elif not sealed:
+            raise FileError(path, "is not as it was written: its digest is missing", self.again, item="digest")
         assert self.unpack is not None
         with file_errors(path):
             return self.unpack(path, data)

@@ -106,11 +106,6 @@ _OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # and their u
 _NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:\[.*\])?\s*")
 
 
-def log_fields(path: Path, text: str) -> dict[str, Any]:
-    """The fields of a log, but for its sensors, from the text of a table."""
-    return _fields(*_read(path, text))
-
-
 def _read(path: Path, text: str) -> tuple[Table, int]:
     """The table, and of how many cables it is."""
     header = next((line for line in text.split("\n") if line.strip()), "")
@@ -131,8 +126,7 @@ def _read(path: Path, text: str) -> tuple[Table, int]:
     if missing := [name for name in _names(kinds[0], cables) if name not in table.columns]:
         shown = ", ".join(missing[:3]) + (", ..." if len(missing) > 3 else "")
         raise line_error(path, table.header, f"missing column {shown}; the last is {kinds[0]}_{cables - 1}")
-    if not table.lines:
-        raise line_error(path, table.header, "no rows below the columns' names; allowed: at least one")
+    table.check_rows()
     return table, cables
 
 
@@ -164,8 +158,8 @@ def _chosen(table: Table, names: Iterable[str], *, all_of_them: bool = True) -> 
     found = [name for name in names if name in table.columns]
     if not found:
         return None
-    if all_of_them and (missing := [name for name in names if name not in found]):
-        raise line_error(table.path, table.header, f"missing column {', '.join(missing)} beside {', '.join(found)}")
+    if all_of_them:
+        table.check_columns(names, f" beside {', '.join(found)}")
     none = np.full(len(table.lines), np.nan)
     return locked(np.stack([table.columns.get(name, none) for name in names], axis=-1))
 
@@ -209,7 +203,7 @@ def _commanded(table: Table) -> Pose | None:
 
 
 def log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
-    """The columns from which `log_fields` has the same fields.
+    """Name with unit and numbers of each column of a log.
 
     Yields:
         Names with units, and the numbers, shape (N,).
@@ -286,7 +280,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
     text = read_text(path, TABLE_LIMIT)
     said, rows = sensors_of_comments(text, path)
     given = said if sensors is None else sensors
-    fields = log_fields(path, rows)
+    fields = _fields(*_read(path, rows))
     for name, key in (("load_cells", "tension"), ("position", "position"), ("rotation", "rotation")):
         if fields[name] is not None and getattr(given, f"{key}_deviation") is None:
             wish = f"# {key}_deviation: {USUAL[key]}"

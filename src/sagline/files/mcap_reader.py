@@ -22,7 +22,7 @@ from sagline.core.memory import check_memory
 from sagline.files.mcap_layout import END, EVENT, EVERY, FORMAT, HEAD, PLAN, RECORD, TRUTH, event_of
 from sagline.files.mcap_writer import check_packages
 from sagline.files.packed import unpack
-from sagline.files.reading import kind_of
+from sagline.files.reading import check_regular, unreadable
 from sagline.files.robot_file import parse_robot
 from sagline.robot.robot import Robot
 
@@ -127,8 +127,7 @@ class LogReader:
         path = self.log.path
         try:
             status = path.stat()
-            if kind := kind_of(status.st_mode):
-                raise FileError(path, f"is {kind.text}", kind.next_step)
+            check_regular(path, status.st_mode)
             if status.st_size < self._offset:
                 raise FileError(path, "has become shorter while it was read", "Read it again; it was begun anew.")
             check_memory(f"{path.name}", 2.0 * (status.st_size - self._offset), "Take a shorter log.")
@@ -140,8 +139,7 @@ class LogReader:
         except InvalidValueError as error:
             raise FileError.of(path, error) from None
         except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-            reason = getattr(error, "strerror", None) or error
-            raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+            raise unreadable(path, error) from None
 
     def _check_kind(self, data: bytes) -> None:
         if data[: len(MAGIC)] == MAGIC:
@@ -259,12 +257,11 @@ def begun(file: os.PathLike[str] | str) -> bool:
     """Whether a log that another process writes can be read yet: False while it is missing or its first bytes are."""
     try:
         path = file_path(file)
-        if kind_of(path.stat().st_mode):
-            return True
+        check_regular(path, path.stat().st_mode)
         with path.open("rb") as stream:
             first = stream.read(len(MAGIC))
     except FileNotFoundError:
         return False
-    except (OSError, ValueError):
+    except (FileError, OSError, ValueError):
         return True
     return first == MAGIC or not MAGIC.startswith(first)

@@ -28,25 +28,10 @@ from sagline.core.arguments import file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError
 from sagline.core.status import Status
+from sagline.files import mcap_layout
 from sagline.files.mcap_layout import (
-    CYCLE,
-    DECIMALS,
-    END,
-    EVENT,
-    HEAD,
-    JSON,
     NANO,
     NONE,
-    PACKED,
-    PLAN,
-    RECORD,
-    SCENE,
-    SCHEMAS,
-    SHARE_SCENE,
-    SHARE_TF,
-    SOURCE,
-    TF,
-    TRUTH,
     Scene,
     columns_of,
     cycle_texts,
@@ -54,7 +39,7 @@ from sagline.files.mcap_layout import (
     head_of,
     transform,
     truth_text,
-)  # fmt: skip
+)
 from sagline.files.packed import pack, pack_dataset, rounded
 from sagline.files.plan_file import plan_dataset
 from sagline.files.robot_file import dump_robot
@@ -114,27 +99,28 @@ class McapFile:
         output: Any = _Unbuffered(file)
         writer: Any = Writer(output, chunk_size=_UNLIMITED, enable_data_crcs=True)  # Any: it is only partly typed
         self._writer = writer
-        writer.start(library=SOURCE)
-        self._attach(HEAD, JSON, head_of(dump_robot(robot), period))
-        kinds: dict[str, tuple[str, int]] = {RECORD: (PACKED, 0)}
+        writer.start(library=mcap_layout.SOURCE)
+        self._attach(mcap_layout.HEAD, mcap_layout.JSON, head_of(dump_robot(robot), period))
+        kinds: dict[str, tuple[str, int]] = {mcap_layout.RECORD: (mcap_layout.PACKED, 0)}
         kinds |= {
-            topic: ("json", writer.register_schema(topic[1:], "jsonschema", text)) for topic, text in SCHEMAS.items()
+            topic: ("json", writer.register_schema(topic[1:], "jsonschema", text))
+            for topic, text in mcap_layout.SCHEMAS.items()
         }
-        for topic, message in ((TF, FrameTransform), (SCENE, SceneUpdate)):
+        for topic, message in ((mcap_layout.TF, FrameTransform), (mcap_layout.SCENE, SceneUpdate)):
             kinds[topic] = ("protobuf", register_schema(writer, message))
         self._channels = {topic: writer.register_channel(topic, *kind) for topic, kind in kinds.items()}
 
     def begin(self, plan: Plan) -> int:
         """Attach a plan; returns its number."""
         number, self._plans = self._plans, self._plans + 1
-        self._attach(PLAN.format(number), PACKED, pack_dataset(plan_dataset(plan)))
+        self._attach(mcap_layout.PLAN.format(number), mcap_layout.PACKED, pack_dataset(plan_dataset(plan)))
         return number
 
     def end(self, number: int, status: str, reason: str) -> None:
         """Attach how a plan ended."""
         self._attach(
-            END.format("none" if number == NONE else number),
-            JSON,
+            mcap_layout.END.format("none" if number == NONE else number),
+            mcap_layout.JSON,
             json.dumps({"status": status, "reason": reason}).encode(),
         )
 
@@ -150,23 +136,30 @@ class McapFile:
         stamps = self._stamps(columns["time"])
         kept = {**columns, "plan": np.array(plan), "zero": zero, "epoch": np.array(self.epoch)}
         for stamp, text in zip(stamps, cycle_texts(kept), strict=True):
-            self._message(CYCLE, stamp, text)
+            self._message(mcap_layout.CYCLE, stamp, text)
             rest()
-        for stamp, row in self._known(columns, stamps, SHARE_TF):
-            self._message(TF, stamp, transform(stamp, row["position"], row["quaternion"]).SerializeToString())
-        for stamp, row in self._known(columns, stamps, SHARE_SCENE):
+        for stamp, row in self._known(columns, stamps, mcap_layout.SHARE_TF):
+            self._message(
+                mcap_layout.TF, stamp, transform(stamp, row["position"], row["quaternion"]).SerializeToString()
+            )
+        for stamp, row in self._known(columns, stamps, mcap_layout.SHARE_SCENE):
             rest()
-            self._message(SCENE, stamp, self._scene.at(stamp, **row).SerializeToString())
-        self._message(RECORD, stamps[-1] if stamps else self.epoch, pack(kept, DECIMALS, rest), self._blocks)
+            self._message(mcap_layout.SCENE, stamp, self._scene.at(stamp, **row).SerializeToString())
+        self._message(
+            mcap_layout.RECORD,
+            stamps[-1] if stamps else self.epoch,
+            pack(kept, mcap_layout.DECIMALS, rest),
+            self._blocks,
+        )
         self._blocks += 1
 
     def event(self, event: Event) -> None:
         """Write an event."""
-        self._message(EVENT, self.stamp(event.time), event_text(event))
+        self._message(mcap_layout.EVENT, self.stamp(event.time), event_text(event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
         """Write where the platform really is."""
-        self._message(TRUTH, self.stamp(time), truth_text(time, position, quaternion))
+        self._message(mcap_layout.TRUTH, self.stamp(time), truth_text(time, position, quaternion))
 
     def close_chunk(self) -> None:
         """Write the chunk so far to the file."""
@@ -384,7 +377,7 @@ class Recorder:
         none = ExecutionStatus.UNKNOWN
         cycles = execution_of(self._tape, self._robot, None, none, "", self._period, self._zero, ())
         columns = columns_of(cycles)
-        columns |= {name: rounded(columns[name], decimals) for name, decimals in DECIMALS.items()}
+        columns |= {name: rounded(columns[name], decimals) for name, decimals in mcap_layout.DECIMALS.items()}
         columns["degraded"] = np.array(self._degraded)
         self._mcap.block(columns, self._plan, self._zero, partial(time.sleep, 0.0))
         self._tape, self._degraded = self._blank(), []

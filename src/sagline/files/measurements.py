@@ -11,7 +11,7 @@ import numpy as np
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array, locked
 from sagline.files.reading import read_text
-from sagline.files.table import TABLE_LIMIT, Table, line_error
+from sagline.files.table import TABLE_LIMIT, Table
 
 # of each kind of column the other one, and what to do where a file has that
 _OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
@@ -74,10 +74,8 @@ def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int
     other, hint = _OTHERS[letter]
     units, strangers = {"time": "s", **dict.fromkeys(names, unit)}, dict.fromkeys(_columns(other, cable_count), hint)
     table = Table.read(path, read_text(path, TABLE_LIMIT), units, strangers)
-    if missing := [name for name in names if name not in table.columns]:
-        raise line_error(path, table.header, f"missing column {', '.join(missing)}; the robot has {cable_count} cables")
-    if not table.lines:
-        raise line_error(path, table.header, "no rows below the columns' names; allowed: at least one")
+    table.check_columns(names, f"; the robot has {cable_count} cables")
+    table.check_rows()
     return table, names
 
 
@@ -129,8 +127,7 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
     """
     path = file_path(file)
     table = Table.read(path, read_text(path, TABLE_LIMIT), UNITS)
-    if missing := [name for name in UNITS if name not in table.columns]:
-        raise line_error(path, table.header, f"missing column {', '.join(missing)}; found: {', '.join(table.columns)}")
+    table.check_columns(UNITS, f"; found: {', '.join(table.columns)}")
     for name, unit in UNITS.items():
         if name != "rise":
             table.refuse(table.columns[name] <= 0.0, name, table.columns[name], unit, f"> 0 {unit}")

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
-from enum import Enum
 from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal, TypeVar
 import numpy as np
 
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.files.reading import kind_of
+from sagline.files.reading import check_regular, unreadable
 from sagline.files.robot_file import parse_robot
 from sagline.files.variables import PARTS
 from sagline.files.writing import atomic_file
@@ -32,30 +31,22 @@ _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
 _BLOCK = 1 << 20  # bytes read at once
 
 
-class Seal(Enum):
-    """State of the digest at the end of a file."""
-
-    WHOLE = "the file is as it was written"
-    BROKEN = "something in it has changed since it was written"
-    MISSING = "it carries no digest"
-
-
 def seal(file: Path) -> None:
     """Put the digest of a file at its end."""
     with file.open("rb+") as handle:
         handle.write(_line(handle, file.stat().st_size))
 
 
-def seal_of(file: Path) -> Seal:
-    """State of the digest at the end of a file."""
+def _digest_is_right(file: Path) -> bool | None:
+    """Whether the digest at the end of a file is that of its content; None if there is none."""
     with file.open("rb") as handle:
         before = max(0, file.stat().st_size - _LENGTH)
         handle.seek(before)
         found = handle.read()
         if not (found.startswith(_HEAD) and found.endswith(_TAIL)):
-            return Seal.MISSING
+            return None
         handle.seek(0)
-        return Seal.WHOLE if found == _line(handle, before) else Seal.BROKEN
+        return found == _line(handle, before)
 
 
 def _line(handle: BinaryIO, size: int) -> bytes:
@@ -122,11 +113,6 @@ class Content:
                 return f"is {what} of sagline, no {self.name}", step
         return f"is no {self.name} of sagline, it names no {self.key}", "Check that this is the file you mean."
 
-    def check_sealed(self, path: Path, found: Seal) -> None:
-        """Refuse a file without a digest."""
-        if found is Seal.MISSING:
-            raise FileError(path, "is not as it was written: its digest is missing", self.again, item="digest")
-
     def attributes(self, title: str) -> dict[str, Any]:
         """Attributes of every file of this content."""
         return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
@@ -177,10 +163,18 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
         seal(partial)
 
 
-def read_dataset(path: Path, content: Content) -> tuple[Dataset, Seal]:
-    """Data set of a file and the state of its digest; FileError if it is missing, damaged or no NetCDF file."""
-    found = _seal(path, content)
-    return _opened(path, content), found
+def read_dataset(path: Path, content: Content) -> tuple[Dataset, bool]:
+    """Data set of an undamaged file, and whether it carries a digest, which is checked before anything else is read."""
+    try:
+        check_regular(path, path.stat().st_mode)  # opening a pipe would wait for its writer
+        right = _digest_is_right(path)
+    except FileNotFoundError:
+        raise FileError(path, "does not exist", "Check its name.") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        raise unreadable(path, error) from None
+    if right is False:
+        raise FileError(path, "is not as it was written: it was damaged or edited", content.again)
+    return _opened(path, content), right is True
 
 
 @contextmanager
@@ -200,28 +194,11 @@ def is_of(path: Path, content: Content) -> bool:
     from h5py import File
 
     try:
-        if kind_of(path.stat().st_mode):
-            return False
+        check_regular(path, path.stat().st_mode)
         with File(path) as file:
             return content.key in file.attrs
-    except (OSError, RuntimeError, ValueError):
+    except (FileError, OSError, RuntimeError, ValueError):
         return False
-
-
-def _seal(path: Path, content: Content) -> Seal:
-    """State of a file's digest, checked before anything else in it is read."""
-    try:
-        if kind := kind_of(path.stat().st_mode):  # opening a pipe would wait for its writer
-            raise FileError(path, f"is {kind.text}", kind.next_step)
-        found = seal_of(path)
-    except FileNotFoundError:
-        raise FileError(path, "does not exist", "Check its name.") from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
-    if found is Seal.BROKEN:
-        raise FileError(path, "is not as it was written: it was damaged or edited", content.again)
-    return found
 
 
 def _opened(path: Path, content: Content) -> Dataset:

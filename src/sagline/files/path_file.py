@@ -56,10 +56,7 @@ def _check_columns(table: Table) -> None:
     """Refuse a table that gives no position, or an orientation in half or in two ways."""
     orientation = table.columns.keys() & set(EULER + QUATERNION)
     wanted = PLACE + next((way for way in (EULER, QUATERNION) if orientation & set(way)), ())
-    if missing := [name for name in wanted if name not in table.columns]:
-        raise line_error(
-            table.path, table.header, f"missing column {', '.join(missing)}; found: {', '.join(table.columns)}"
-        )
+    table.check_columns(wanted, f"; found: {', '.join(table.columns)}")
     if surplus := table.columns.keys() - set(wanted):
         raise line_error(
             table.path,

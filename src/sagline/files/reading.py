@@ -6,44 +6,32 @@ import codecs
 import re
 import stat
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
 from sagline.core.errors import FileError
 
-
-class Kind(NamedTuple):
-    """Kind of a directory entry that is no regular file.
-
-    Attributes:
-        text: What it is.
-        next_step: What to do about it.
-    """
-
-    text: str
-    next_step: str
-
-
-_DEVICE = Kind("a device, not a file", "Name a file.")
-_KINDS = {
-    stat.S_IFDIR: Kind("a folder", "Give the name of a file in it."),
-    stat.S_IFCHR: _DEVICE,
-    stat.S_IFBLK: _DEVICE,
-    stat.S_IFIFO: Kind("a pipe, not a file", "Name a file."),
-    stat.S_IFSOCK: Kind("a socket, not a file", "Name a file."),
-}
-
-
-def kind_of(mode: int) -> Kind | None:
-    """Kind of a directory entry from its mode; None for a regular file.
-
-    Returns:
-        What it is; None for a regular file.
-    """
-    return None if stat.S_ISREG(mode) else _KINDS.get(stat.S_IFMT(mode), Kind("no file", "Name a file."))
-
-
 MEGABYTE: Final = 1_000_000
+_IRREGULAR: Final = {
+    stat.S_IFDIR: ("a folder", "Give the name of a file in it."),
+    stat.S_IFCHR: ("a device, not a file", "Name a file."),
+    stat.S_IFBLK: ("a device, not a file", "Name a file."),
+    stat.S_IFIFO: ("a pipe, not a file", "Name a file."),
+    stat.S_IFSOCK: ("a socket, not a file", "Name a file."),
+}
 _OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-16"}
+
+
+def check_regular(path: Path, mode: int) -> None:
+    """Refuse a path whose mode, as `os.stat` gives it, is not that of a regular file."""
+    if not stat.S_ISREG(mode):
+        kind, step = _IRREGULAR.get(stat.S_IFMT(mode), ("no file", "Name a file."))
+        raise FileError(path, f"is {kind}", step)
+
+
+def unreadable(path: Path, error: Exception) -> FileError:
+    """Error of a file that the system does not let be read, to be raised."""
+    reason = getattr(error, "strerror", None) or error
+    return FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.")
 
 
 def exists(path: Path) -> bool:
@@ -64,13 +52,11 @@ def read_bytes(path: Path, limit: float) -> bytes:
     """
     most = int(limit * MEGABYTE)
     try:
-        if kind := kind_of(path.stat().st_mode):
-            raise FileError(path, f"is {kind.text}", kind.next_step)
+        check_regular(path, path.stat().st_mode)
         with path.open("rb") as file:
             data = file.read(most + 1)
     except (OSError, ValueError) as error:  # ValueError: a path with a zero byte or a lone surrogate
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.") from None
+        raise unreadable(path, error) from None
     if len(data) > most:
         size = max(path.stat().st_size, len(data)) / MEGABYTE
         raise FileError(path, f"has {size:.3g} MB; allowed: {limit:g} MB", "Check that this is the file you mean.")

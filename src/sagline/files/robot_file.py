@@ -10,7 +10,7 @@ from typing import Any
 from sagline.core.arguments import brief, file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError, nearest
-from sagline.files.mesh_file import load_mesh, meters
+from sagline.files.mesh_file import load_mesh
 from sagline.files.reading import exists, read_text
 from sagline.files.robot_schema import SWIVEL_AXES, Place, RobotEntry
 from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validated
@@ -199,12 +199,11 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
 
 
 def _obstacle(place: Place, item: str, path: Path) -> Obstacle:
+    """Obstacle of an entry in the scene of a robot file; a mesh is loaded from beside that file."""
     try:
-        kind = place.kind(item)
-        if kind != "mesh":
-            return place.solid(item, kind)
-        pose = place.pose(item)
-        meters(place.unit, f"{item}.unit")
+        solid = place.solid(item)
     except InvalidValueError as error:
         raise FileError.of(path, error) from None
-    return load_mesh(place.mesh_file(path), place.unit, place.name).placed(pose)
+    if solid is not None:
+        return solid
+    return load_mesh(path.parent / str(place.mesh), place.unit, place.name).placed(place.pose(item))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -37,33 +36,20 @@ _EITHER: Final = "one of box, capsule, sphere, mesh"
 
 
 class Place(Entry):
-    """Obstacle around the robot.
-
-    Attributes:
-        name: What it is called.
-        box: Its edges.
-        center: The box's middle.
-        capsule: Both ends of its middle line.
-        sphere: Its middle.
-        radius: Of a capsule or sphere.
-        mesh: The mesh's file, beside the robot's file.
-        unit: Unit of the mesh's coordinates.
-        position: Where the mesh's origin goes.
-        turned: How a box or mesh is turned about z.
-    """
+    """Obstacle around the robot; which keys go together is said by `_KINDS`."""
 
     name: str
-    box: Any = None
-    center: Any = None
-    capsule: Any = None
-    sphere: Any = None
-    radius: Any = None
-    mesh: str | None = None
-    unit: str = "m"
-    position: Any = None
-    turned: Any = 0.0
+    box: Any = None  # edges
+    center: Any = None  # of a box
+    capsule: Any = None  # both ends of its axis
+    sphere: Any = None  # center
+    radius: Any = None  # of a capsule or sphere
+    mesh: str | None = None  # file, beside the robot's
+    unit: str = "m"  # of the coordinates of a mesh
+    position: Any = None  # of the origin of a mesh
+    turned: Any = 0.0  # angle of a box or mesh about z
 
-    def kind(self, item: str) -> str:
+    def _kind(self, item: str) -> str:
         """Kind of the obstacle; InvalidValueError if its keys do not go together."""
         label(self.name, f"{item}.name")
         given = self.model_fields_set - {"name"}
@@ -79,8 +65,13 @@ class Place(Entry):
             raise InvalidValueError(f"{item}.radius", "missing", "a length", f"Give the {kind}'s radius.")
         return kind
 
-    def solid(self, item: str, kind: str) -> Box | Capsule | Sphere:
-        """Box, capsule or sphere of the entry."""
+    def solid(self, item: str) -> Box | Capsule | Sphere | None:
+        """Box, capsule or sphere of the entry; None for a mesh, whose values are checked but not its file."""
+        kind = self._kind(item)
+        if kind == "mesh":
+            self.pose(item)
+            meters(self.unit, f"{item}.unit")
+            return None
         if kind == "box":
             size = exactly(in_si(self.box, "m", f"{item}.box"), f"{item}.box", "m", (3,), above=0.0)
             return Box(size, self._point(item, "center"), self.pose(item).matrix, self.name)
@@ -95,26 +86,10 @@ class Place(Entry):
         angle = number(in_si(self.turned, "rad", f"{item}.turned"), f"{item}.turned", "rad")
         return Pose.from_euler(self._point(item, "position"), angle, 0.0, 0.0)
 
-    def mesh_file(self, beside: Path) -> Path:
-        """The mesh's file, found from the robot's."""
-        return beside.parent / str(self.mesh)
-
     def _point(self, item: str, key: str) -> Any:
         value = getattr(self, key)
         place = f"{item}.{key}"
         return np.zeros(3) if value is None else exactly(in_si(value, "m", place), place, "m", (3,))
-
-
-def check_scene(places: list[Place]) -> None:
-    """Check the values of a scene; mesh files are not opened."""
-    for k, place in enumerate(places):
-        item = f"scene[{k}]"
-        kind = place.kind(item)
-        if kind == "mesh":
-            place.pose(item)
-            meters(place.unit, f"{item}.unit")
-        else:
-            place.solid(item, kind)
 
 
 _ERROR: Final = "calibration.standard_error."  # where those of a robot's numbers are
@@ -357,7 +332,8 @@ class RobotEntry(_RobotPart):
         """The robot the file describes."""
         keys = self.model_fields_set - {"scene", "tolerances", "calibration"}
         fields = {key: self.given(key) if key in _UNITS else getattr(self, key) for key in keys}
-        check_scene(self.scene)
+        for k, place in enumerate(self.scene):
+            place.solid(f"scene[{k}]")
         fields["cables"] = self.cables.cable()
         if self.winches is not None:
             fields["winches"] = self.winches.winches()

@@ -7,7 +7,7 @@ import csv
 import io
 import re
 from array import array
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from types import MappingProxyType
@@ -86,6 +86,16 @@ class Table:
             table.refuse(wrong, name, column, units[name], "a finite number")
             table.refuse(np.abs(column) > LARGEST, name, column, units[name], f"{REACH} {units[name]}".rstrip())
         return table
+
+    def check_columns(self, names: Iterable[str], hint: str) -> None:
+        """Refuse a table without one of the columns; the hint ends the message."""
+        if missing := [name for name in names if name not in self.columns]:
+            raise line_error(self.path, self.header, f"missing column {', '.join(missing)}{hint}")
+
+    def check_rows(self) -> None:
+        """Refuse a table without rows."""
+        if not self.lines:
+            raise line_error(self.path, self.header, "no rows below the columns' names; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
         """Refuse the first row that is wrong.

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from sagline.core.errors import FileError, is_seen
-from sagline.files.reading import kind_of
+from sagline.files.reading import check_regular
 
 LONGEST = 120  # bytes: with the words and the suffix that follow it stays below the 255 of common file systems
 UNNAMED = "robot"
@@ -47,21 +47,14 @@ def file_stem(name: str, *words: str) -> str:
         'evil-0fbfd372-poses'
     """
     plain = unicodedata.normalize("NFC", name)
-    spaced = "".join(c if _stays(c) else " " for c in plain)
-    stem = _cut("-".join(spaced.split())).strip(".-")
+    # letters, their marks, numbers
+    spaced = "".join(c if c in "._-" or unicodedata.category(c)[0] in "LMN" else " " for c in plain)
+    stem = "-".join(spaced.split()).encode()[:LONGEST].decode(errors="ignore").strip(".-")
     if _DEVICES.fullmatch(stem):
         stem = f"{UNNAMED}-{stem}"
     if not stem or stem != "-".join(plain.split(" ")):
         stem = f"{stem or UNNAMED}-{sha256(name.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
     return "-".join((stem, *words))
-
-
-def _stays(character: str) -> bool:
-    return character in "._-" or unicodedata.category(character)[0] in "LMN"  # letters, their marks, numbers
-
-
-def _cut(text: str) -> str:
-    return text.encode()[:LONGEST].decode(errors="ignore")
 
 
 PREFIX, SUFFIX = ".sagline-", ".part"
@@ -205,8 +198,7 @@ def check_file(file: os.PathLike[str] | str) -> Path:
     if stat.S_ISLNK(mode):
         leads = os.readlink(target)
         raise FileError(target, f"is a link, to {leads}", "Name the file itself, or remove the link.")
-    if kind := kind_of(mode):
-        raise FileError(target, f"is {kind.text}", kind.next_step)
+    check_regular(target, mode)
     if not os.access(target, os.W_OK):
         raise FileError(target, "is write-protected", "Change its permissions, or give another name.")
     return target
