@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from sagline.files.packed import pack, rounded, unpack
+from sagline.files.packed import pack, round_decimals, unpack
 
 FLOATS = st.floats(width=64)  # NaN with any payload, infinities, both zeros, subnormals
 
@@ -25,7 +25,7 @@ def same(one: np.ndarray[Any, Any], other: np.ndarray[Any, Any]) -> bool:
     st.integers(0, 15),
 )
 def test_whatever_floats_and_whole_numbers_come_back(real: Any, whole: Any, decimals: int) -> None:
-    columns = {"real": real, "whole": whole, "rounded": rounded(np.nan_to_num(real, posinf=9.0, neginf=-9.0), 2)}
+    columns = {"real": real, "whole": whole, "rounded": round_decimals(np.nan_to_num(real, posinf=9.0, neginf=-9.0), 2)}
     found = unpack(pack(columns, {"real": decimals, "rounded": decimals}))
     assert list(found) == list(columns)
     assert all(same(found[name], columns[name]) for name in columns)
@@ -38,7 +38,7 @@ def test_codes_and_flags_keep_their_type(kind: Any) -> None:
 
 
 def test_gaps_stay_among_decimals_and_take_little() -> None:
-    column = rounded(np.linspace(0.0, 1.0, 1000), 3)
+    column = round_decimals(np.linspace(0.0, 1.0, 1000), 3)
     column[[3, 40, 500]] = np.nan, np.inf, -np.inf
     packed = pack({"a": column}, {"a": 3})
     assert same(unpack(packed)["a"], column)
@@ -49,7 +49,7 @@ def test_a_smooth_course_takes_a_fraction_of_its_bytes() -> None:
     time = np.linspace(0.0, 10.0, 2000)
     column = np.sin(time)[:, None] * np.arange(1.0, 9.0)
     assert len(pack({"a": column})) < 0.25 * column.nbytes  # zstandard alone: 0.9
-    noise = rounded(np.random.default_rng(0).normal(size=(2000, 8)), 2)
+    noise = round_decimals(np.random.default_rng(0).normal(size=(2000, 8)), 2)
     entropy = np.log2(100.0 * np.sqrt(2.0 * np.pi * math.e)) / 8.0  # bytes of a number of such noise
     assert len(pack({"a": noise}, {"a": 2})) < 1.15 * entropy * noise.size
 
@@ -58,13 +58,13 @@ def test_rounded_numbers_are_those_that_their_digits_are_read_as() -> None:
     values = np.random.default_rng(1).uniform(-5000.0, 5000.0, 2000)
     for decimals in (0, 2, 7):
         written = [float(f"{value:.{decimals}f}") + 0.0 for value in values]
-        assert np.array_equal(rounded(values, decimals), written)
-    assert not np.signbit(rounded(np.array([-1e-9, -0.0]), 3)).any()
+        assert np.array_equal(round_decimals(values, decimals), written)
+    assert not np.signbit(round_decimals(np.array([-1e-9, -0.0]), 3)).any()
 
 
 def test_what_has_no_such_digits_stays_what_it_is() -> None:
     values = np.array([1e300, -1e17, np.inf, -np.inf, np.nan])
-    assert same(rounded(values, 8), values)
+    assert same(round_decimals(values, 8), values)
     assert same(unpack(pack({"a": values}, {"a": 8}))["a"], values)
 
 

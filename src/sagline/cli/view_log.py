@@ -79,10 +79,10 @@ def view_log(
 
 
 def _wait(logs: list[Path]) -> None:
-    """Until all have been begun."""
-    from sagline.files.mcap_reader import begun
+    """Wait until all logs can be read."""
+    from sagline.files.mcap_reader import has_begun
 
-    while not all(map(begun, logs)):
+    while not all(map(has_begun, logs)):
         time.sleep(LOOK)
 
 

@@ -44,7 +44,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
     if has_drum_data(plan.robot):
         rows["counts"] = counts_of(drums_of(plan.robot), plan.unstrained_length)
     poses = [
-        {name: _rounded(row, _DECIMALS[name]) for name, row in zip(rows, each, strict=True)}
+        {name: _round(row, _DECIMALS[name]) for name, row in zip(rows, each, strict=True)}
         for each in zip(*rows.values(), strict=True)
     ]
     data: dict[str, Any] = {"rate": RATE}
@@ -60,7 +60,7 @@ def _durations(poses: Pose) -> list[float]:
     way = np.linalg.norm(np.diff(poses.position, axis=0), axis=1)
     turn = (poses.rotation[1:] * poses.rotation[:-1].inv()).magnitude()
     times = np.maximum(_PEAK * np.maximum(way / SPEED, turn / ANGULAR_SPEED), DWELL)
-    return _rounded(np.ceil(10.0 * times) / 10.0, 1)
+    return _round(np.ceil(10.0 * times) / 10.0, 1)
 
 
 def _about(plan: CalibrationPoses) -> dict[str, Any]:
@@ -81,7 +81,7 @@ def _about(plan: CalibrationPoses) -> dict[str, Any]:
     }
 
 
-def _rounded(row: Array, decimals: int) -> list[Any]:
+def _round(row: Array, decimals: int) -> list[Any]:
     rounded: list[float] = (np.round(row, decimals) + 0.0).tolist()
     return rounded if decimals else [int(number) for number in rounded]
 

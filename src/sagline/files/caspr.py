@@ -18,11 +18,11 @@ from sagline.files.robot_xml import (
     STEEL_ROPE_DENSITY,
     STEEL_ROPE_STIFFNESS,
     Imported,
-    imported,
     number,
     numbers,
     only_child,
     read_xml,
+    with_losses,
 )
 from sagline.robot.pattern import MotionPattern
 from sagline.robot.robot import Robot
@@ -69,13 +69,13 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
     try:
         platform = _platform(read_xml(bodies))
         at = cables_file
-        chosen, lost_sets = _chosen_set(read_xml(cables_file), cable_set)
+        chosen, lost_sets = _select_set(read_xml(cables_file), cable_set)
         legs, lost_cables = _legs(chosen, platform.center_of_mass)
         lost = (*platform.lost, *lost_sets, *lost_cables)
         robot = _robot(bodies.stem.removesuffix("_bodies"), platform, legs, cables)
     except InvalidValueError as error:
         raise FileError.of(at, error) from None
-    return imported(robot, lost)
+    return with_losses(robot, lost)
 
 
 class _Platform(NamedTuple):
@@ -180,7 +180,7 @@ def _lost_of_link(root: Element, link: Element) -> tuple[str, ...]:
     return tuple(lost)
 
 
-def _chosen_set(root: Element, wanted: str | None) -> tuple[Element, tuple[str, ...]]:
+def _select_set(root: Element, wanted: str | None) -> tuple[Element, tuple[str, ...]]:
     sets = {element.get("id", ""): element for element in root.findall("cable_set")}
     name = root.get("default_cable_set", "") if wanted is None else wanted
     if name not in sets:

@@ -20,7 +20,7 @@ from sagline.files.format import Format
 from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, NONE, ROWS, SMALL, TIME, columns_of
 from sagline.files.mcap_reader import AGAIN, Ending, Log, read_log
 from sagline.files.mcap_writer import BLOCK, McapFile, check_packages
-from sagline.files.netcdf import labeled_dataset, numbered, write_dataset
+from sagline.files.netcdf import index_coordinate, labeled_dataset, write_dataset
 from sagline.files.packed import unpack_dataset
 from sagline.files.plan_file import plan_dataset, plan_of
 from sagline.files.robot_file import dump_robot
@@ -143,8 +143,8 @@ def to_dataset(execution: Execution) -> Dataset:
         values = [getattr(event, name) for event in done.events]
         variables[f"event_{name}"] = ("event", [_plain(value) for value in values], {"long_name": what})
     coordinates: dict[str, Any] = {
-        "cable": numbered("cable", done.robot.cable_count),
-        "group": numbered("group", done.samples.age.shape[1]),
+        "cable": index_coordinate("cable", done.robot.cable_count),
+        "group": index_coordinate("group", done.samples.age.shape[1]),
         TIME.name: (ROWS, done.time, TIME.attributes),
     }
     attributes = {

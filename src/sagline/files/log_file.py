@@ -21,7 +21,7 @@ from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, Table, line_error
 from sagline.files.writing import write_text
-from sagline.files.yaml_text import Entry, parse_mapping, validated
+from sagline.files.yaml_text import Entry, parse_mapping, validate
 from sagline.robot.pose import Pose
 
 DEVIATIONS: Final = {
@@ -54,7 +54,7 @@ def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
     rows = "\n".join([""] * count + lines[count:])
     if not any(said):
         return Sensors(), rows
-    entry = validated(parse_mapping("\n".join(said), path), _Sensors, path)
+    entry = validate(parse_mapping("\n".join(said), path), _Sensors, path)
     try:
         return _sensors(entry), rows
     except InvalidValueError as error:
@@ -140,11 +140,11 @@ def _fields(table: Table, cables: int) -> dict[str, Any]:
     for name in _names("length", cables):
         if name in columns:
             table.refuse(columns[name] < 0.0, name, columns[name], "m", ">= 0 m")
-    position = _chosen(table, XYZ, all_of_them=False)
+    position = _stack_columns(table, XYZ, all_of_them=False)
     return {
-        "counts": _chosen(table, _names("count", cables)),
-        "unstrained_length": _chosen(table, _names("length", cables)),
-        "load_cells": _chosen(table, _names("load_cell", cables), all_of_them=False),
+        "counts": _stack_columns(table, _names("count", cables)),
+        "unstrained_length": _stack_columns(table, _names("length", cables)),
+        "load_cells": _stack_columns(table, _names("load_cell", cables), all_of_them=False),
         "position": position,
         "rotation": _rotation(table, ""),
         "time": columns.get("time"),
@@ -152,7 +152,7 @@ def _fields(table: Table, cables: int) -> dict[str, Any]:
     }
 
 
-def _chosen(table: Table, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
+def _stack_columns(table: Table, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
     """Columns side by side, NaN for those that are missing; None where all are."""
     names = list(names)
     found = [name for name in names if name in table.columns]
@@ -166,8 +166,8 @@ def _chosen(table: Table, names: Iterable[str], *, all_of_them: bool = True) -> 
 
 def _rotation(table: Table, suffix: str) -> Array | None:
     """Rotations as unit quaternions, rows of NaN where there is none."""
-    angles = _chosen(table, [name + suffix for name in EULER])
-    quaternion = _chosen(table, [name + suffix for name in QUATERNION])
+    angles = _stack_columns(table, [name + suffix for name in EULER])
+    quaternion = _stack_columns(table, [name + suffix for name in QUATERNION])
     if angles is not None and quaternion is not None:
         way = f"columns alpha{suffix} beside qx{suffix}; allowed: one way"
         raise line_error(table.path, table.header, way)
@@ -191,7 +191,7 @@ def _rotation(table: Table, suffix: str) -> Array | None:
 
 
 def _commanded(table: Table) -> Pose | None:
-    position = _chosen(table, [name + COMMANDED for name in XYZ])
+    position = _stack_columns(table, [name + COMMANDED for name in XYZ])
     rotation = _rotation(table, COMMANDED)
     if position is None:
         if rotation is not None:

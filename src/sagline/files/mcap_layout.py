@@ -29,45 +29,45 @@ NONE: Final = -1  # of a code: there is none
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
 
 
-def _real(name: str, place: str, parts: tuple[str, ...], unit: str, what: str) -> Quantity:
-    return Quantity(name, parts, unit, what, place, SOMEWHERE, infinite=True)
+def _real(name: str, parts: tuple[str, ...], unit: str, long_name: str, source: str = "") -> Quantity:
+    return Quantity(name, parts, unit, long_name, source, SOMEWHERE, infinite=True)
 
 
-def _whole(name: str, place: str, parts: tuple[str, ...], what: str) -> Quantity:
-    return Quantity(name, parts, "", what, place, values=int)
+def _integer(name: str, parts: tuple[str, ...], long_name: str, source: str = "") -> Quantity:
+    return Quantity(name, parts, "", long_name, source, values=int)
 
 
-TIME: Final = _real("time", "time", (), "s", "time on the clock of the link")
+TIME: Final = _real("time", (), "s", "time on the clock of the link")
 CYCLES: Final = (
     Quantity("answered", (), "", "whether there was a sample", values=bool),
     Quantity("state", (), "", "state of the controller at the end of the cycle", codes=State),
-    _real("late", "late", (), "s", "by how much the cycle began too late"),
-    _real("clock", "clock", (), "s", "where on the plan the cycle was, from its start; none beside it"),
-    _real("position", "position", AXIS, "m", "position of the platform origin, estimated from the encoders"),
-    _real("quaternion", "quaternion", TURN, "1", "rotation from platform to world, estimated, scalar last"),
-    _whole("estimate", "estimate", (), f"code of the estimate; {NONE}: none"),
-    _whole("mode", "mode", (), f"code of the command's mode; {NONE}: none was sent"),
-    _real("set_length", "set_length", CABLE, "m", "set point of the unstrained length, with the zero of homing"),
-    _real("set_rate", "set_rate", CABLE, "m/s", "set point of its rate"),
-    _real("set_tension", "set_tension", CABLE, "N", "set point of the tension at the drum"),
-    _real("planned_tension", "planned_tension", CABLE, "N", "tension at the frame end planned for the sample"),
-    _real("correction", "correction", CABLE, "m", "what the tension loop has in the set point of the length"),
-    _real("age", "samples.age", GROUP, "s", "since the newest good block came in"),
-    _whole("counter", "samples.counter", GROUP, "of the blocks"),
-    _real("plc_time", "samples.plc_time", GROUP, "s", "when the PLC wrote its block, on its own clock"),
-    _whole("owner", "samples.owner", GROUP, "who has the grant; 0: nobody"),
-    _whole("echo", "samples.echo", GROUP, "counter of the last command that the PLC took"),
-    _whole("group_status", "samples.status", GROUP, "bits of the PLC's status"),
-    _whole("group_fault", "samples.fault", GROUP, "code of why the PLC acts by itself; 0: it does not"),
-    _whole("discarded", "samples.discarded", GROUP, "blocks that were no good so far"),
-    _real("length", "samples.length", CABLE, "m", "unstrained length off the drum as read, without the zero of homing"),
-    _real("rate", "samples.rate", CABLE, "m/s", "its rate"),
-    _real("torque", "samples.torque", CABLE, "N m", "of the motor at its shaft, positive where it lets cable out"),
-    _real("tension", "samples.tension", CABLE, "N", "tension at the frame end as the load cell reads it"),
-    _real("filtered", "samples.filtered", CABLE, "N", "the same behind the PLC's filter"),
-    _whole("counts", "samples.counts", CABLE, "of the encoder"),
-    _whole("winch_state", "samples.state", CABLE, "code of the winch's state"),
-    _whole("winch_fault", "samples.winch_fault", CABLE, "the drive's own code; 0: none"),
+    _real("late", (), "s", "by how much the cycle began too late"),
+    _real("clock", (), "s", "where on the plan the cycle was, from its start; none beside it"),
+    _real("position", AXIS, "m", "position of the platform origin, estimated from the encoders"),
+    _real("quaternion", TURN, "1", "rotation from platform to world, estimated, scalar last"),
+    _integer("estimate", (), f"code of the estimate; {NONE}: none"),
+    _integer("mode", (), f"code of the command's mode; {NONE}: none was sent"),
+    _real("set_length", CABLE, "m", "set point of the unstrained length, with the zero of homing"),
+    _real("set_rate", CABLE, "m/s", "set point of its rate"),
+    _real("set_tension", CABLE, "N", "set point of the tension at the drum"),
+    _real("planned_tension", CABLE, "N", "tension at the frame end planned for the sample"),
+    _real("correction", CABLE, "m", "what the tension loop has in the set point of the length"),
+    _real("age", GROUP, "s", "since the newest good block came in", "samples.age"),
+    _integer("counter", GROUP, "of the blocks", "samples.counter"),
+    _real("plc_time", GROUP, "s", "when the PLC wrote its block, on its own clock", "samples.plc_time"),
+    _integer("owner", GROUP, "who has the grant; 0: nobody", "samples.owner"),
+    _integer("echo", GROUP, "counter of the last command that the PLC took", "samples.echo"),
+    _integer("group_status", GROUP, "bits of the PLC's status", "samples.status"),
+    _integer("group_fault", GROUP, "code of why the PLC acts by itself; 0: it does not", "samples.fault"),
+    _integer("discarded", GROUP, "blocks that were no good so far", "samples.discarded"),
+    _real("length", CABLE, "m", "unstrained length off the drum as read, without the zero of homing", "samples.length"),
+    _real("rate", CABLE, "m/s", "its rate", "samples.rate"),
+    _real("torque", CABLE, "N m", "of the motor at its shaft, positive where it lets cable out", "samples.torque"),
+    _real("tension", CABLE, "N", "tension at the frame end as the load cell reads it", "samples.tension"),
+    _real("filtered", CABLE, "N", "the same behind the PLC's filter", "samples.filtered"),
+    _integer("counts", CABLE, "of the encoder", "samples.counts"),
+    _integer("winch_state", CABLE, "code of the winch's state", "samples.state"),
+    _integer("winch_fault", CABLE, "the drive's own code; 0: none", "samples.winch_fault"),
 )
 EVERY: Final = (TIME, *CYCLES)
 SMALL: Final = frozenset({"estimate", "mode"})  # whole numbers that are kept in a byte
@@ -107,7 +107,7 @@ SHARE_TF, SHARE_SCENE = 10, 100  # one of so many cycles
 PER_METER: Final = 1e3  # mm
 
 
-class Shown(NamedTuple):
+class CycleField(NamedTuple):
     """A quantity of `/cycle`, of which people need not all digits: `/record` has them.
 
     Attributes:
@@ -123,15 +123,15 @@ class Shown(NamedTuple):
     several: bool = False
 
 
-SHOWN: Final = {
-    "time": Shown(2, "s", "on the clock of the link"),
-    "late": Shown(4, "s", "by how much the cycle began too late"),
-    "clock": Shown(2, "s", "where on the plan, from its start"),
-    "position": Shown(5, "m", "of the platform's origin, estimated from the encoders", True),
-    "tension": Shown(1, "N", "at the frame ends, as the load cells read it", True),
-    "planned_tension": Shown(1, "N", "the same as planned", True),
-    "length_error": Shown(2, "mm", "length that is asked for less that of the encoder", True),
-    "correction": Shown(2, "mm", "what the tension loop has in the lengths", True),
+CYCLE_FIELDS: Final = {
+    "time": CycleField(2, "s", "on the clock of the link"),
+    "late": CycleField(4, "s", "by how much the cycle began too late"),
+    "clock": CycleField(2, "s", "where on the plan, from its start"),
+    "position": CycleField(5, "m", "of the platform's origin, estimated from the encoders", True),
+    "tension": CycleField(1, "N", "at the frame ends, as the load cells read it", True),
+    "planned_tension": CycleField(1, "N", "the same as planned", True),
+    "length_error": CycleField(2, "mm", "length that is asked for less that of the encoder", True),
+    "correction": CycleField(2, "mm", "what the tension loop has in the lengths", True),
 }
 
 
@@ -139,7 +139,7 @@ def _schema(title: str, properties: dict[str, Any]) -> bytes:
     return json.dumps({"title": title, "type": "object", "properties": properties}).encode()
 
 
-def _number(shown: Shown) -> dict[str, Any]:
+def _number(shown: CycleField) -> dict[str, Any]:
     """Schema of a quantity of a cycle."""
     said = {"description": f"{shown.what} [{shown.unit}]"}
     return {"type": "array", "items": {"type": "number"}, **said} if shown.several else {"type": "number", **said}
@@ -147,7 +147,7 @@ def _number(shown: Shown) -> dict[str, Any]:
 
 _TEXT: Final = {"type": "string"}
 SCHEMAS: Final = {
-    CYCLE: _schema("sagline.Cycle", {"state": _TEXT, **{name: _number(shown) for name, shown in SHOWN.items()}}),
+    CYCLE: _schema("sagline.Cycle", {"state": _TEXT, **{name: _number(shown) for name, shown in CYCLE_FIELDS.items()}}),
     EVENT: _schema(
         "sagline.Event",
         {
@@ -159,9 +159,9 @@ SCHEMAS: Final = {
     TRUTH: _schema(
         "sagline.Truth",
         {
-            "time": _number(Shown(0, "s", "on the clock of the twin")),
-            "position": _number(Shown(0, "m", "of the platform's origin", True)),
-            "quaternion": _number(Shown(0, "1", "rotation from platform to world, scalar last", True)),
+            "time": _number(CycleField(0, "s", "on the clock of the twin")),
+            "position": _number(CycleField(0, "m", "of the platform's origin", True)),
+            "quaternion": _number(CycleField(0, "1", "rotation from platform to world, scalar last", True)),
         },
     ),
 }
@@ -181,7 +181,7 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
     """Messages of cycles, for people."""
     away = PER_METER * (columns["set_length"] - columns["length"] - columns["zero"])
     there = {**columns, "length_error": away, "correction": PER_METER * columns["correction"]}
-    kept = {name: _listed(np.round(there[name], shown.digits)) for name, shown in SHOWN.items()}
+    kept = {name: _json_values(np.round(there[name], shown.digits)) for name, shown in CYCLE_FIELDS.items()}
     states = [State(code).name for code in columns["state"].tolist()]
     rows = zip(states, *kept.values(), strict=True)
     names = ("state", *kept)
@@ -209,7 +209,7 @@ def truth_text(time: float, position: Any, quaternion: Any) -> bytes:
     return _text({"time": time, "position": position.tolist(), "quaternion": quaternion.tolist()})
 
 
-def _listed(values: NDArray[Any]) -> list[Any]:
+def _json_values(values: NDArray[Any]) -> list[Any]:
     """Values as JSON knows them: None for what is no number, and for rows of nothing else."""
     known = np.isfinite(values)
     if known.all():

@@ -253,7 +253,7 @@ def read_log(file: os.PathLike[str] | str) -> Log:
     return log
 
 
-def begun(file: os.PathLike[str] | str) -> bool:
+def has_begun(file: os.PathLike[str] | str) -> bool:
     """Whether a log that another process writes can be read yet: False while it is missing or its first bytes are."""
     try:
         path = file_path(file)

@@ -40,7 +40,7 @@ from sagline.files.mcap_layout import (
     transform,
     truth_text,
 )
-from sagline.files.packed import pack, pack_dataset, rounded
+from sagline.files.packed import pack, pack_dataset, round_decimals
 from sagline.files.plan_file import plan_dataset
 from sagline.files.robot_file import dump_robot
 from sagline.files.writing import check_file
@@ -377,7 +377,7 @@ class Recorder:
         none = ExecutionStatus.UNKNOWN
         cycles = execution_of(self._tape, self._robot, None, none, "", self._period, self._zero, ())
         columns = columns_of(cycles)
-        columns |= {name: rounded(columns[name], decimals) for name, decimals in mcap_layout.DECIMALS.items()}
+        columns |= {name: round_decimals(columns[name], decimals) for name, decimals in mcap_layout.DECIMALS.items()}
         columns["degraded"] = np.array(self._degraded)
         self._mcap.block(columns, self._plan, self._zero, partial(time.sleep, 0.0))
         self._tape, self._degraded = self._blank(), []

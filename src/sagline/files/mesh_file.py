@@ -124,11 +124,11 @@ def first_crossing(mesh: Mesh) -> Array | None:
     result = fcl.CollisionResult()
     fcl.collide(one, other, request, result)
     pairs = np.array([(contact.b1, contact.b2) for contact in result.contacts], dtype=np.int64).reshape(-1, 2)
-    apart = _apart(mesh.faces, pairs)
+    apart = _without_common_vertex(mesh.faces, pairs)
     return None if not apart.any() else np.array(result.contacts[int(np.argmax(apart))].pos)
 
 
-def _apart(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
+def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
     """Flags of pairs of triangles without a common corner."""
     one, other = faces[pairs[:, 0]], faces[pairs[:, 1]]
     return np.asarray(~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2)))
@@ -153,7 +153,7 @@ def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) ->
         raise FileError(target, "has an ending that no surface is written with", f"Take {', '.join(ENDINGS)}.")
     if not len(surface.faces):
         raise InvalidValueError("surface", "empty", "a surface with triangles", "Look for the set elsewhere.")
-    tints = None if colors is None else _checked(colors, len(surface.vertices))
+    tints = None if colors is None else _check_colors(colors, len(surface.vertices))
     check_file(target)
     content = None if ending in _VTK else _by_trimesh(surface, ending[1:], tints)
     package = _vtk_package(target) if content is None else ""
@@ -166,7 +166,7 @@ def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) ->
             _by_pyvista(surface, partial, ending)
 
 
-def _checked(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
+def _check_colors(colors: ArrayLike, count: int) -> NDArray[np.uint8]:
     given = np.asarray(colors)
     if given.shape != (count, 3) or given.dtype.kind not in "ui" or given.min() < 0 or given.max() > 255:
         found = f"of {given.dtype}, shape {given.shape}"

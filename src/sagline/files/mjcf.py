@@ -160,7 +160,7 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     instance(robot, Robot, "robot")
     if instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model a pose.")
-    lengths = _held(robot, pose) if unstrained_length is None else _checked(robot, unstrained_length)
+    lengths = _lengths_at_rest(robot, pose) if unstrained_length is None else _check_lengths(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths
     lead, over_pulley = lead_of(robot, pose), pulleys_of(robot).radius > 0.0
     dynamics = _dynamics(robot, pose, stiffness)
@@ -215,7 +215,7 @@ def _dynamics(robot: Robot, pose: Pose, stiffness: Array) -> _Dynamics:
     return _Dynamics(step, _STRETCH_DAMPING / fastest, float(drag))
 
 
-def _held(robot: Robot, pose: Pose) -> Array:
+def _lengths_at_rest(robot: Robot, pose: Pose) -> Array:
     plan = inverse(robot, pose, model=Elastic())
     if not plan.feasible:
         raise InvalidValueError(
@@ -227,7 +227,7 @@ def _held(robot: Robot, pose: Pose) -> Array:
     return plan.unstrained_length
 
 
-def _checked(robot: Robot, lengths: ArrayLike) -> Array:
+def _check_lengths(robot: Robot, lengths: ArrayLike) -> Array:
     array = checked(lengths, "unstrained_length", "m", low=_SHORTEST)
     if array.shape != (robot.cable_count,):
         raise InvalidValueError(

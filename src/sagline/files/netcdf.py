@@ -140,7 +140,7 @@ def labeled_dataset(
     return Dataset(variables, Coordinates({**labels, **(coordinates or {})}, indexes={}), attributes)
 
 
-def numbered(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
+def index_coordinate(dimension: str, count: int) -> tuple[str, Any, dict[str, str]]:
     """Coordinate that counts cables or the like from 0."""
     return dimension, np.arange(count), {"long_name": f"{dimension}, counted from 0"}
 
@@ -174,7 +174,7 @@ def read_dataset(path: Path, content: Content) -> tuple[Dataset, bool]:
         raise unreadable(path, error) from None
     if right is False:
         raise FileError(path, "is not as it was written: it was damaged or edited", content.again)
-    return _opened(path, content), right is True
+    return _load(path, content), right is True
 
 
 @contextmanager
@@ -201,7 +201,7 @@ def is_of(path: Path, content: Content) -> bool:
         return False
 
 
-def _opened(path: Path, content: Content) -> Dataset:
+def _load(path: Path, content: Content) -> Dataset:
     from h5py import File
     from xarray import open_dataset
 

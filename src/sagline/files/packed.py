@@ -49,7 +49,7 @@ class _Column:
     order: int
 
 
-def rounded(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
+def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
     """The nearest numbers of so many decimals, each as the float that its digits are read as.
 
     Args:

@@ -14,7 +14,7 @@ from sagline.files.pose_text import FARTHEST, QUATERNION_TOLERANCE, PoseEntry, p
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, Table, line_error
-from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validated
+from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validate
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import quintic_path, septic_path
 from sagline.motion.sampled import path_from_samples
@@ -143,7 +143,7 @@ class _Waypoints(Entry):
 
 
 def _path_from_yaml(path: FilePath, text: str) -> Path:
-    entry = validated(parse_mapping(text, path), _Waypoints, path)
+    entry = validate(parse_mapping(text, path), _Waypoints, path)
     timing: dict[str, Any] = {
         name: in_si(getattr(entry, name), unit, name)
         for name, unit in TIMING_UNITS.items()

@@ -15,7 +15,7 @@ from sagline.cables.model import CableState, CableStatus
 from sagline.cables.models import MODELS
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.format import Format
-from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset, numbered, robot_of
+from sagline.files.netcdf import choice_attributes, choice_of, index_coordinate, labeled_dataset, robot_of
 from sagline.files.robot_file import dump_robot
 from sagline.files.variables import SOLVED, SOMEWHERE, STEP, Quantity, check_variables, values_of, variables_of
 from sagline.kinematics.plan import Plan
@@ -243,7 +243,7 @@ def plan_dataset(plan: Plan) -> Dataset:
     cables = plan.state.one_robot.cable_count
     machine = () if plan.state.contact is None else MACHINE
     variables = variables_of(plan, (*QUANTITIES, *machine, WINDING, *PROOF, *MOTION, JERK), rows)
-    coordinates = {"cable": numbered("cable", cables), **variables_of(plan, (TIME,), rows)}
+    coordinates = {"cable": index_coordinate("cable", cables), **variables_of(plan, (TIME,), rows)}
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "when the platform stands"})
     data = labeled_dataset(variables, _attributes(plan), coordinates)

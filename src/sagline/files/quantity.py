@@ -48,7 +48,7 @@ def plain_number(text: str) -> float | None:
         return None
     if found[1] is None:
         return float(text.replace(".", ""))
-    return _capped(float(text))
+    return _limit(float(text))
 
 
 def within_reach(number: float) -> bool:
@@ -84,10 +84,10 @@ def _from_text(text: str, unit: str) -> float | None:
         return number
     found = _WITH_UNIT.fullmatch(text)
     factor = _factor(found[2].strip(), unit) if found else None
-    return None if found is None or factor is None else _capped(float(found[1]) * factor)
+    return None if found is None or factor is None else _limit(float(found[1]) * factor)
 
 
-def _capped(number: float) -> float:
+def _limit(number: float) -> float:
     """Number within the range of float64: only words are infinite, not too many digits."""
     return max(-float_info.max, min(number, float_info.max))
 

@@ -13,7 +13,7 @@ from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.mesh_file import load_mesh
 from sagline.files.reading import exists, read_text
 from sagline.files.robot_schema import SWIVEL_AXES, Place, RobotEntry
-from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validated
+from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validate
 from sagline.interference.pairs import Obstacle
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
@@ -82,7 +82,7 @@ def parse_robot(text: str, origin: Path | str) -> Robot:
 
 def robot_entry(text: str, origin: Path | str) -> RobotEntry:
     """Entry of a robot file with known keys of the right type; values are not checked."""
-    return validated(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
+    return validate(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
 
 
 def dump_robot(robot: Robot) -> str:

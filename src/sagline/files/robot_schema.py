@@ -342,9 +342,9 @@ class RobotEntry(_RobotPart):
             fields["inertia"] = self.inertia.about_center(mass)
         if self.test_box is not None:
             fields["test_box"] = PoseBox(*(self.test_box.given(key, "test_box.") for key in ("low", "high", "tilt")))
-        return self._trusted(Robot(**fields))
+        return self._with_tolerances(Robot(**fields))
 
-    def _trusted(self, robot: Robot) -> Robot:
+    def _with_tolerances(self, robot: Robot) -> Robot:
         """The robot with how far its numbers are to be trusted, which shares of them may say."""
         about: dict[str, Any] = {}
         if self.tolerances is not None:

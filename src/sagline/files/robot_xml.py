@@ -147,6 +147,6 @@ class Imported:
     lost: tuple[str, ...]
 
 
-def imported(robot: Robot, lost: tuple[str, ...]) -> Imported:
+def with_losses(robot: Robot, lost: tuple[str, ...]) -> Imported:
     """A robot whose notes tell what was lost, so that its file does too."""
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

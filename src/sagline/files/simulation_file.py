@@ -16,7 +16,7 @@ from sagline.dynamics.simulation.results import EnergyBalance, Occurrence, Simul
 from sagline.dynamics.simulation.winches import SecondOrder
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.files.format import Format
-from sagline.files.netcdf import attributes_with_units, labeled_dataset, numbered, robot_of
+from sagline.files.netcdf import attributes_with_units, index_coordinate, labeled_dataset, robot_of
 from sagline.files.robot_file import dump_robot
 from sagline.files.variables import (
     NONE,
@@ -198,7 +198,7 @@ def pack(simulation: Simulation) -> Dataset:
     if simulation.events:
         variables |= record_variables(simulation.events, EVENTS)
     cables = simulation.robot.cable_count
-    coordinates = {"cable": numbered("cable", cables), **variables_of(simulation, (TIME,), (ROWS,))}
+    coordinates = {"cable": index_coordinate("cable", cables), **variables_of(simulation, (TIME,), (ROWS,))}
     data = labeled_dataset(variables, _attributes(simulation), coordinates)
     check_simulation(data, cables)
     return data

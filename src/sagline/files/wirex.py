@@ -18,10 +18,10 @@ from sagline.files.robot_xml import (
     STEEL_ROPE_DENSITY,
     STEEL_ROPE_STIFFNESS,
     Imported,
-    imported,
     number,
     only_child,
     read_xml,
+    with_losses,
 )
 from sagline.robot.inertia import box_inertia
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
@@ -90,7 +90,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
     assumed: dict[str, str] = {}
     pattern = _pattern(robot, assumed)
     low, high = _limits(root, materials, assumed)
-    mass = _given(platform, "mass", "platform", "kg")
+    mass = _required(platform, "mass", "platform", "kg")
     anchors = [_point(chain, "platform", k) for k, chain in enumerate(chains)]
     winches, lost = _winches(root, chains)
     result = Robot(
@@ -109,10 +109,10 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
         source=f"WireX file {root.get('version', '')}".strip(),
         assumed=assumed,
     )
-    return imported(result, (*lost, *_lost(root)))
+    return with_losses(result, (*lost, *_lost(root)))
 
 
-def _value(element: Element | None, key: str, item: str, unit: str) -> float | None:
+def _optional(element: Element | None, key: str, item: str, unit: str) -> float | None:
     """An attribute's number; None where it is missing, empty, or infinite, which some writers put for unknown."""
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
@@ -120,14 +120,14 @@ def _value(element: Element | None, key: str, item: str, unit: str) -> float | N
     return number(text, f"{item}: {key}", unit)
 
 
-def _given(element: Element, key: str, item: str, unit: str) -> float:
+def _required(element: Element, key: str, item: str, unit: str) -> float:
     return number(element.get(key), f"{item}: {key}", unit)
 
 
 def _point(chain: Element, tag: str, k: int) -> list[float]:
     item = f"chain {k + 1}"
     element = only_child(chain, tag, item)
-    return [_given(element, axis, f"{item}: {tag}", "m") for axis in _AXES]
+    return [_required(element, axis, f"{item}: {tag}", "m") for axis in _AXES]
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
@@ -145,11 +145,11 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
     density, stiffness, diameter = [], [], []
     for element in materials:
         item = f"cable {element.get('name', '')}".strip()
-        modulus = _value(element, "elasticity", item, "Pa")
-        radius = _value(element, "radius", item, "m")
+        modulus = _optional(element, "elasticity", item, "Pa")
+        radius = _optional(element, "radius", item, "m")
         if radius is not None and radius < 0.0:
             raise InvalidValueError(f"{item}: radius", f"{radius:g} m", ">= 0 m", "Correct it in the file.")
-        density.append(_value(element, "weight", item, "kg/m"))
+        density.append(_optional(element, "weight", item, "kg/m"))
         stiffness.append(None if not modulus or not radius else modulus * np.pi * radius**2)
         diameter.append(2.0 * (radius or 0.0))
     missing = [
@@ -172,7 +172,7 @@ def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[
     for k, chain in enumerate(chains):
         item = f"chain {k + 1}: base"
         base = only_child(chain, "base", f"chain {k + 1}")
-        radius, axis = _value(base, "radius", item, "m") or 0.0, _axis(base, item)
+        radius, axis = _optional(base, "radius", item, "m") or 0.0, _axis(base, item)
         if axis is None and radius:
             lost.append(
                 f"The pulley of chain {k + 1} (radius {radius:g} m), whose axis is not vertical: its cable starts "
@@ -196,21 +196,24 @@ def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
     """The way the cable enters its pulley, z of the matrix a11 to a33; up without one, and None if not vertical."""
     if base.get("a33") is None:
         return (0.0, 0.0, 1.0)
-    upright = _given(base, "a33", item, "")
+    upright = _required(base, "a33", item, "")
     # of a rotation: where z stays vertical, the last row is as bare as the last column, whichever of them is z
-    sideways = max(abs(_value(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
+    sideways = max(abs(_optional(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
     return None if sideways > UPRIGHT * abs(upright) or not upright else (0.0, 0.0, float(np.sign(upright)))
 
 
 def _drive(winch: Element) -> dict[str, float]:
     """Drum and motor; a zero is how a file says that it does not know."""
     drum, motor = winch.find("drum"), winch.find("motor")
-    width, grooves = _value(drum, "l_drum", "winch: drum", "m"), _value(drum, "nr_groove", "winch: drum", "")
+    width, grooves = (
+        _optional(drum, "l_drum", "winch: drum", "m"),
+        _optional(drum, "nr_groove", "winch: drum", ""),
+    )
     fields = {
-        "drum_radius": _value(drum, "r_drum", "winch: drum", "m"),
+        "drum_radius": _optional(drum, "r_drum", "winch: drum", "m"),
         "drum_width": width,
         "groove_pitch": width / grooves if width and grooves else None,
-        "inertia": _value(motor, "inertia", "winch: motor", "kg m^2"),
+        "inertia": _optional(motor, "inertia", "winch: motor", "kg m^2"),
     }
     return {name: value for name, value in fields.items() if value}
 
@@ -229,9 +232,9 @@ def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
 
 def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) -> tuple[list[float], list[float]]:
     """Lower limit from the cable, upper from the winch, or else from the cable's breaking load."""
-    low = [_value(element, "minimum_load", "cable", "N") for element in materials]
-    break_at = [_value(element, "breaking_load", "cable", "N") or None for element in materials]
-    winch = _value(root.find("winch/cable"), "f_max", "winch: cable", "N") or None
+    low = [_optional(element, "minimum_load", "cable", "N") for element in materials]
+    break_at = [_optional(element, "breaking_load", "cable", "N") or None for element in materials]
+    winch = _optional(root.find("winch/cable"), "f_max", "winch: cable", "N") or None
     if None in low:
         assumed["tension_min"] = "0 N; the WireX file gives none"
     if winch is None:
@@ -249,7 +252,7 @@ def _center(platform: Element, assumed: dict[str, str]) -> list[float]:
     if center is None:
         assumed["center_of_mass"] = "the platform's origin; the WireX file gives none"
         return [0.0, 0.0, 0.0]
-    return [_given(center, axis, "centerofgravity", "m") for axis in _AXES]
+    return [_required(center, axis, "centerofgravity", "m") for axis in _AXES]
 
 
 def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str]) -> Array:
@@ -257,7 +260,7 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
     matrix = np.full((3, 3), np.nan)
     tensor = platform.find("inertiatensor")
     for (i, row), (j, column) in product(enumerate(_AXES), repeat=2):
-        value = _value(tensor, f"I{row}{column}", "inertiatensor", "kg m^2")
+        value = _optional(tensor, f"I{row}{column}", "inertiatensor", "kg m^2")
         matrix[i, j] = np.nan if value is None else value
     matrix = np.where(np.isnan(matrix), matrix.T, matrix)
     if not np.nan_to_num(matrix).any():

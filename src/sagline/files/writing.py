@@ -83,7 +83,7 @@ def _new_place(folder: Path) -> tuple[Path, int]:
     for _ in range(TRIES):
         place = Path(tempfile.mkdtemp(prefix=PREFIX, suffix=SUFFIX, dir=folder))
         try:
-            lock = _opened(place)
+            lock = _open_lock(place)
         except FileNotFoundError:
             continue
         if try_lock(lock, if_unknown=True) and os.fstat(lock).st_nlink:
@@ -97,13 +97,13 @@ def _remove_if_left(place: Path) -> None:
     with suppress(OSError):
         if place.is_symlink():
             return
-        lock = _opened(place)
+        lock = _open_lock(place)
         if try_lock(lock, if_unknown=False):
             shutil.rmtree(place, ignore_errors=True)
         os.close(lock)
 
 
-def _opened(place: Path) -> int:
+def _open_lock(place: Path) -> int:
     flags = os.O_RDWR | os.O_CREAT
     for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC"):  # neither a link nor a fifo planted there does harm
         flags |= getattr(os, name, 0)
@@ -149,14 +149,14 @@ def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int
             parts = tuple(place / f"{k}{SUFFIX}" for k in range(len(targets)))
             for part in parts:
                 part.touch()
-            _find_room(place / "room", size)
+            _check_space(place / "room", size)
             yield parts
             for part, target in zip(parts, targets, strict=True):
-                _complete(part, target)
+                _finish(part, target)
             old, new = [str(part) for part in parts], [str(target) for target in targets]
             list(map(os.replace, old, new))  # all of it runs in C: Ctrl-C does not get between two names
     except OSError as error:
-        target = _blamed(error, targets)
+        target = _target_of(error, targets)
         raise FileError(target, f"cannot be written ({_reason(error)})", _next_step(target)) from error
     finished = _finished.get()
     if finished is not None:
@@ -238,7 +238,7 @@ def create_folder(folder: os.PathLike[str] | str) -> Path:
     return path
 
 
-def _find_room(file: Path, size: int) -> None:
+def _check_space(file: Path, size: int) -> None:
     """Check that the disk has space for so many bytes: HDF5 crashes on a full one."""
     if size and hasattr(os, "posix_fallocate"):
         with file.open("wb") as handle:
@@ -246,7 +246,7 @@ def _find_room(file: Path, size: int) -> None:
         file.unlink()
 
 
-def _complete(part: Path, target: Path) -> None:
+def _finish(part: Path, target: Path) -> None:
     """Give a file the permissions of the one it replaces, and flush it to the disk."""
     if target.is_file():
         shutil.copymode(target, part)
@@ -254,7 +254,7 @@ def _complete(part: Path, target: Path) -> None:
         os.fsync(handle.fileno())
 
 
-def _blamed(error: OSError, targets: Sequence[Path]) -> Path:
+def _target_of(error: OSError, targets: Sequence[Path]) -> Path:
     """The file that an error is about, by the name of its part; the first if it does not say."""
     name = Path(str(error.filename)).name.removesuffix(SUFFIX)
     return targets[int(name)] if name.isdecimal() and int(name) < len(targets) else targets[0]

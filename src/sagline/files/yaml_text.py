@@ -29,7 +29,7 @@ class Entry(BaseModel):
 Schema = TypeVar("Schema", bound=Entry)
 
 
-def validated(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) -> Schema:
+def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) -> Schema:
     """Entry of a schema from a mapping; FileError for an unknown or missing key, or a value of the wrong type."""
     try:
         return schema.model_validate(data)
@@ -37,13 +37,13 @@ def validated(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str)
         mistakes = error.errors(include_url=False)
     # a misspelt key explains the missing one beside it, so it is told first
     first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
-    key, found, allowed, next_step = _explained(first, schema)
+    key, found, allowed, next_step = _explain(first, schema)
     refused = FileError(origin, f"{key} is {found}{allowed and f'; allowed: {allowed}'}", next_step, item=key)
     refused.value, refused.allowed = found, allowed
     raise refused
 
 
-def _explained(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str, str, str]:
+def _explain(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str, str, str]:
     """The key, its value, what is allowed and the next step."""
     where = mistake["loc"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).removeprefix(".")
@@ -171,7 +171,7 @@ class _PlainLoader(yaml.SafeLoader):
         return node
 
     def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
-        return _resolved(kind, value, implicit)
+        return _tag_of(kind, value, implicit)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
         # PyYAML keeps the last of two equal keys and says nothing; a !!map of something else it refuses itself
@@ -195,11 +195,11 @@ class _PlainDumper(yaml.SafeDumper):
     """Quotes what either reader, the one above or PyYAML's own, would take for something else than a text."""
 
     def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
-        ours = _resolved(kind, value, implicit)
+        ours = _tag_of(kind, value, implicit)
         return ours if ours != f"{_TAG}str" else str(super().resolve(kind, value, implicit))  # type: ignore[no-untyped-call]
 
 
-def _resolved(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
+def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
     """The tag of a value that has none."""
     if kind is yaml.ScalarNode and value is not None and implicit[0]:  # neither quoted nor tagged
         if value in _WORDS:

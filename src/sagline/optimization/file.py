@@ -14,7 +14,7 @@ from sagline.core.arguments import choice, file_path
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
-from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validated
+from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validate
 from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.free import CableChoice, Free, FreeCable, FreeLimit
 from sagline.optimization.free_anchors import FreeAnchors
@@ -74,7 +74,7 @@ def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
         3000.0 N; least_margin
     """
     path = file_path(file)
-    entry = validated(parse_mapping(read_text(path, YAML_LIMIT), path), _Design, path)
+    entry = validate(parse_mapping(read_text(path, YAML_LIMIT), path), _Design, path)
     try:
         return entry.arguments()
     except InvalidValueError as error:

@@ -20,7 +20,7 @@ from sagline.files.path_file import load_path
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
 from sagline.files.robot_file import load_robot
-from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validated
+from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validate
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -118,7 +118,7 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
     if path.suffix.lower() not in (".yaml", ".yml"):
         step = "Give a sweep file: sagline examples writes one."
         raise FileError.of(path, InvalidValueError("the suffix", path.suffix or "missing", ".yaml, .yml", step))
-    entry = validated(parse_mapping(read_text(path, YAML_LIMIT), path), _SweepEntry, path)
+    entry = validate(parse_mapping(read_text(path, YAML_LIMIT), path), _SweepEntry, path)
     try:
         return Request(
             _robots(entry.robots, path.parent),
