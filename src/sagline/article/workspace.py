@@ -9,6 +9,7 @@ import numpy as np
 import sagline as sl
 from sagline.article.drawing import Drawings, axes, legend
 from sagline.core.numbers import n
+from sagline.plot.labels import PLACE
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, Verdict, table_of
 from sagline.workspaces.region import Plane, slice_of
@@ -111,7 +112,7 @@ def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
     """Both boundaries in a plane."""
     plane, box = Plane(normal, at), pair.exact.box
     first, second = plane.axes
-    figure, ax = axes(f"${'xyz'[first]}$ [m]", f"${'xyz'[second]}$ [m]")
+    figure, ax = axes(PLACE[first], PLACE[second])
     for space, color, label in ((pair.exact, BLUE, "with sag"), (pair.straight, VERMILLION, "straight")):
         cut = slice_of(space.levels().details, plane, box.low, box.high, (POINTS, POINTS))
         style = "-" if space is pair.exact else "--"

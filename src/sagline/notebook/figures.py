@@ -22,12 +22,14 @@ from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
 from sagline.plot.calibration import calibration
 from sagline.plot.drawing import draw_at_rest
-from sagline.plot.labels import name_lines
+from sagline.plot.labels import PLACE, TENSIONS, TIME, name_lines
+from sagline.plot.plan import abscissa
 from sagline.plot.robot import pose_of
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
     axes_or_new,
+    cable_look,
     draw_course,
     dressed,
     runs,
@@ -83,9 +85,7 @@ def _(plan: Plan) -> Figure | None:
     state = plan.state
     if not state.pose.shape:
         return _whole(draw_at_rest(state.one_robot, state.pose, plan))
-    clock = np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
-    label = r"chord tension $\tau$ [N]"
-    return _courses(clock, plan.chord_tension, "pose" if plan.path is None else "time [s]", label, ~plan.feasible)
+    return _courses(*abscissa(plan), plan.chord_tension, TENSIONS["chord_tension"][0], ~plan.feasible)
 
 
 @figure_of.register
@@ -93,14 +93,13 @@ def _(proof: Confirmation) -> Figure | None:
     plan = proof.plan
     if not plan.state.pose.shape:
         return None
-    clock = np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
-    axis = "pose" if plan.path is None else "time [s]"
-    return _courses(clock, 1e3 * proof.position_error, axis, "position error [mm]", ~proof.held, ("$x$", "$y$", "$z$"))
+    error = 1e3 * proof.position_error
+    return _courses(*abscissa(plan), error, "position error [mm]", ~proof.held, ("$x$", "$y$", "$z$"))
 
 
 @figure_of.register
 def _(run: Simulation) -> Figure | None:
-    return _courses(run.time, run.tensions, "time [s]", "tension at the frame [N]", np.zeros(run.time.size, dtype=bool))
+    return _courses(run.time, TIME, run.tensions, "tension at the frame [N]", np.zeros(run.time.size, dtype=bool))
 
 
 @figure_of.register
@@ -109,7 +108,7 @@ def _(path: Path) -> Figure | None:
     x, y, _ = path.pose.position[_chosen(path.pose.position)].T
     ax.plot(x, y, color=BLUE, linewidth=1.3)
     ax.plot(x[:1], y[:1], "o", color=BLUE, markersize=5.0)
-    dressed(ax, "$x$ [m]", "$y$ [m]")
+    dressed(ax, *PLACE[:2])
     ax.set_aspect("equal", adjustable="datalim")
     return _whole(ax)
 
@@ -130,7 +129,7 @@ def _(space: Workspace) -> Figure | None:
         color = COLORS[k % len(COLORS)]
         ax.contour(space.axes[first], space.axes[second], level[:, :, row].T, levels=[0.0], colors=[color])
         ax.plot([], [], color=color, label=f"${'xyz'[third]}$ = {space.axes[third][row]:.3g} m")
-    dressed(ax, f"${'xyz'[first]}$ [m]", f"${'xyz'[second]}$ [m]")
+    dressed(ax, PLACE[first], PLACE[second])
     ax.set_aspect("equal")
     name_lines(ax)
     return _whole(ax)
@@ -142,17 +141,15 @@ def _(found: Calibration) -> Figure | None:
 
 
 def _courses(
-    clock: Array, values: Array, axis: str, label: str, gaps: Flags, names: tuple[str, ...] | None = None
+    clock: Array, axis: str, values: Array, label: str, gaps: Flags, names: tuple[str, ...] | None = None
 ) -> Figure:
     """Lines over time, with as many samples as are seen."""
     figure = sheet(3.2)
     ax = figure.add_subplot()
     chosen = _chosen(values)
     for i, course in enumerate(values[chosen].T[:MOST_CABLES]):
-        style = "-" if i % 2 == 0 or names else (0, (4.0, 1.6))
-        color = COLORS[(i if names else i // 2) % len(COLORS)]
-        name = names[i] if names else f"cable {i}"
-        draw_course(ax, clock[chosen], course, color=color, linestyle=style, linewidth=1.2, label=name)
+        look = {"color": COLORS[i], "label": names[i]} if names else {**cable_look(i), "label": f"cable {i}"}
+        draw_course(ax, clock[chosen], course, **look, linewidth=1.2)
     shade(ax, clock, runs(gaps)[:MOST_SAMPLES], "no answer")
     dressed(ax, axis, label)
     if axis == "pose":

@@ -16,7 +16,7 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import fitting, wrapped
+from sagline.plot.labels import PLACE, fitting, wrapped
 from sagline.plot.sheet import COLORS, GAP_COLOR, VERMILLION, dressed, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
@@ -238,7 +238,7 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
             f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if np.isfinite(values).any() else "told by nothing"
         )
         ax.set_title(f"{name}, {told}", fontsize=current().tick)
-        dressed(ax, "$x$ [m]", "$y$ [m]")
+        dressed(ax, *PLACE[:2])
         ax.grid(visible=False)
         ax.set_aspect("equal")
         ax.label_outer()

@@ -21,7 +21,7 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.response import FrequencyResponse, drawn_curves, response_curves
 from sagline.dynamics.vibration.vibration import Vibration
-from sagline.plot.labels import above, name_lines, wrapped
+from sagline.plot.labels import PLACE, TIME, above, name_lines, wrapped
 from sagline.plot.sheet import BLUE, COLORS, DASHED, GAP_COLOR, TICK, VERMILLION, WIDTH, axes_or_new, dressed, sheet
 from sagline.plot.style import current
 
@@ -71,7 +71,7 @@ def energy(simulation: Simulation) -> Figure:
         above.set_xlim(time[0], time[-1])
     name_lines(above)
     below.plot(time, balance.error, color="black", linewidth=1.0, label="error of the balance")
-    dressed(below, "time [s]", "error [J]")
+    dressed(below, TIME, "error [J]")
     _mark_events(below, simulation, named=False)
     least = ROUNDING * _largest(*courses.values(), balance.potential)
     low, high = below.get_ylim()
@@ -234,8 +234,8 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
         ax.set_title(f"$z$ = {z[row]:.3g} m", fontsize=current().tick)
         ax.set_aspect("equal")
         ax.tick_params(labelsize=current().tick, length=3.0, width=0.6)
-        ax.set_xlabel("$x$ [m]", fontsize=current().label)
-        ax.set_ylabel("$y$ [m]", fontsize=current().label)
+        ax.set_xlabel(PLACE[0], fontsize=current().label)
+        ax.set_ylabel(PLACE[1], fontsize=current().label)
         ax.label_outer()
     bar = figure.colorbar(ScalarMappable(scale, MAP_COLORS), ax=list(panels.flat), shrink=0.8, pad=0.02)
     bar.set_label(label, fontsize=current().label)

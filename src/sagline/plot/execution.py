@@ -10,7 +10,7 @@ from sagline.control.execution import Execution, null_space_error, position_erro
 from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
-from sagline.plot.labels import above, name_lines
+from sagline.plot.labels import TIME, above, name_lines
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
@@ -98,7 +98,7 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
         spans = [(clock[first], clock[last] + done.period - clock[first]) for first, last in runs(there)]
         if spans:
             ax.broken_barh(spans, (0.0, 1.0), facecolors=color, label=name, linewidth=0.0)
-    dressed(ax, "time [s]", "")
+    dressed(ax, TIME, "")
     ax.set_yticks([])
     ax.grid(visible=False)
     ax.spines["left"].set_visible(False)
@@ -187,7 +187,7 @@ def _line(ax: Axes, clock: Array, course: Array, **look: object) -> None:
 
 def _finished(ax: Axes, clock: Array, label: str) -> Axes:
     """Labels of the axes, their limits, and names of the lines."""
-    dressed(ax, "time [s]", label)
+    dressed(ax, TIME, label)
     _limit(ax, clock)
     name_lines(ax)
     return ax

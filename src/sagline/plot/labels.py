@@ -1,10 +1,10 @@
-"""Labels in figures: names at the ends of lines, legends, headings that fit the width."""
+"""Labels in figures: axes with their units, names at the ends of lines, legends, headings that fit the width."""
 
 from __future__ import annotations
 
 from math import ceil
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -22,6 +22,19 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
+TIME: Final = "time [s]"
+PLACE: Final = ("$x$ [m]", "$y$ [m]", "$z$ [m]")
+TENSIONS = {  # quantity -> label with unit, and factor from SI
+    "chord_tension": (r"chord tension $\tau$ [N]", 1.0),
+    "horizontal_tension": (r"horizontal tension $T_x$ [N]", 1.0),
+    "vertical_force": (r"vertical force $T_z$ [N]", 1.0),
+    "frame_end_tension": (r"tension at the frame end $T_A$ [N]", 1.0),
+    "platform_end_tension": (r"tension at the platform end $T_B$ [N]", 1.0),
+}
+LENGTHS = {
+    "unstrained_length": (r"unstrained length $L$ [m]", 1.0),
+    "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
+}
 POINT = 1.0 / 72.0  # in
 WIDE = {SANS: 0.58, SERIF: 0.48}  # of the size of the text, that a letter takes
 SHARE = 0.9  # of a figure's width, that a heading may take

@@ -14,7 +14,7 @@ from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
-from sagline.plot.labels import name_all, name_lines
+from sagline.plot.labels import LENGTHS, PLACE, TENSIONS, TIME, name_all, name_lines
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
@@ -37,17 +37,6 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
-TENSIONS = {  # quantity -> label with unit, and factor from SI
-    "chord_tension": (r"chord tension $\tau$ [N]", 1.0),
-    "horizontal_tension": (r"horizontal tension $T_x$ [N]", 1.0),
-    "vertical_force": (r"vertical force $T_z$ [N]", 1.0),
-    "frame_end_tension": (r"tension at the frame end $T_A$ [N]", 1.0),
-    "platform_end_tension": (r"tension at the platform end $T_B$ [N]", 1.0),
-}
-LENGTHS = {
-    "unstrained_length": (r"unstrained length $L$ [m]", 1.0),
-    "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
-}
 OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"
 LEAST_ERROR = 1e-3  # mm: rounding errors are drawn as the flat line that they are, and told
@@ -123,23 +112,23 @@ def overview(plan: Plan) -> Figure:
     return figure
 
 
-def clock_of(plan: Plan) -> Array:
-    """Abscissa of a plan: times of its path [s], or the numbers of its poses, shape (N,).
+def abscissa(plan: Plan) -> tuple[Array, str]:
+    """Times of a plan's path or the numbers of its poses, shape (N,), and their label.
 
     Raises:
         InvalidValueError: If it has no pose.
     """
     if not plan.status.size:
         raise InvalidValueError("plan", "one of no pose", "one pose at least", "Plan some poses first.")
-    return np.arange(plan.status.size, dtype=np.float64) if plan.path is None else plan.path.time
+    return (np.arange(plan.status.size, dtype=np.float64), "pose") if plan.path is None else (plan.path.time, TIME)
 
 
 def dress_over(ax: Axes, plan: Plan, label: str) -> None:
     """Dress axes of what a plan does over time, or over the numbers of its poses."""
-    dressed(ax, "pose" if plan.path is None else "time [s]", label)
+    clock, axis = abscissa(plan)
+    dressed(ax, axis, label)
     if plan.path is None:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    clock = clock_of(plan)
     if clock.size > 1:
         ax.set_xlim(clock[0], clock[-1])
 
@@ -148,7 +137,7 @@ def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str
     """One line a cable, and the infeasible poses shaded."""
     label, scale = table[choice(quantity, "quantity", table)]
     values = scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity))
-    clock = clock_of(plan)
+    clock, _ = abscissa(plan)
     for i, course in enumerate(values.T):
         draw_course(ax, clock, course, **cable_look(i), linewidth=1.1, label=f"cable {i}")
     shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
@@ -204,7 +193,7 @@ def errors(*confirmations: Confirmation) -> Figure:
 
 def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
     plan = instance(confirmation, Confirmation, "confirmation").plan
-    clock = clock_of(plan)
+    clock, _ = abscissa(plan)
     courses = 1e3 * np.atleast_2d(confirmation.position_error)
     for name, course, color, style in zip("xyz", courses.T, COLORS[:3], AXIS_STYLES, strict=True):
         draw_course(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
@@ -247,7 +236,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
     table = TENSIONS | LENGTHS
     label, scale = table[choice(quantity, "quantity", table)]
     values = scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity))
-    clock, robot, count = clock_of(plan), plan.state.one_robot, values.shape[1]
+    (clock, axis), robot, count = abscissa(plan), plan.state.one_robot, values.shape[1]
     columns = min(count, 2 if current().narrow else 4)
     rows = ceil(count / columns)
     figure = sheet(0.4 + rows * ROW_HEIGHT)
@@ -269,7 +258,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
         for limit in (robot.tension_min[i], robot.tension_max[i]):
             if LIMITED.get(quantity) == robot.tension_limits_of and low <= limit <= high:
                 ax.axhline(limit, color=VERMILLION, linewidth=0.8, linestyle=":", zorder=1.8)
-    figure.supxlabel("pose" if plan.path is None else "time [s]", fontsize=current().label)
+    figure.supxlabel(axis, fontsize=current().label)
     figure.supylabel(label, fontsize=current().label)
     return figure
 
@@ -297,7 +286,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
     low, high = float(z.min()), float(z.max())
     height = f"$z$ = {low:g} m" if high - low < LEVEL else f"$z$ from {low:g} m to {high:g} m"
     ax.set_title(height, fontsize=current().tick, loc="right")
-    dressed(ax, "$x$ [m]", "$y$ [m]")
+    dressed(ax, *PLACE[:2])
     ax.set_aspect("equal")
     ax.margins(0.06)
     return ax
@@ -318,7 +307,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
         "xyz", instance(path, Path, "path").twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True
     ):
         ax.plot(path.time, course, color=color, linestyle=style, linewidth=1.3, label=f"$v_{name}$")
-    dressed(ax, "time [s]", "velocity [m/s]")
+    dressed(ax, TIME, "velocity [m/s]")
     if len(path) > 1:
         ax.set_xlim(path.time[0], path.time[-1])
     name_lines(ax)

@@ -18,6 +18,7 @@ from sagline.core.arguments import instance, optional
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
+from sagline.plot.labels import PLACE
 from sagline.plot.sheet import VERMILLION, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
@@ -250,8 +251,8 @@ def dress_space(ax: Axes3D, points: Array, title: str) -> None:
     size = np.maximum(high - low, 0.1 * np.max(high - low))
     middle = 0.5 * (low + high)
     ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
-    for name, axis, share in zip("xyz", (ax.xaxis, ax.yaxis, ax.zaxis), size / size.max(), strict=True):
-        axis.set_label_text(f"${name}$ [m]", fontsize=current().label)
+    for name, axis, share in zip(PLACE, (ax.xaxis, ax.yaxis, ax.zaxis), size / size.max(), strict=True):
+        axis.set_label_text(name, fontsize=current().label)
         axis.labelpad = 7.0
         axis.set_tick_params(labelsize=current().tick, pad=0.0)
         axis.set_major_locator(MaxNLocator(max(1, round(4.5 * share)), steps=[1, 2, 5, 10], prune="both"))

@@ -15,7 +15,7 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import wrapped
+from sagline.plot.labels import PLACE, wrapped
 from sagline.plot.robot import draw_robot, dress_space
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, dressed, sheet
 from sagline.plot.style import current
@@ -78,7 +78,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     beside = plane._replace(at=plane.at + BESIDE * float(high[plane.normal] - plane.at))
     cut = slice_of(space.levels().details, beside, low, high, (shape[0], shape[1]))
     ax = axes_or_new(ax, height=0.9 + 5.6 * float(np.clip(size[second] / size[first], 0.3, 1.3)))
-    dressed(ax, f"${AXES[first]}$ [m]", f"${AXES[second]}$ [m]")
+    dressed(ax, PLACE[first], PLACE[second])
     ax.grid(visible=False)
     ax.set_aspect("equal")
     ax.set(xlim=(low[first], high[first]), ylim=(low[second], high[second]))
