@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import sagline as sl
-from sagline.article.drawing import axes, draw_errors, floored, legend, map_axes
+from sagline.article.drawing import axes, draw_errors, legend, logarithmic_with_floor, map_axes
 from tests.article.conftest import Written
 from tests.tiers import extended
 
@@ -73,7 +73,7 @@ def test_what_is_below_the_floor_is_shaded_and_told_and_nothing_is_lifted() -> N
     _, ax = axes("x", "y")
     for course in courses:
         ax.plot(range(4), course)
-    floored(ax, 1e-6, "below 1 nm")
+    logarithmic_with_floor(ax, 1e-6, "below 1 nm")
     np.testing.assert_array_equal([line.get_ydata() for line in ax.get_lines()], courses)
     ((low, high),) = strips(ax)
     assert (low, high) == pytest.approx((ax.get_ylim()[0], 1e-6), rel=1e-9)
@@ -86,7 +86,7 @@ def test_what_is_below_the_floor_is_shaded_and_told_and_nothing_is_lifted() -> N
 def test_without_anything_below_it_there_is_no_strip() -> None:
     _, ax = axes("x", "y")
     ax.plot([0, 1, 2], [1e-5, np.nan, 1.0])
-    floored(ax, 1e-6, "below 1 nm")
+    logarithmic_with_floor(ax, 1e-6, "below 1 nm")
     assert strips(ax) == []
     assert len(ax.texts) == 0
 

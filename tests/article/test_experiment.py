@@ -19,7 +19,7 @@ from sagline.article.experiment import (
     duration,
     experiment,
     in_process,
-    level,
+    level_poses,
     pair,
     points,
     with_cells,
@@ -84,7 +84,7 @@ def load_cells_are_off_by_their_noise_and_bias_alone(whole: Experiment) -> None:
     off = whole.tension - whole.planned_tension
     np.testing.assert_allclose(off, np.tile(bias.load_cell_bias, (10, 1)), atol=0.6)  # a second's mean, and stiction
     # what lengths could mend of it: a plain projection on the null space of the lengths, from the stiffness
-    here = sl.stiffness(sl.inverse(ROBOT, level(whole.table.desired[3])).state)
+    here = sl.stiffness(sl.inverse(ROBOT, level_poses(whole.table.desired[3])).state)
     slope = here.tension_sensitivity @ here.null_lengths
     seen = slope @ np.linalg.lstsq(slope, off[3])[0]
     assert whole.null_error[3] == pytest.approx(np.abs(seen).max(), rel=0.05)
@@ -96,7 +96,7 @@ def courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> None:
     assert whole.time[-1] == pytest.approx(duration() - 12 * STOP, abs=0.2)
     assert (np.diff(whole.stops) > 0.0).all()
     assert np.abs(whole.cells - whole.planned).max() <= 10.0
-    home = sl.inverse(ROBOT, level(HOME)).unstrained_length
+    home = sl.inverse(ROBOT, level_poses(HOME)).unstrained_length
     path = sl.quintic_path(points(), speed=0.06, rate=10.0)
     lengths = sl.inverse(ROBOT, path).unstrained_length - home
     planned = np.stack([np.interp(whole.time, path.time, column) for column in lengths.T], axis=1)
@@ -105,7 +105,7 @@ def courses_are_those_of_the_plan_without_the_stops(whole: Experiment) -> None:
 
 @extended
 def test_a_cable_that_breaks_ends_it_with_the_place_and_the_reason() -> None:
-    twin = sl.twin.Machine(ROBOT, start=level(HOME), faults=[f"cable 2 breaks at {STOP + 4.0:g} s"])
+    twin = sl.twin.Machine(ROBOT, start=level_poses(HOME), faults=[f"cable 2 breaks at {STOP + 4.0:g} s"])
     watch = Watch(lambda: twin.reading.position)
     with refused("the experiment, on its way to P1", kind=RefusedError) as caught:
         experiment(Controller(ROBOT, twin.link(), record=watch, seed=1), watch)
@@ -121,9 +121,9 @@ def test_drums_and_zeros_of_the_pair_are_off_as_asked() -> None:
     assert nominal.winches.length_zero is not None
     assert true.winches.drum_radius == pytest.approx(0.99 * nominal.winches.drum_radius, rel=1e-12)
     assert true.winches.length_zero - nominal.winches.length_zero == pytest.approx(-6.5e-3, rel=1e-9)
-    twin = sl.twin.Machine(true, nominal=nominal, start=level(HOME))
-    shorter = sl.inverse(ROBOT, level(HOME)).unstrained_length - 6.5e-3
-    expected = sl.forward(ROBOT, shorter, start=level(HOME)).pose.position
+    twin = sl.twin.Machine(true, nominal=nominal, start=level_poses(HOME))
+    shorter = sl.inverse(ROBOT, level_poses(HOME)).unstrained_length - 6.5e-3
+    expected = sl.forward(ROBOT, shorter, start=level_poses(HOME)).pose.position
     np.testing.assert_allclose(twin.reading.position, expected, atol=1e-6)
 
 
@@ -142,7 +142,7 @@ def test_no_tension_loop_mends_a_machine_that_is_off(name: str) -> None:
 
 @pytest.mark.soak
 def test_zeros_that_differ_are_taken_out_of_tensions_without_moving_the_platform() -> None:
-    zero = sl.inverse(ROBOT, level(HOME)).unstrained_length
+    zero = sl.inverse(ROBOT, level_poses(HOME)).unstrained_length
     wrong = np.random.default_rng(3).normal(size=8)
     wrong *= 2e-3 / np.sqrt(np.mean(wrong**2))
     assert ROBOT.winches is not None

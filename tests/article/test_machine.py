@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.article.explanations import Explanation, explanations, information
+from sagline.article.explanations import Explanation, corrected_aic, explanations
 from sagline.article.machine import (
     ANCHORS,
     DENSITY,
@@ -21,9 +21,9 @@ from sagline.article.machine import (
     WIDTH,
     ZERO,
     Errors,
-    machine,
-    rest,
-    wound,
+    rest_positions,
+    robot_with_errors,
+    wound_lengths,
 )
 from sagline.article.table2 import table2
 from sagline.article.ten_poses import HOME, METHOD, tour
@@ -42,7 +42,7 @@ class Planned(NamedTuple):
 
     def error(self, errors: Sequence[Errors]) -> Array:
         """Actual less desired positions [m]."""
-        return rest(ROBOT, self.plan, self.home, errors) - table2().desired
+        return rest_positions(ROBOT, self.plan, self.home, errors) - table2().desired
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def test_table_2_has_distances_for_errors() -> None:
 
 def test_a_machine_is_another_robot() -> None:
     errors = {p.name: p.typical for p in PARAMETERS}
-    robot = machine(ROBOT, errors)
+    robot = robot_with_errors(ROBOT, errors)
     assert robot.winches is not None
     assert ROBOT.winches is not None
     np.testing.assert_allclose(robot.cables.axial_stiffness, 1.2 * 14000.0, rtol=1e-12)  # Table 1: 3.5 GPa, 4 mm²
@@ -76,15 +76,15 @@ def test_a_machine_is_another_robot() -> None:
     np.testing.assert_array_equal(robot.winches.dead_cable, np.full(8, 0.2))
     assert robot.winches.drum_radius is not None
     np.testing.assert_array_equal(robot.winches.drum_radius, ROBOT.winches.drum_radius)
-    bare = machine(ROBOT.replace(winches=None), {PULLEY: 40.0})
+    bare = robot_with_errors(ROBOT.replace(winches=None), {PULLEY: 40.0})
     assert bare.winches is not None
     np.testing.assert_array_equal(bare.winches.pulley_radius, np.full(8, 0.04))
 
 
 def test_what_is_wound_is_counted_from_home(study: Planned) -> None:
     planned, home = study.plan.unstrained_length, study.home.unstrained_length
-    np.testing.assert_array_equal(wound(study.plan, study.home, {}), planned)
-    lengths = wound(study.plan, study.home, {DRUM: 2.0, ZERO: -5.0})
+    np.testing.assert_array_equal(wound_lengths(study.plan, study.home, {}), planned)
+    lengths = wound_lengths(study.plan, study.home, {DRUM: 2.0, ZERO: -5.0})
     np.testing.assert_allclose(lengths - home, 1.02 * (planned - home) - 0.005, atol=1e-12)
 
 
@@ -108,7 +108,7 @@ def test_slope_of_the_vertical_error_over_the_height(study: Planned, name: str, 
 
 
 def test_a_wrong_drum_changes_nothing_at_home(study: Planned) -> None:
-    right, wrong = rest(ROBOT, study.home, study.home, [{}, {DRUM: 2.0}])
+    right, wrong = rest_positions(ROBOT, study.home, study.home, [{}, {DRUM: 2.0}])
     np.testing.assert_allclose(wrong, right, atol=1e-9)
 
 
@@ -172,8 +172,8 @@ def test_a_fit_that_does_not_converge_is_refused(monkeypatch: pytest.MonkeyPatch
 
 
 def test_information_counts_parameters_and_scatter() -> None:
-    assert information(1e-3, 30, 0) == pytest.approx(2.0 + 4.0 / 28.0)  # ln 1 = 0, one unknown: the scatter
-    assert information(math.e * 1e-3, 30, 2) == pytest.approx(60.0 + 6.0 + 24.0 / 26.0)
+    assert corrected_aic(1e-3, 30, 0) == pytest.approx(2.0 + 4.0 / 28.0)  # ln 1 = 0, one unknown: the scatter
+    assert corrected_aic(math.e * 1e-3, 30, 2) == pytest.approx(60.0 + 6.0 + 24.0 / 26.0)
 
 
 def test_the_tour_stops_at_the_ten_poses() -> None:
@@ -188,4 +188,4 @@ def test_the_tour_stops_at_the_ten_poses() -> None:
 
 def test_a_machine_without_rest_says_so(study: Planned) -> None:
     with refused("the changed robot", kind=sl.InvalidValueError):
-        rest(ROBOT, study.plan, study.home, [{}, {ZERO: -1500.0}])
+        rest_positions(ROBOT, study.plan, study.home, [{}, {ZERO: -1500.0}])

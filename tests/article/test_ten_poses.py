@@ -20,7 +20,7 @@ from sagline.article.machine import (
     PULLEY,
     WIDTH,
     ZERO,
-    rest,
+    rest_positions,
 )
 from sagline.article.ten_poses import METHOD, TenPoses, ten_poses
 from sagline.core.arrays import Array
@@ -89,19 +89,19 @@ def test_anchors_raised_lift_the_platform_by_as_much(study: TenPoses) -> None:
 def test_what_is_set_at_home_is_nothing_at_home(study: TenPoses) -> None:
     """A wrong drum, a pulley or dead cable; and a thin pulley or short dead cable is hardly anything anywhere."""
     errors = [{}, {DRUM: 2.0}, {PULLEY: 40.0}, {DEAD: 3.0}, {PULLEY: 40.0, DEAD: 3.0}]
-    right, *wrong = rest(ROBOT, study.home, study.home, errors)
+    right, *wrong = rest_positions(ROBOT, study.home, study.home, errors)
     np.testing.assert_allclose(wrong[0], right, atol=1e-9)
     for one in wrong[1:]:  # the home pose is planned with the empirical model, 0.2 mm of length off
         np.testing.assert_allclose(one, right, atol=3e-5)
-    right, *thin = rest(ROBOT, study.plan, study.home, [{}, {PULLEY: 1e-3}, {DEAD: 1e-5}])
+    right, *thin = rest_positions(ROBOT, study.plan, study.home, [{}, {PULLEY: 1e-3}, {DEAD: 1e-5}])
     np.testing.assert_allclose(thin, [right] * 2, atol=2e-6)
 
 
 def test_many_machines_at_once_are_each_alone(study: TenPoses) -> None:
     errors = [{p.name: p.typical, PULLEY: 10.0 * k} for k, p in enumerate(PARAMETERS)]
-    together = rest(ROBOT, study.plan, study.home, errors)
+    together = rest_positions(ROBOT, study.plan, study.home, errors)
     for one, some in zip(errors, together, strict=True):
-        np.testing.assert_allclose(rest(ROBOT, study.plan, study.home, [one])[0], some, atol=1e-9)
+        np.testing.assert_allclose(rest_positions(ROBOT, study.plan, study.home, [one])[0], some, atol=1e-9)
 
 
 def test_the_best_explanations(study: TenPoses) -> None:
@@ -171,7 +171,7 @@ def test_dead_cable_modulus_and_load_explain_nothing_more(study: TenPoses) -> No
 def test_an_explanation_is_what_the_machine_does(study: TenPoses) -> None:
     for found in (study.best(count) for count in (1, 2, 3)):
         errors = dict(zip((p.name for p in found.parameters), found.values, strict=True))
-        error = rest(ROBOT, study.plan, study.home, [errors])[0] - study.table.desired
+        error = rest_positions(ROBOT, study.plan, study.home, [errors])[0] - study.table.desired
         np.testing.assert_allclose(error, found.predicted, atol=1e-9)
         remaining = study.table.error - error
         assert found.rms == pytest.approx(np.sqrt(np.mean(remaining**2)), rel=1e-9)
@@ -183,7 +183,7 @@ def test_an_explanation_is_what_the_machine_does(study: TenPoses) -> None:
         for parameter in (p for p, limit in zip(found.parameters, found.at_limit, strict=True) if not limit):
             for step in (-0.02 * parameter.plausible, 0.02 * parameter.plausible):
                 other = {**errors, parameter.name: errors[parameter.name] + step}
-                off = rest(ROBOT, study.plan, study.home, [other])[0] - study.table.actual
+                off = rest_positions(ROBOT, study.plan, study.home, [other])[0] - study.table.actual
                 assert np.sqrt(np.mean(off**2)) > found.rms
 
 
@@ -199,9 +199,9 @@ def test_errors_that_were_made_are_found_again(study: TenPoses) -> None:
     """Positions computed for known errors, in place of the measured ones."""
     by_name = {p.name: p for p in PARAMETERS}
     for made in ({ZERO: -12.0, PULLEY: 45.0}, {MODULUS: -20.0, DEAD: 2.0}, {ANCHORS: 30.0, DRUM: 1.5, WIDTH: -8.0}):
-        positions = rest(ROBOT, study.plan, study.home, [made])[0]
+        positions = rest_positions(ROBOT, study.plan, study.home, [made])[0]
         (found,) = explanations(
-            lambda errors: rest(ROBOT, study.plan, study.home, errors) - study.table.desired,
+            lambda errors: rest_positions(ROBOT, study.plan, study.home, errors) - study.table.desired,
             positions - study.table.desired,
             [tuple(by_name[name] for name in made)],
         )

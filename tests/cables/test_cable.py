@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from sagline import Cable, Catenary, InvalidValueError, Robot, dump_robot, identify_cable, load_robot, without_cables
-from sagline.article.machine import PARAMETERS, Parameter, machine
+from sagline.article.machine import PARAMETERS, Parameter, robot_with_errors
 from sagline.cables.rope import ROPES
 from sagline.viewer.snapshot import Settings
 from tests.refusal import refused
@@ -73,7 +73,7 @@ def test_replace_leaves_the_original() -> None:
 
 
 def changed(parameter: Parameter, robot: Robot) -> Robot:
-    return machine(robot, {parameter.name: parameter.typical})
+    return robot_with_errors(robot, {parameter.name: parameter.typical})
 
 
 def saved_and_loaded(robot: Robot) -> Robot:

@@ -13,7 +13,7 @@ from syrupy.assertion import SnapshotAssertion
 import sagline as sl
 from sagline import Damping, VibrationStatus, plot
 from sagline.dynamics.vibration.mode_list import ListedMode
-from sagline.plot.film import shares_told
+from sagline.plot.film import energy_shares
 from tests.plot import made
 from tests.refusal import refused
 from tests.tiers import extended
@@ -229,7 +229,7 @@ def test_a_map_has_the_value_of_a_pose_where_the_pose_is(snapshot: SnapshotAsser
 
 def test_a_film_says_whose_the_energy_is() -> None:
     def told(cable: int | None, share: float) -> str:
-        return shares_told(ListedMode(1, "with cable mass", 2.0, 1.0 - share, cable, share, 0.01))
+        return energy_shares(ListedMode(1, "with cable mass", 2.0, 1.0 - share, cable, share, 0.01))
 
     assert re.findall(r"\d+", told(3, 0.25)) == ["75", "3", "25"]
     assert told(3, 0.004) == told(None, 0.004)

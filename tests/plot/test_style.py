@@ -18,7 +18,7 @@ from scipy.optimize import lsq_linear
 
 import sagline as sl
 from sagline import InvalidValueError, plot
-from sagline.plot.labels import spread
+from sagline.plot.labels import spread_heights
 from tests.plot import made
 from tests.refusal import refused
 from tests.tiers import extended, wide
@@ -142,7 +142,7 @@ def test_names_are_as_near_as_can_be() -> None:
         for _ in range(20):
             heights = generator.uniform(0.0, 1.0, count) ** generator.integers(1, 4)
             spacing = float(generator.uniform(0.02, 0.99 / count))
-            placed = spread(heights, spacing)
+            placed = spread_heights(heights, spacing)
             order = np.argsort(heights, kind="stable")
             # the lowest, and how much more than the spacing lies between neighbors; the top bounds their sum
             free = np.tril(np.ones((count, count)))

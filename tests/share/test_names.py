@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline.share.course import of_plan
-from sagline.share.machine import still
+from sagline.share.machine import robot_drawing
 from sagline.share.page import course_page, robot_page
 
 NAME = """a & b"'><blink></script></title></svg>"""
@@ -72,7 +72,7 @@ def test_the_title_and_the_notes_of_a_run() -> None:
 @pytest.mark.parametrize("name", [NAME, "cogiro"])
 def test_the_description_of_a_drawing(name: str) -> None:
     robot = sl.load_robot("cogiro").replace(name=name)
-    page = Page(still(robot, sl.Pose([0.0, 0.0, 2.0], np.eye(3)), np.full(8, np.nan)))
+    page = Page(robot_drawing(robot, sl.Pose([0.0, 0.0, 2.0], np.eye(3)), np.full(8, np.nan)))
     assert page.tags == {"svg", "path"}
     (description,) = page.descriptions
     assert description.startswith(f"{name}: ")

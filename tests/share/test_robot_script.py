@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 import sagline as sl
 from sagline.robot.bounds import bounds
 from sagline.robot.wheels import wheel_centers
-from sagline.share.machine import machine
+from sagline.share.machine import model_data
 from sagline.statics.chords import chord_geometry
 from sagline.viewer.snapshot import Snapshot
 from tests.chromium import NEEDED, PATIENCE, launched
@@ -59,7 +59,7 @@ def poses(robot: sl.Robot, count: int) -> sl.Pose:
 def found_by(page: Page, robot: sl.Robot, pose: sl.Pose) -> list[dict[str, Any]]:
     pairs = zip(pose.position.tolist(), pose.quaternion.tolist(), strict=True)
     given = [{"position": position, "quaternion": quaternion} for position, quaternion in pairs]
-    answer: list[dict[str, Any]] = page.evaluate(EVERY, [machine(robot), given])
+    answer: list[dict[str, Any]] = page.evaluate(EVERY, [model_data(robot), given])
     return answer
 
 

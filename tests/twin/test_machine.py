@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.article.machine import DEAD, LOAD, MODULUS, PULLEY, machine, rest
+from sagline.article.machine import DEAD, LOAD, MODULUS, PULLEY, rest_positions, robot_with_errors
 from sagline.control import Command, Mode, Sample
 from tests.control.protocol import PERIOD, GroupFault, GroupStatus
 from tests.dynamics.machines import prototype
@@ -202,8 +202,8 @@ def test_a_smaller_drum_lets_out_less() -> None:
 def test_it_begins_where_the_article_s_machine_rests(error: dict[str, float]) -> None:
     """What pulleys and dead cable add to the lengths at home was not counted when the encoders were set."""
     home = sl.inverse(ROBOT, sl.Pose.from_quaternion(HOME.position[None], [[0.0, 0.0, 0.0, 1.0]]))
-    rig = sl.twin.Machine(machine(ROBOT, error), nominal=ROBOT)
-    np.testing.assert_allclose(rig.reading.position, rest(ROBOT, home, home, [error])[0, 0], atol=1e-9)
+    rig = sl.twin.Machine(robot_with_errors(ROBOT, error), nominal=ROBOT)
+    np.testing.assert_allclose(rig.reading.position, rest_positions(ROBOT, home, home, [error])[0, 0], atol=1e-9)
 
 
 def test_the_start_is_the_middle_of_the_test_box() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from sagline.article.drawing import Drawings, axes, legend
-from sagline.article.explanations import Explanation, information
+from sagline.article.explanations import Explanation, corrected_aic
 from sagline.article.machine import ANCHORS, DEAD, DENSITY, LOAD, MODULUS, PULLEY, ZERO
 from sagline.article.sampling import fit_line
 from sagline.article.ten_poses import TenPoses, Trend
@@ -25,7 +25,7 @@ AS_MEASURED = 0.15  # of it: nearer is the measured one
 LOWEST, HIGHEST = "P8", "P7"
 
 
-def explained(study: TenPoses, draw: Drawings) -> Finding:
+def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
     """The best explanations, and what more parameters are worth."""
     one, two, three = (study.best(count) for count in (1, 2, 3))
     second = study.explanations[1][1]
@@ -67,7 +67,7 @@ def explained(study: TenPoses, draw: Drawings) -> Finding:
     )
 
 
-def untold(study: TenPoses) -> Finding:
+def limits_of_ten_points(study: TenPoses) -> Finding:
     """Limits of ten points: parameters that they cannot tell apart."""
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {PULLEY, ANCHORS} for found in few)
@@ -110,7 +110,7 @@ def _table(study: TenPoses) -> Table:
     shown = [group if k == 0 else group[:SHOWN] for k, group in enumerate(study.explanations)]
     rest = study.table.error - study.model_error
     rms, worst = float(np.sqrt(np.mean(rest**2))), float(np.linalg.norm(rest, axis=1).max())
-    found = [("nothing off", rms, worst, rms, information(rms, rest.size, 0))]
+    found = [("nothing off", rms, worst, rms, corrected_aic(rms, rest.size, 0))]
     found += [(_values(one), one.rms, one.worst, one.left_out, one.aicc) for group in shown for one in group]
     return Table(
         f"Nothing, one parameter, and the best {SHOWN} by two and by three; standard uncertainties in parentheses",
@@ -180,7 +180,7 @@ def _percent(share: float) -> str:
     return n(100.0 * share, ".1f", "%")
 
 
-def classes(study: TenPoses) -> Finding:
+def single_causes(study: TenPoses) -> Finding:
     """Every class alone: an example of it, its best value, what that leaves, and why."""
     ranked = study.explanations[0]
     alone = {found.parameters[0].name: found for found in ranked}

@@ -15,7 +15,7 @@ from matplotlib.textpath import TextPath
 
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, Sheet, cable_look, dressed, svg_text, unique_names
+from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, Sheet, cable_look, format_axes, svg_text, unique_names
 from sagline.present.page import Panel
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
     figure = Sheet(figsize=(WIDTH, height))  # fixed margins: half the time of a layout that measures every label
     figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BELOW / height, top=1.0 - ABOVE / height)
     ax = figure.add_subplot()
-    dressed(ax, x, y)
+    format_axes(ax, x, y)
     return figure, ax
 
 
@@ -100,7 +100,7 @@ def _grow(figure: Sheet, more: float) -> None:
     figure.subplots_adjust(bottom=place.bottom * before / after, top=1.0 - ((1.0 - place.top) * before + more) / after)
 
 
-def floored(ax: Axes, floor: float, told: str) -> None:
+def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
     """A logarithmic vertical axis that ends at a floor.
 
     Curves below it run under a shaded strip that says what is there; none is lifted onto the floor. Without any the
@@ -133,7 +133,7 @@ def shades(number: int) -> list[tuple[float, float, float, float]]:
     return [colors(0.85 * k / max(number - 1, 1)) for k in range(number)]
 
 
-def thinned(number: int) -> slice:
+def thinning(number: int) -> slice:
     """Every so many samples."""
     return slice(None, None, max(1, number // MOST_POINTS))
 
@@ -143,7 +143,7 @@ def cables_over_time(
 ) -> tuple[Sheet, Axes]:
     """A line a cable over time, values (N, m); a vertical line at each stop, between which the time is counted."""
     figure, ax = axes("time without stops [s]" if stops else "time [s]", label, height=2.7)
-    part = thinned(len(time))
+    part = thinning(len(time))
     for i, course in enumerate(values[part].T):
         ax.plot(time[part], course, **cable_look(i), linewidth=width, label=name.format(i))
     for stop in stops:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 import sagline as sl
 from sagline import control
-from sagline.article.machine import DRUM, ZERO, Errors, machine
+from sagline.article.machine import DRUM, ZERO, Errors, robot_with_errors
 from sagline.article.table2 import Table2, table2
 from sagline.article.ten_poses import HOME
 from sagline.control.link import PERIOD
@@ -160,7 +160,7 @@ class Experiment:
 
 def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
     """A robot that is other than it was planned, and how it was planned, both with what a twin needs."""
-    true, nominal = machine(robot, errors), robot
+    true, nominal = robot_with_errors(robot, errors), robot
     assert true.winches is not None
     assert robot.winches is not None
     if errors.get(DRUM):
@@ -169,7 +169,7 @@ def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
         true = true.replace(winches=true.winches.replace(drum_radius=radius * (1.0 + 0.01 * errors[DRUM])))
     if errors.get(ZERO):
         assert true.winches is not None
-        zero = sl.inverse(robot, level(HOME)).unstrained_length
+        zero = sl.inverse(robot, level_poses(HOME)).unstrained_length
         nominal = robot.replace(winches=robot.winches.replace(length_zero=zero))
         true = true.replace(winches=true.winches.replace(length_zero=zero + 1e-3 * errors[ZERO]))
     return true, nominal
@@ -200,7 +200,7 @@ def in_process(
     """
     planned = sl.load_robot(PROTOTYPE) if nominal is None else nominal
     real = with_cells(planned if true is None else true)
-    twin = sl.twin.Machine(real, nominal=planned, start=level(HOME), seed=seed)
+    twin = sl.twin.Machine(real, nominal=planned, start=level_poses(HOME), seed=seed)
     watch = Watch(lambda: twin.reading.position, tell)
     return experiment(control.Controller(planned, twin.link(), loop=loop, record=watch, seed=seed), watch)
 
@@ -213,7 +213,7 @@ def experiment(controller: control.Controller, watch: Watch) -> Experiment:
     """
     legs = _legs(controller.period)
     controller.connect()
-    controller.home(level(HOME))
+    controller.home(level_poses(HOME))
     _stand(controller, "home")
     stops, plans, ends = [watch.seen()], list[sl.Plan](), [0.0]
     for name, leg in zip([*table2().points, "home"], legs, strict=True):
@@ -299,7 +299,7 @@ def _result(
 
 def _legs(period: float) -> list[sl.Path]:
     """The straight ways from point to point, of the fifth order as the article's, with a sample a cycle."""
-    places = level(points())
+    places = level_poses(points())
     return [sl.quintic_path([places[k], places[k + 1]], speed=SPEED, rate=1.0 / period) for k in range(len(places) - 1)]
 
 
@@ -314,7 +314,7 @@ def points() -> Array:
     return np.vstack((HOME, table2().desired, HOME))
 
 
-def level(position: ArrayLike) -> sl.Pose:
+def level_poses(position: ArrayLike) -> sl.Pose:
     """Poses at positions (..., 3), the platform not turned, as all of the article's."""
     return sl.Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)
 

@@ -78,7 +78,8 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         near = tangents(error_of, [models[i] for i in moving], [values[i] for i in moving])
         far = []
         for i, one in zip(moving, near, strict=True):
-            step = best_within(models[i], one.slopes, measured.ravel() - one.error + one.slopes @ values[i]) - values[i]
+            right = measured.ravel() - one.error + one.slopes @ values[i]
+            step = bounded_least_squares(models[i], one.slopes, right) - values[i]
             if step @ steps[i] < 0.0:  # it swings about where it should end
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
@@ -124,7 +125,7 @@ def limits(model: Model) -> tuple[Array, Array]:
     return np.where([parameter.positive for parameter in model], 0.0, -high), high
 
 
-def best_within(model: Model, slopes: Array, right: Array) -> Array:
+def bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
     """Least squares within the limits; each unknown is counted in its upper one, which makes them comparable."""
     from scipy.optimize import lsq_linear
 
@@ -133,7 +134,7 @@ def best_within(model: Model, slopes: Array, right: Array) -> Array:
     return values
 
 
-def information(rms: float, count: int, parameters: int) -> float:
+def corrected_aic(rms: float, count: int, parameters: int) -> float:
     """Akaike's information criterion, corrected for few measurements.
 
     Source:
@@ -157,7 +158,7 @@ def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple
     }
     slopes = [np.hstack([near[parameter].slopes for parameter in model]) for model in models]
     values = [
-        best_within(model, one, measured.ravel() - near[model[0]].error)
+        bounded_least_squares(model, one, measured.ravel() - near[model[0]].error)
         for model, one in zip(models, slopes, strict=True)
     ]
     return values, slopes
@@ -176,7 +177,7 @@ def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, m
         predicted=predicted,
         rms=rms,
         worst=float(np.linalg.norm(rest, axis=1).max()),
-        aicc=information(rms, rest.size, len(model)),
+        aicc=corrected_aic(rms, rest.size, len(model)),
         left_out=_left_out(model, values, slopes, rest),
     )
 
@@ -194,7 +195,7 @@ def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
     """Cross-validation: root mean square residual of each pose by the fit to the others, linearized [m]."""
     right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
     left = [
-        right[pose == k] - slopes[pose == k] @ best_within(model, slopes[pose != k], right[pose != k])
+        right[pose == k] - slopes[pose == k] @ bounded_least_squares(model, slopes[pose != k], right[pose != k])
         for k in range(len(rest))
     ]
     return float(np.sqrt(np.mean(np.square(left))))

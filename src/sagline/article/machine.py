@@ -52,7 +52,7 @@ PARAMETERS = (
 )
 
 
-def machine(robot: sl.Robot, errors: Errors) -> sl.Robot:
+def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
     """The robot with some of its parameters off: what the cables hang from, what they are and what they carry."""
     off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
     cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
@@ -75,13 +75,13 @@ def machine(robot: sl.Robot, errors: Errors) -> sl.Robot:
     )
 
 
-def wound(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
+def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
     """Lengths that the winches wind when planned lengths are commanded."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 
 
-def rest(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
+def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
     """Equilibria of robots with errors, whose winches wind the lengths of a plan of the robot without.
 
     Encoders are set while the platform rests in its home pose, held as planned: what pulleys and dead cable add to the
@@ -90,8 +90,8 @@ def rest(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]
     Raises:
         InvalidValueError: If the cables do not hold the platform in a stable equilibrium at some pose.
     """
-    robots = [machine(robot, one) for one in errors]
-    off_drum = np.stack([wound(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
+    robots = [robot_with_errors(robot, one) for one in errors]
+    off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
     count, poses, m = off_drum.shape
     repeated = [one for one in robots for _ in range(poses)]
     found = sl.forward(repeated, off_drum.reshape(-1, m), start=plan.state.pose[np.tile(np.arange(poses), count)])

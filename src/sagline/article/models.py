@@ -12,7 +12,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, draw_errors, floored, legend, map_axes
+from sagline.article.drawing import Drawings, axes, draw_errors, legend, logarithmic_with_floor, map_axes
 from sagline.article.identify import position_error
 from sagline.article.sampling import GRAVITY, simulated_cable
 from sagline.core.arrays import Array, checked
@@ -229,7 +229,7 @@ def _slices(draw: Drawings) -> Finding:
         for model, row, color in zip(study.models[:-1], error, COLORS, strict=False):
             ax.plot(x, row, color=color, linewidth=1.3, label=_name(model))
         ax.axhline(1e3 * TOLERANCE, color="0.6", linewidth=0.7, linestyle=":")
-        floored(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
+        logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         if quantity != "angle":
             ax.set_xscale("log")
         legend(ax)

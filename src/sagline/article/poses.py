@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sagline.article.causes import classes, explained, untold
+from sagline.article.causes import best_explanations, limits_of_ten_points, single_causes
 from sagline.article.drawing import Drawings, axes, cables_over_time, legend
 from sagline.article.sampling import fit_line
 from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
@@ -26,12 +26,12 @@ def poses_chapter() -> Chapter:
         "than planned.",
         (
             _table(study),
-            classes(study),
+            single_causes(study),
             _tour(way, draw),
             _space(study, draw),
             _trends(study, draw),
-            explained(study, draw),
-            untold(study),
+            best_explanations(study, draw),
+            limits_of_ten_points(study),
         ),
     )
 

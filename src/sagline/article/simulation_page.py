@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import WIDTH, Drawings, axes, cables_over_time, floored, legend, thinned
+from sagline.article.drawing import WIDTH, Drawings, axes, cables_over_time, legend, logarithmic_with_floor, thinning
 from sagline.article.simulation import ERROR_BAND, Figures, LowTension, Simulation, figures, low_tension_study, simulate
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -73,7 +73,7 @@ def _path(path: sl.Path, draw: Drawings) -> Finding:
     draw_path(path, ax)
     figure.subplots_adjust(bottom=0.16, top=0.92)
     second, bx = axes("time [s]", "velocity [m/s]")
-    part = thinned(len(path))
+    part = thinning(len(path))
     for name, course, color in zip("xy", path.twist.T[:2], COLORS, strict=False):
         bx.plot(path.time[part], course[part], color=color, linewidth=1.3, label=f"$v_{name}$")
     legend(bx)
@@ -169,7 +169,7 @@ def _error(study: Simulation, draw: Drawings) -> Finding:
 
 
 def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str, draw: Drawings) -> Panel:
-    part = thinned(len(path))
+    part = thinning(len(path))
     figure, ax = axes("time [s]", "position error [mm]", height=2.7)
     for name, course, color in zip("xyz", 1e3 * run.position_error[part].T, COLORS, strict=False):
         ax.plot(path.time[part], course, color=color, linewidth=1.1, label=f"${name}$")
@@ -232,11 +232,11 @@ def _models(study: Simulation, draw: Drawings) -> Finding:
     panels = []
     for robot, runs in (("suspended", study.suspended), ("mixed", study.mixed)):
         figure, ax = axes("time [s]", "distance from the plan [mm]")
-        part = thinned(len(study.path))
+        part = thinning(len(study.path))
         for model, run, color in zip(study.models[:-1], runs, COLORS, strict=False):
             distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
-        floored(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
+        logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         legend(ax)
         panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact one is the zero."))
     shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]

@@ -10,7 +10,17 @@ import numpy as np
 
 import sagline as sl
 from sagline.article.explanations import ErrorOf, Explanation, explanations, subsets, tangents
-from sagline.article.machine import ANCHORS, DEAD, PARAMETERS, PULLEY, ZERO, Errors, Parameter, machine, rest
+from sagline.article.machine import (
+    ANCHORS,
+    DEAD,
+    PARAMETERS,
+    PULLEY,
+    ZERO,
+    Errors,
+    Parameter,
+    rest_positions,
+    robot_with_errors,
+)
 from sagline.article.sampling import Line, fit_line
 from sagline.article.table2 import Table2, table2
 from sagline.core.arrays import Array, locked
@@ -109,7 +119,7 @@ def ten_poses(most: int = 3) -> TenPoses:
     plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 
     def error_of(errors: Sequence[Errors]) -> Array:
-        return rest(robot, plan, home, errors) - table.desired
+        return rest_positions(robot, plan, home, errors) - table.desired
 
     nominal, dead, *off = error_of([{}, {DEAD: 1.0}, *({one.name: one.typical} for one in PARAMETERS)])
     found = sorted(explanations(error_of, table.error, subsets(PARAMETERS, most)), key=lambda one: one.rms)
@@ -155,7 +165,7 @@ def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanatio
     is_pulley = np.array([p.name == PULLEY for p in three])
     whole, others = slopes[:, is_pulley], slopes[:, ~is_pulley]
     imitation = others @ np.linalg.lstsq(others, whole)[0]
-    state = sl.inverse(machine(robot, at), plan.state.pose, tension=METHOD).state
+    state = sl.inverse(robot_with_errors(robot, at), plan.state.pose, tension=METHOD).state
     by_zero = sl.stiffness(state).length_sensitivity[:, :3].reshape(-1, robot.cable_count)
     scatter = found.rms * np.sqrt(len(by_zero) / (len(by_zero) - robot.cable_count))
     return Limits(

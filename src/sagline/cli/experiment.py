@@ -89,7 +89,7 @@ def experiment(
 
 def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experiment:
     """Drive a twin in another process, over S7, in real time."""
-    from sagline.article.experiment import Watch, level, with_cells
+    from sagline.article.experiment import Watch, level_poses, with_cells
     from sagline.article.experiment import experiment as driven
     from sagline.article.ten_poses import HOME
     from sagline.control.controller import Controller
@@ -98,7 +98,7 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
     from sagline.twin.server import apart
 
     with (
-        apart(with_cells(true), nominal, level(HOME), seed=seed) as twin,
+        apart(with_cells(true), nominal, level_poses(HOME), seed=seed) as twin,
         closing(S7Link(twin.addresses, nominal)) as link,
     ):
         watch = Watch(twin.position, tell)

@@ -30,12 +30,12 @@ from sagline.plot.sheet import (
     COLORS,
     axes_or_new,
     cable_look,
-    draw_course,
-    dressed,
-    runs,
-    shade,
+    draw_series,
+    format_axes,
+    shade_spans,
     sheet,
     svg_text,
+    true_runs,
     unique_names,
 )
 from sagline.plot.style import PLAIN, Using
@@ -108,7 +108,7 @@ def _(path: Path) -> Figure | None:
     x, y, _ = path.pose.position[_chosen(path.pose.position)].T
     ax.plot(x, y, color=BLUE, linewidth=1.3)
     ax.plot(x[:1], y[:1], "o", color=BLUE, markersize=5.0)
-    dressed(ax, *PLACE[:2])
+    format_axes(ax, *PLACE[:2])
     ax.set_aspect("equal", adjustable="datalim")
     return _whole(ax)
 
@@ -129,7 +129,7 @@ def _(space: Workspace) -> Figure | None:
         color = COLORS[k % len(COLORS)]
         ax.contour(space.axes[first], space.axes[second], level[:, :, row].T, levels=[0.0], colors=[color])
         ax.plot([], [], color=color, label=f"${'xyz'[third]}$ = {space.axes[third][row]:.3g} m")
-    dressed(ax, PLACE[first], PLACE[second])
+    format_axes(ax, PLACE[first], PLACE[second])
     ax.set_aspect("equal")
     name_lines(ax)
     return _whole(ax)
@@ -149,9 +149,9 @@ def _courses(
     chosen = _chosen(values)
     for i, course in enumerate(values[chosen].T[:MOST_CABLES]):
         look = {"color": COLORS[i], "label": names[i]} if names else {**cable_look(i), "label": f"cable {i}"}
-        draw_course(ax, clock[chosen], course, **look, linewidth=1.2)
-    shade(ax, clock, runs(gaps)[:MOST_SAMPLES], "no answer")
-    dressed(ax, axis, label)
+        draw_series(ax, clock[chosen], course, **look, linewidth=1.2)
+    shade_spans(ax, clock, true_runs(gaps)[:MOST_SAMPLES], "no answer")
+    format_axes(ax, axis, label)
     if axis == "pose":
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     if clock.size > 1:

@@ -16,8 +16,8 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import PLACE, fitting, wrapped
-from sagline.plot.sheet import COLORS, GAP_COLOR, VERMILLION, dressed, sheet
+from sagline.plot.labels import PLACE, legend_columns, wrap_heading
+from sagline.plot.sheet import COLORS, GAP_COLOR, VERMILLION, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
 
@@ -138,7 +138,7 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
                 beyond = side * values > REACH
                 ax.plot(found.rows[shown][beyond], np.full(beyond.sum(), side * REACH), arrow, markersize=4.0, **look)
         _mark_outliers(ax, found, kind)
-        dressed(ax, "", f"{kind.label} [$\\sigma$]")
+        format_axes(ax, "", f"{kind.label} [$\\sigma$]")
         ax.grid(visible=False)
         if far:
             ax.set_ylim(-1.12 * REACH, 1.12 * REACH)
@@ -153,10 +153,10 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
     columns = 1
     if style.direct:
         width = cast("Figure", panels[0].get_figure(root=True)).get_figwidth()
-        place, columns = "outside lower center", fitting(names, width, style.tick)
+        place, columns = "outside lower center", legend_columns(names, width, style.tick)
     figure.legend(handles.values(), names, loc=place, ncols=columns, fontsize=style.tick, frameon=False)
     figure.align_ylabels(panels)
-    told = wrapped(f"{found.robot.name}: {chi_squared_text(found)}", current().label)
+    told = wrap_heading(f"{found.robot.name}: {chi_squared_text(found)}", current().label)
     figure.suptitle(told, fontsize=current().label)
 
 
@@ -238,7 +238,7 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
             f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if np.isfinite(values).any() else "told by nothing"
         )
         ax.set_title(f"{name}, {told}", fontsize=current().tick)
-        dressed(ax, *PLACE[:2])
+        format_axes(ax, *PLACE[:2])
         ax.grid(visible=False)
         ax.set_aspect("equal")
         ax.label_outer()
@@ -252,7 +252,7 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
     bar.set_label("expected position error [mm]", fontsize=current().label)
     bar.ax.tick_params(labelsize=current().tick)
     but = ", but for a shift and a turn of the world" if own else ""
-    told = wrapped(f"at $z$ = {n(z, '.3g', 'm')}{but}; dots: poses of the log", current().label)
+    told = wrap_heading(f"at $z$ = {n(z, '.3g', 'm')}{but}; dots: poses of the log", current().label)
     figure.suptitle(told, fontsize=current().label)
 
 

@@ -13,8 +13,19 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.plot.occlusion import Line, directions, seen
-from sagline.plot.robot import EDGES, FACES, frame_box, ground, hung, platform_box, pose_of, taut, tension_bar, wheels
+from sagline.plot.occlusion import Line, view_axes, visible_parts
+from sagline.plot.robot import (
+    EDGES,
+    FACES,
+    catenary_points,
+    frame_box,
+    ground,
+    platform_box,
+    pose_of,
+    pulleys_and_drums,
+    straight_points,
+    tension_bar,
+)
 from sagline.plot.sheet import VERMILLION, Sheet, axes_or_new
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
@@ -31,7 +42,7 @@ if TYPE_CHECKING:
     from sagline.plot.style import Style
 
 AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
-USUAL: Final = directions(float(AZIMUTH), float(ELEVATION))
+USUAL: Final = view_axes(float(AZIMUTH), float(ELEVATION))
 FRAME, GROUND, BODY, WHEEL = "0.45", (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16), "0.4"
 CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # pt
 SPECK: Final = 1.5  # pt: what is left of a line between two gaps and shorter looks like dirt
@@ -103,14 +114,14 @@ def drawing(
     turn, above = number(azimuth, "azimuth", "rad"), number(elevation, "elevation", "rad")
     if not 0.0 <= above <= 0.5 * np.pi:
         raise InvalidValueError("elevation", f"{above:g} rad", "0 to pi / 2", "Look down at the robot.")
-    return draw_at_rest(robot, where, inverse(robot, where), directions(turn, above), ax)
+    return draw_at_rest(robot, where, inverse(robot, where), view_axes(turn, above), ax)
 
 
 def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USUAL, ax: Axes | None = None) -> Axes:
     """The robot at a pose, with what is known of its tensions."""
     held, scale = plan is not None and bool(plan.feasible), TensionScale.of(robot)
     tension = plan.chord_tension if plan is not None else np.full(len(robot.frame_anchors), np.nan)
-    courses = hung(robot, where, plan) if plan is not None and held else taut(robot, where)
+    courses = catenary_points(robot, where, plan) if plan is not None and held else straight_points(robot, where)
     scene = _Scene.of(robot, where, courses, scale.colors(tension) / 255.0, dashed=not held)
     ax = _axes(ax, scene, view, bar=held)
     if held:
@@ -144,7 +155,7 @@ class _Scene(NamedTuple):
             _Stroke(course, color, CABLE_WIDTH, style, covers=True)
             for course, color in zip(courses, colors, strict=True)
         ]
-        circles, runs = wheels(robot, where)
+        circles, runs = pulleys_and_drums(robot, where)
         others = [_Stroke(circle, WHEEL, THIN, "-", covers=False) for circle in circles]
         others += [_Stroke(run, WHEEL, THIN, "-" if known else ":", covers=False) for run, known in runs]
         frame, body = frame_box(robot), platform_box(robot, where)
@@ -189,13 +200,13 @@ def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
         for each in strokes
     ]
     courses = [line.points[:, :2] for line in lines]
-    numbers = places_of_numbers(courses[: len(scene.cables)], courses, look.tick * point)
+    numbers = number_positions(courses[: len(scene.cables)], courses, look.tick * point)
     boxes = label_boxes(numbers, look.tick * point)
     turned = scene.faces @ view.T
     facing = [face for face in turned if _seen_from_outside(face)]
     for flat, color in (*((each @ view[:2].T, GROUND) for each in scene.flat), *((f[:, :2], BODY) for f in facing)):
         ax.add_collection(PolyCollection([flat], facecolors=[color], edgecolors="none", zorder=0.5))
-    for k, (stroke, parts) in enumerate(zip(strokes, seen(lines, facing, boxes), strict=True)):
+    for k, (stroke, parts) in enumerate(zip(strokes, visible_parts(lines, facing, boxes), strict=True)):
         long = [part[:, :2] for part in parts if _length(part) > SPECK * point]
         shown = LineCollection(
             long, colors=[stroke.color], linewidths=stroke.width, linestyles=[stroke.style],
@@ -221,7 +232,7 @@ def _seen_from_outside(face: Array) -> bool:
     return bool(one[0] * other[1] > one[1] * other[0])
 
 
-def places_of_numbers(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
+def number_positions(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
     """Positions of the cable numbers: on the cable, or close beside it if another cable is too near."""
     starts = np.concatenate([course[:-1] for course in courses])
     steps = np.concatenate([course[1:] for course in courses]) - starts

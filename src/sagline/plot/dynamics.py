@@ -21,8 +21,8 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.response import FrequencyResponse, drawn_curves, response_curves
 from sagline.dynamics.vibration.vibration import Vibration
-from sagline.plot.labels import PLACE, TIME, above, name_lines, wrapped
-from sagline.plot.sheet import BLUE, COLORS, DASHED, GAP_COLOR, TICK, VERMILLION, WIDTH, axes_or_new, dressed, sheet
+from sagline.plot.labels import PLACE, TIME, legend_above, name_lines, wrap_heading
+from sagline.plot.sheet import BLUE, COLORS, DASHED, GAP_COLOR, TICK, VERMILLION, WIDTH, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 
 if TYPE_CHECKING:
@@ -65,19 +65,19 @@ def energy(simulation: Simulation) -> Figure:
         courses["left with cables and loads"] = balance.removed
     for (name, course), color, style in zip(courses.items(), COLORS, ENERGY_STYLES, strict=False):
         above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
-    dressed(above, "", "energy [J]")
+    format_axes(above, "", "energy [J]")
     _mark_events(above, simulation, named=True)
     if time.size > 1:
         above.set_xlim(time[0], time[-1])
     name_lines(above)
     below.plot(time, balance.error, color="black", linewidth=1.0, label="error of the balance")
-    dressed(below, TIME, "error [J]")
+    format_axes(below, TIME, "error [J]")
     _mark_events(below, simulation, named=False)
     least = ROUNDING * _largest(*courses.values(), balance.potential)
     low, high = below.get_ylim()
     below.set_ylim(min(low, -least), max(high, least))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
-    told = wrapped(f"the sum, supplied counted negative, less its start: at most {worst}", current().tick)
+    told = wrap_heading(f"the sum, supplied counted negative, less its start: at most {worst}", current().tick)
     below.set_title(told, fontsize=current().tick, loc="left")
     return figure
 
@@ -131,7 +131,7 @@ def frequencies(
     ax.add_collection(_swinging(states, clock))
     massless = _filled([each.massless_frequency for each in states])
     ax.plot(clock, massless, color=VERMILLION, linewidth=0.9, linestyle=DASHED, zorder=2.5)
-    dressed(ax, "state" if time is None else label, "natural frequency [Hz]")
+    format_axes(ax, "state" if time is None else label, "natural frequency [Hz]")
     if time is None:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     ax.set_xlim(clock[0], clock[-1])
@@ -183,7 +183,7 @@ def _legend_of_shares(ax: Axes) -> None:
     handles.append(Line2D([], [], color=VERMILLION, linewidth=0.9, linestyle=DASHED, label="massless"))
     labels = [str(handle.get_label()) for handle in handles]
     place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2, "fontsize": TICK, "frameon": False}
-    ax.legend(handles=handles, **(above(ax, labels) if current().direct else place))
+    ax.legend(handles=handles, **(legend_above(ax, labels) if current().direct else place))
 
 
 class MapQuantity(NamedTuple):
@@ -296,7 +296,7 @@ def response(
         curves.frequency, curves.massless, color=VERMILLION, linewidth=1.1, linestyle=DASHED,
         label="massless", zorder=2.1,
     )  # fmt: skip
-    dressed(ax, "frequency [Hz]", f"{_name(motion or force)} for a {_cause(force)} [{curves.unit}]")
+    format_axes(ax, "frequency [Hz]", f"{_name(motion or force)} for a {_cause(force)} [{curves.unit}]")
     ax.set_xlim(curves.frequency[0], curves.frequency[-1])
     ax.set_ylim(*_vertical_range(curves.with_mass, curves.massless, curves.static))
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

@@ -10,7 +10,7 @@ from sagline.control.execution import Execution, null_space_error, position_erro
 from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
-from sagline.plot.labels import TIME, above, name_lines
+from sagline.plot.labels import TIME, legend_above, name_lines
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
@@ -24,10 +24,10 @@ from sagline.plot.sheet import (
     WIDTH,
     axes_or_new,
     cable_look,
-    draw_course,
-    dressed,
-    runs,
+    draw_series,
+    format_axes,
     sheet,
+    true_runs,
 )
 from sagline.plot.style import current
 
@@ -95,16 +95,16 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
     looks[None] = GAP_COLOR, "standing"
     for code, (color, name) in looks.items():
         there = ~np.isin(done.state, list(STATES)) if code is None else done.state == code
-        spans = [(clock[first], clock[last] + done.period - clock[first]) for first, last in runs(there)]
+        spans = [(clock[first], clock[last] + done.period - clock[first]) for first, last in true_runs(there)]
         if spans:
             ax.broken_barh(spans, (0.0, 1.0), facecolors=color, label=name, linewidth=0.0)
-    dressed(ax, TIME, "")
+    format_axes(ax, TIME, "")
     ax.set_yticks([])
     ax.grid(visible=False)
     ax.spines["left"].set_visible(False)
     _limit(ax, clock)
     handles, labels = ax.get_legend_handles_labels()
-    place = above(ax, labels) if current().direct else {**BESIDE, "ncols": 2, "fontsize": current().tick}
+    place = legend_above(ax, labels) if current().direct else {**BESIDE, "ncols": 2, "fontsize": current().tick}
     ax.legend(handles, labels, **{**place, "handlelength": 1.0, "columnspacing": 1.0})
     return ax
 
@@ -182,12 +182,12 @@ def _line(ax: Axes, clock: Array, course: Array, **look: object) -> None:
         chosen = np.sort(np.stack((rows[first, low], rows[first, high]), axis=1), axis=1).ravel()
         chosen = np.append(chosen, np.arange(rows.size, clock.size))
         clock, course = clock[chosen], course[chosen]
-    draw_course(ax, clock, course, **look)
+    draw_series(ax, clock, course, **look)
 
 
 def _finished(ax: Axes, clock: Array, label: str) -> Axes:
     """Labels of the axes, their limits, and names of the lines."""
-    dressed(ax, TIME, label)
+    format_axes(ax, TIME, label)
     _limit(ax, clock)
     name_lines(ax)
     return ax

@@ -60,36 +60,37 @@ def name_lines(ax: Axes, title: str = "") -> None:
         rest = [(handle, label) for handle, label in zip(handles, labels, strict=True) if not _is_line(handle)]
         handles, labels, title = [handle for handle, _ in rest], [label for _, label in rest], ""
     if handles:
-        ax.legend(handles, labels, title=title or None, **above(ax, labels, title))
+        ax.legend(handles, labels, title=title or None, **legend_above(ax, labels, title))
 
 
-def name_all(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], place: Any) -> None:
+def figure_legend(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], place: Any) -> None:
     """One legend for all axes of a figure: at its side, or above them all in the styles whose figures are narrow."""
     look, columns = current(), 1
     if look.direct:
-        place, columns = "outside upper center", fitting(labels, figure.get_figwidth(), look.tick)
+        place, columns = "outside upper center", legend_columns(labels, figure.get_figwidth(), look.tick)
     figure.legend(handles, labels, loc=place, ncols=columns, fontsize=look.tick, frameon=False)
 
 
-def above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
+def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
     """Arguments for a legend above the axes, in as many columns as there is room for."""
     look = current()
     width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
+    columns = legend_columns([*labels, title], 0.85 * width, look.tick)
     return {
-        "loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": fitting([*labels, title], 0.85 * width, look.tick),
+        "loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": columns,
         "fontsize": look.tick, "title_fontsize": look.tick, "alignment": "left", "frameon": False,
         "borderaxespad": 0.1, "borderpad": 0.1, "handlelength": 1.8, "handletextpad": 0.5, "columnspacing": 1.2,
     }  # fmt: skip
 
 
-def fitting(labels: Sequence[str], width: float, size: float) -> int:
+def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
     """Number of legend columns that fit, at least 1, none of them empty."""
     widest = max((TextPath((0.0, 0.0), label, size=size).get_extents().width for label in labels if label), default=0.0)
     columns = max(1, min(len(labels), int((width / POINT + 1.2 * size) / (widest + 3.6 * size))))
     return ceil(len(labels) / ceil(len(labels) / columns))
 
 
-def wrapped(text: str, size: float) -> str:
+def wrap_heading(text: str, size: float) -> str:
     """A heading in as many lines as the width of figures in the style in use asks for."""
     look = current()
     return text if look.width is None else fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
@@ -164,7 +165,7 @@ def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
     look, names = current(), [end.name for end in ends]
     if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
-    heights = spread(np.array([end.height for end in ends]), _spacing(ax))
+    heights = spread_heights(np.array([end.height for end in ends]), _spacing(ax))
     for end, name, height in zip(ends, names, heights, strict=True):
         ax.annotate(
             name, end.place, xycoords="data", xytext=(LEADER, (height - end.height) * ax.bbox.height * _points(ax)),
@@ -184,7 +185,7 @@ def _points(ax: Axes) -> float:
     return 1.0 / (cast(Figure, ax.get_figure(root=True)).dpi * POINT)
 
 
-def spread(heights: Array, spacing: float) -> Array:
+def spread_heights(heights: Array, spacing: float) -> Array:
     """Heights of names: as near as can be, by least squares, to those of the ends, in their order, and apart."""
     order = np.argsort(heights, kind="stable")
     steps = spacing * np.arange(heights.size)

@@ -73,7 +73,7 @@ class _Crossing(NamedTuple):
     along: Array
 
 
-def directions(azimuth: float, elevation: float) -> Array:
+def view_axes(azimuth: float, elevation: float) -> Array:
     """To the right, up, and toward the viewer, as rows, in the world's axes, shape (3, 3)."""
     around, above = np.array([np.cos(azimuth), np.sin(azimuth)]), np.array([np.cos(elevation), np.sin(elevation)])
     toward = np.array([above[0] * around[0], above[0] * around[1], above[1]])
@@ -81,7 +81,7 @@ def directions(azimuth: float, elevation: float) -> Array:
     return np.stack((right, np.cross(toward, right), toward))
 
 
-def seen(lines: Sequence[Line], surfaces: Sequence[Array], labels: Sequence[Array] = ()) -> list[list[Array]]:
+def visible_parts(lines: Sequence[Line], surfaces: Sequence[Array], labels: Sequence[Array] = ()) -> list[list[Array]]:
     """The parts of lines that are seen."""
     if not lines:
         return []

@@ -14,7 +14,7 @@ from sagline.core.numbers import n
 from sagline.kinematics.confirm import Confirmation
 from sagline.kinematics.plan import Plan
 from sagline.motion.path import Path
-from sagline.plot.labels import LENGTHS, PLACE, TENSIONS, TIME, name_all, name_lines
+from sagline.plot.labels import LENGTHS, PLACE, TENSIONS, TIME, figure_legend, name_lines
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
@@ -23,11 +23,11 @@ from sagline.plot.sheet import (
     VERMILLION,
     axes_or_new,
     cable_look,
-    draw_course,
-    dressed,
-    runs,
-    shade,
+    draw_series,
+    format_axes,
+    shade_spans,
     sheet,
+    true_runs,
 )
 from sagline.plot.style import current
 
@@ -108,7 +108,7 @@ def overview(plan: Plan) -> Figure:
         _draw_cables(ax, plan, quantity, LENGTHS | TENSIONS)
         ax.label_outer()
     handles, labels = panels[0].get_legend_handles_labels()
-    name_all(figure, handles, labels, "outside right center")
+    figure_legend(figure, handles, labels, "outside right center")
     return figure
 
 
@@ -126,7 +126,7 @@ def abscissa(plan: Plan) -> tuple[Array, str]:
 def dress_over(ax: Axes, plan: Plan, label: str) -> None:
     """Dress axes of what a plan does over time, or over the numbers of its poses."""
     clock, axis = abscissa(plan)
-    dressed(ax, axis, label)
+    format_axes(ax, axis, label)
     if plan.path is None:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     if clock.size > 1:
@@ -139,8 +139,8 @@ def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str
     values = scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity))
     clock, _ = abscissa(plan)
     for i, course in enumerate(values.T):
-        draw_course(ax, clock, course, **cable_look(i), linewidth=1.1, label=f"cable {i}")
-    shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+        draw_series(ax, clock, course, **cable_look(i), linewidth=1.1, label=f"cable {i}")
+    shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
     dress_over(ax, plan, label)
 
 
@@ -187,7 +187,7 @@ def errors(*confirmations: Confirmation) -> Figure:
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _tell_flat(ax, confirmation)  # on the scale that they have found together
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    name_all(figure, [*handles.values()], [*handles], "outside right upper")
+    figure_legend(figure, [*handles.values()], [*handles], "outside right upper")
     return figure
 
 
@@ -196,10 +196,10 @@ def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
     clock, _ = abscissa(plan)
     courses = 1e3 * np.atleast_2d(confirmation.position_error)
     for name, course, color, style in zip("xyz", courses.T, COLORS[:3], AXIS_STYLES, strict=True):
-        draw_course(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
-    shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+        draw_series(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
+    shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
     lost = np.atleast_1d(plan.feasible & ~confirmation.held)
-    shade(ax, clock, runs(lost), UNCONFIRMED, ORANGE, 0.25)
+    shade_spans(ax, clock, true_runs(lost), UNCONFIRMED, ORANGE, 0.25)
     dress_over(ax, plan, "position error [mm]")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -LEAST_ERROR), max(high, LEAST_ERROR))
@@ -246,9 +246,9 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
             ax.set_axis_off()
             continue
         for other in np.delete(values, i, axis=1).T:
-            draw_course(ax, clock, other, color=OTHER_CABLES, linewidth=0.6, zorder=1.5)
-        draw_course(ax, clock, values[:, i], color=BLUE, linewidth=1.3, zorder=2.0, label=f"cable {i}")
-        shade(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+            draw_series(ax, clock, other, color=OTHER_CABLES, linewidth=0.6, zorder=1.5)
+        draw_series(ax, clock, values[:, i], color=BLUE, linewidth=1.3, zorder=2.0, label=f"cable {i}")
+        shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
         dress_over(ax, plan, "")
         ax.set_xlabel("")
         ax.set_title(f"cable {i}", fontsize=current().tick, loc="left", pad=2.0)
@@ -286,7 +286,7 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
     low, high = float(z.min()), float(z.max())
     height = f"$z$ = {low:g} m" if high - low < LEVEL else f"$z$ from {low:g} m to {high:g} m"
     ax.set_title(height, fontsize=current().tick, loc="right")
-    dressed(ax, *PLACE[:2])
+    format_axes(ax, *PLACE[:2])
     ax.set_aspect("equal")
     ax.margins(0.06)
     return ax
@@ -307,7 +307,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
         "xyz", instance(path, Path, "path").twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True
     ):
         ax.plot(path.time, course, color=color, linestyle=style, linewidth=1.3, label=f"$v_{name}$")
-    dressed(ax, TIME, "velocity [m/s]")
+    format_axes(ax, TIME, "velocity [m/s]")
     if len(path) > 1:
         ax.set_xlim(path.time[0], path.time[-1])
     name_lines(ax)

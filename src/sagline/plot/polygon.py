@@ -12,7 +12,7 @@ from matplotlib.textpath import TextPath
 from sagline.core.arguments import instance
 from sagline.core.errors import InvalidValueError
 from sagline.plot.labels import name_lines
-from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, dressed
+from sagline.plot.sheet import COLORS, GAP_COLOR, axes_or_new, format_axes
 from sagline.plot.style import current
 from sagline.tension.polygon import TensionPolygon
 
@@ -69,7 +69,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
         if np.isfinite(place).all():
             color, marker = COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)]
             ax.plot(*place, marker, color=color, markersize=6.0, markeredgecolor="white", label=name, linestyle="none")
-    dressed(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
+    format_axes(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
     ax.set_aspect("equal")
     ax.margins(x=0.33, y=0.16)  # room for names
     if any(np.isfinite(place).all() for place in places.values()):

@@ -61,7 +61,7 @@ def pose_of(robot: Robot, pose: Pose | None) -> Pose:
     return pose
 
 
-def hung(robot: Robot, pose: Pose, plan: Plan) -> Array:
+def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
     """Points of the cables in the world as a feasible plan of the pose has them [m], shape (m, points, 3)."""
     contact = plan.state.contact
     wraps = lines.wraps(robot, pose, None if contact is None else contact.wrap_angle)
@@ -69,13 +69,13 @@ def hung(robot: Robot, pose: Pose, plan: Plan) -> Array:
     return np.concatenate((wraps, free), axis=1)
 
 
-def taut(robot: Robot, pose: Pose) -> Array:
+def straight_points(robot: Robot, pose: Pose) -> Array:
     """Points of straight cables in the world [m], shape (m, points, 3)."""
     wraps = lines.wraps(robot, pose, None)
     return np.concatenate((wraps, lines.straight(lines.chords(robot, pose, wraps[:, -1]))), axis=1)
 
 
-def wheels(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
+def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
     """Circles of the pulleys and of the drums that are known; and the runs behind pulleys, and whether each is upright.
 
     Of dead cable only its length and its rise are known: of a run that is not upright its rise is drawn.
@@ -159,7 +159,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")
     plan, points = draw_robot(ax, robot, where)
-    dress_space(
+    format_space_axes(
         ax, points, robot.name if plan.feasible else f"{robot.name}: no tensions within the limits carry it here"
     )
     if plan.feasible:
@@ -171,7 +171,7 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
     """Frame, platform, cables and ground, without labels of the axes."""
     ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it
     plan = inverse(robot, where)
-    courses = hung(robot, where, plan) if plan.feasible else taut(robot, where)
+    courses = catenary_points(robot, where, plan) if plan.feasible else straight_points(robot, where)
     colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray where there is no tension
     for line, own in zip(courses, colors, strict=True):
         style = "-" if plan.feasible else (0, (3.0, 2.0))
@@ -191,7 +191,7 @@ def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) 
 
 def _draw_wheels(ax: Axes3D, robot: Robot, pose: Pose) -> Array:
     """The pulleys, the runs behind them and the drums that are known; returns their points (n, 3)."""
-    circles, runs = wheels(robot, pose)
+    circles, runs = pulleys_and_drums(robot, pose)
     for circle in circles:
         ax.plot(*circle.T, color=WHEEL_COLOR, linewidth=0.9, zorder=1.9)
     for run, upright in runs:
@@ -243,7 +243,7 @@ def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["l
     bar.ax.tick_params(labelsize=current().tick)
 
 
-def dress_space(ax: Axes3D, points: Array, title: str) -> None:
+def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
     """Labels, and ticks as far apart as their numbers are wide, none where two axes meet."""
     ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)

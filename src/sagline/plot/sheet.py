@@ -109,7 +109,7 @@ def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> A
     return ax
 
 
-def dressed(ax: Axes, x: str, y: str) -> None:
+def format_axes(ax: Axes, x: str, y: str) -> None:
     """Labels, a light grid, and no more lines around it than needed."""
     look = current()
     ax.set_xlabel(x, fontsize=look.label)
@@ -126,7 +126,7 @@ def cable_look(cable: int) -> dict[str, Any]:
     return {"color": COLORS[cable // 2 % len(COLORS)], "linestyle": "-" if cable % 2 == 0 else DASHED}
 
 
-def draw_course(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
+def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
     """A line over time; a sample that has no neighbor to be joined to is a point, not nothing."""
     known = np.concatenate(([False], np.isfinite(course), [False]))
     alone = np.flatnonzero(known[1:-1] & ~known[:-2] & ~known[2:])
@@ -134,13 +134,13 @@ def draw_course(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
     ax.plot(clock, course, **look, **points)
 
 
-def runs(flags: Flags) -> list[tuple[int, int]]:
+def true_runs(flags: Flags) -> list[tuple[int, int]]:
     """First and last sample of each run of flags."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
 
 
-def shade(
+def shade_spans(
     ax: Axes, clock: Array, spans: Iterable[tuple[int, int]], label: str, color: str = GAP_COLOR, alpha: float = 0.5
 ) -> None:
     """Shade the spans of samples (first, last), each up to halfway to its neighbors."""

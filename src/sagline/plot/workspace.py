@@ -15,9 +15,9 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import PLACE, wrapped
-from sagline.plot.robot import draw_robot, dress_space
-from sagline.plot.sheet import GAP_COLOR, axes_or_new, dressed, sheet
+from sagline.plot.labels import PLACE, wrap_heading
+from sagline.plot.robot import draw_robot, format_space_axes
+from sagline.plot.sheet import GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
 from sagline.viewer.tension_scale import CABLES, cable_color
@@ -78,7 +78,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     beside = plane._replace(at=plane.at + BESIDE * float(high[plane.normal] - plane.at))
     cut = slice_of(space.levels().details, beside, low, high, (shape[0], shape[1]))
     ax = axes_or_new(ax, height=0.9 + 5.6 * float(np.clip(size[second] / size[first], 0.3, 1.3)))
-    dressed(ax, PLACE[first], PLACE[second])
+    format_axes(ax, PLACE[first], PLACE[second])
     ax.grid(visible=False)
     ax.set_aspect("equal")
     ax.set(xlim=(low[first], high[first]), ylim=(low[second], high[second]))
@@ -93,7 +93,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
         _draw_lines(ax, cut, levels)
     held = f"{space.wrenches}; {space.orientations}"
     told = f"{space.robot.name}, {AXES[plane.normal]} = {n(plane.at, unit='m')}; {held}"
-    ax.set_title(wrapped(told, current().label), fontsize=current().label)
+    ax.set_title(wrap_heading(told, current().label), fontsize=current().label)
     return ax
 
 
@@ -233,12 +233,12 @@ def workspace(space: Workspace) -> Figure:
     _, points = draw_robot(ax, space.robot, _place(space), "0.4")
     _draw_hull(ax, space, colors)
     points = np.concatenate((points, space.surface.vertices))
-    dress_space(ax, points, "")
+    format_space_axes(ax, points, "")
     ax.set_box_aspect([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=ZOOM)
     for each in ax.get_children():
         each.set_clip_on(False)
     told = f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}"
-    figure.suptitle(wrapped(told, current().label), fontsize=current().label)
+    figure.suptitle(wrap_heading(told, current().label), fontsize=current().label)
     if limits:
         _draw_bars(figure.add_axes(BELOW if narrow else BARS), space, colors)
     return figure

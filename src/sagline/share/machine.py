@@ -14,7 +14,7 @@ from sagline.robot.bounds import bounds, home_pose
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.several import pulleys_of
-from sagline.share.packing import Channel, packed
+from sagline.share.packing import Channel, encode_channels
 from sagline.viewer import lines, solids
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.wording import ForceUnit
@@ -28,7 +28,7 @@ _UP: Final = np.array([-0.154, 0.318, 0.936])
 _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2, 4)]
 
 
-def machine(robot: Robot) -> dict[str, Any]:
+def model_data(robot: Robot) -> dict[str, Any]:
     """Data of the model of docs/model.md, for page/robot.js; None stands for no upper limit."""
     radius, entry = pulleys_of(robot)
     winches = robot.winches
@@ -59,7 +59,7 @@ def machine(robot: Robot) -> dict[str, Any]:
     }
 
 
-def picture(robot: Robot) -> dict[str, Any]:
+def solids_data(robot: Robot) -> dict[str, Any]:
     """Solids of frame, winches and platform, for page/scene.js."""
     low, high = bounds(robot)
     body, size = solids.platform(robot), solids.size_of(robot)
@@ -106,10 +106,10 @@ def _highest(robot: Robot) -> float:
 
 def _triangles(solid: solids.Solid, size: float) -> tuple[dict[str, object], str]:
     """The corners of all triangles, one after the other, packed."""
-    return packed([Channel("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
+    return encode_channels([Channel("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
 
 
-def still(robot: Robot, pose: Pose, tension: Array) -> str:
+def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
     """The cables of a robot as they hang at chord tensions, between frame and platform, as SVG."""
     ends = lines.chords(robot, pose)
     run = ends[:, 1] - ends[:, 0]

@@ -34,7 +34,7 @@ class Channel(NamedTuple):
     scale: Literal["linear", "relative"] = "linear"
 
 
-def packed(channels: Sequence[Channel]) -> tuple[dict[str, object], str]:
+def encode_channels(channels: Sequence[Channel]) -> tuple[dict[str, object], str]:
     """Encode channels for a page."""
     described, planes = [], []
     for channel in channels:

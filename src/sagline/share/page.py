@@ -17,8 +17,8 @@ from sagline.kinematics.inverse import inverse
 from sagline.robot.bounds import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.course import Course
-from sagline.share.machine import colors, machine, numbers, picture, still
-from sagline.share.packing import Channel, packed
+from sagline.share.machine import colors, model_data, numbers, robot_drawing, solids_data
+from sagline.share.packing import Channel, encode_channels
 from sagline.viewer.wording import number
 
 SCRIPTS: Final = (  # in the order in which they need each other
@@ -50,7 +50,7 @@ def robot_page(robot: Robot) -> str:
         over=RING + HOME,
         quantity="along the chord",
         robot=robot,
-        still=still(robot, at, plan.chord_tension),
+        still=robot_drawing(robot, at, plan.chord_tension),
         table=_table(robot, plan.chord_tension, plan.unstrained_length),
         notes=("Tensions of least norm within the limits, exact elastic catenaries, the platform at rest.",),
         facts=facts,
@@ -62,7 +62,7 @@ def course_page(course: Course, title: str) -> str:
     """A run that plays."""
     robot, kept = course.robot, course.thinned()
     first = kept.pose_at(0)
-    header, text = packed(
+    header, text = encode_channels(
         [
             Channel("time", kept.time, TIME),
             Channel("position", kept.position, POSITION),
@@ -86,7 +86,7 @@ def course_page(course: Course, title: str) -> str:
         over=HOME,
         quantity=kept.quantity,
         robot=robot,
-        still=still(robot, home_pose(robot) if first is None else first, kept.chord_tension[0]),
+        still=robot_drawing(robot, home_pose(robot) if first is None else first, kept.chord_tension[0]),
         table=_table(robot, kept.tension[0], kept.length[0]),
         notes=(*kept.notes, _precision()),
         facts=facts,
@@ -115,7 +115,7 @@ def _filled(robot: Robot, facts: dict[str, Any], notes: Sequence[str], **parts: 
 
 
 def _facts(robot: Robot) -> dict[str, Any]:
-    return {"machine": machine(robot), "picture": picture(robot), "colors": colors(robot)}
+    return {"machine": model_data(robot), "picture": solids_data(robot), "colors": colors(robot)}
 
 
 def _about(robot: Robot) -> str:
