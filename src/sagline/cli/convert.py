@@ -65,7 +65,7 @@ def convert(
             --linear-density "20 g/m" --axial-stiffness "50 kN"
         sagline convert cogiro --format mjcf --out cogiro.xml
     """
-    from sagline.files.pose_text import FARTHEST, numbers
+    from sagline.files.pose_text import FARTHEST, decimal_numbers
     from sagline.files.robot_file import dump_robot
 
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
@@ -77,7 +77,7 @@ def convert(
         raise InvalidValueError(
             "--at", "given for a robot file", "--format mjcf", "A robot file holds no pose: leave it out."
         )
-    place = None if at is None else numbers(at, "--at", "m", FARTHEST)
+    place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
     if form is Format.ROBOT:
         text = dump_robot(imported.robot)

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 READ: Final = ("lengths", "counts")  # by Parameters.counted: what was read of the winches
+UNITS = ("m", "kg/m", "N", "kg", "rad", "1")
+OUTLYING = ("length", "load cell", "position", "rotation")
 P: Final = ("parameter",)
 N: Final = ("pose",)
 PARAMETERS: Final = (
@@ -124,10 +126,6 @@ def directions(group: str) -> tuple[Quantity, ...]:
 
 
 DIRECTIONS: Final = {group: directions(group) for group in ("gauge", "cannot_tell_apart")}
-
-
-UNITS = ("m", "kg/m", "N", "kg", "rad", "1")
-OUTLYING = ("length", "load cell", "position", "rotation")
 
 
 def check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:

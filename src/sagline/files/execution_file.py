@@ -17,14 +17,14 @@ from sagline.core.arguments import brief, file_path, instance, integer
 from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.format import Format
-from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, NONE, ROWS, SMALL, TIME, columns_of
+from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, ROWS, SMALL, TIME, columns_of
 from sagline.files.mcap_reader import AGAIN, Ending, Log, read_log
 from sagline.files.mcap_writer import BLOCK, McapFile, check_packages
 from sagline.files.netcdf import index_coordinate, labeled_dataset, write_dataset
 from sagline.files.packed import unpack_dataset
 from sagline.files.plan_file import plan_dataset, plan_of
 from sagline.files.robot_file import dump_robot
-from sagline.files.variables import PARTS, Quantity
+from sagline.files.variables import NONE, PARTS, Quantity
 from sagline.files.writing import atomic_file
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot

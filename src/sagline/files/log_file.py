@@ -203,11 +203,7 @@ def _commanded(table: Table) -> Pose | None:
 
 
 def log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
-    """Name with unit and numbers of each column of a log.
-
-    Yields:
-        Names with units, and the numbers, shape (N,).
-    """
+    """Name with unit, and numbers of shape (N,), of each column of a log."""
     m = log.readings.shape[1]
     if log.time is not None:
         yield "time [s]", log.time

@@ -15,7 +15,7 @@ from sagline.control.execution import Execution
 from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array
-from sagline.files.variables import SOMEWHERE, Quantity
+from sagline.files.variables import NONE, SOMEWHERE, Quantity
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 ROWS: Final = "time"
-NONE: Final = -1  # of a code: there is none
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
 
 
@@ -168,17 +167,12 @@ SCHEMAS: Final = {
 
 
 def head_of(robot: str, period: float) -> bytes:
-    """The attachment that says what a log is of.
-
-    Args:
-        robot: Text of the robot's file.
-        period: Of a cycle [s].
-    """
+    """Attachment that states robot (as text of its file) and cycle period [s] of a log."""
     return json.dumps({"sagline_log_format": FORMAT, "source": SOURCE, "period": period, "robot": robot}).encode()
 
 
 def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
-    """Messages of cycles, for people."""
+    """Messages of N cycles for other programs, rounded."""
     away = PER_METER * (columns["set_length"] - columns["length"] - columns["zero"])
     there = {**columns, "length_error": away, "correction": PER_METER * columns["correction"]}
     kept = {name: _json_values(np.round(there[name], shown.digits)) for name, shown in CYCLE_FIELDS.items()}
@@ -195,7 +189,7 @@ def event_text(event: Event) -> bytes:
 
 
 def event_of(text: bytes) -> Event:
-    """The event of a message."""
+    """Event of a message; ValueError if it is none."""
     try:
         said = json.loads(text)
         kind, state = EventKind(said["kind"]), State[said["state"]]
@@ -205,12 +199,12 @@ def event_of(text: bytes) -> Event:
 
 
 def truth_text(time: float, position: Any, quaternion: Any) -> bytes:
-    """Message of where the platform really is, without loss."""
+    """Message of the true pose of the platform, without loss."""
     return _text({"time": time, "position": position.tolist(), "quaternion": quaternion.tolist()})
 
 
 def _json_values(values: NDArray[Any]) -> list[Any]:
-    """Values as JSON knows them: None for what is no number, and for rows of nothing else."""
+    """Values in JSON: None for numbers that are not finite, and for rows without finite ones."""
     known = np.isfinite(values)
     if known.all():
         return list(values.tolist())
@@ -230,13 +224,7 @@ _STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17
 
 
 def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
-    """Pose of the platform as a message of Foxglove.
-
-    Args:
-        stamp: When [ns].
-        position: Of its origin [m], shape (3,).
-        quaternion: Its rotation to the world, scalar last, shape (4,).
-    """
+    """Pose of the platform at a time [ns] as a message of Foxglove; position [m], quaternion scalar last."""
     from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 
     found = FrameTransform(parent_frame_id=WORLD, child_frame_id=PLATFORM)
@@ -257,14 +245,7 @@ class Scene:
         self._body = _corners(robot.platform_anchors)
 
     def at(self, stamp: int, position: Array, quaternion: Array, tension: Array) -> SceneUpdate:
-        """The whole scene at a time, so that it is complete from any message on.
-
-        Args:
-            stamp: When [ns].
-            position: Of the platform's origin [m], shape (3,).
-            quaternion: Its rotation to the world, scalar last, shape (4,).
-            tension: At the frame ends [N], shape (m,): how much the cables sag.
-        """
+        """Whole scene at a time [ns]: position [m], quaternion scalar last, tensions at the frame ends [N]."""
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
         scene = SceneUpdate()

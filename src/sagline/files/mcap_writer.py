@@ -29,20 +29,10 @@ from sagline.core.arrays import Array
 from sagline.core.errors import FileError
 from sagline.core.status import Status
 from sagline.files import mcap_layout
-from sagline.files.mcap_layout import (
-    NANO,
-    NONE,
-    Scene,
-    columns_of,
-    cycle_texts,
-    event_text,
-    head_of,
-    transform,
-    truth_text,
-)
 from sagline.files.packed import pack, pack_dataset, round_decimals
 from sagline.files.plan_file import plan_dataset
 from sagline.files.robot_file import dump_robot
+from sagline.files.variables import NONE
 from sagline.files.writing import check_file
 from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
@@ -93,14 +83,14 @@ class McapFile:
         from mcap_protobuf.schema import register_schema
 
         self.epoch = epoch
-        self._scene = Scene(robot)
+        self._scene = mcap_layout.Scene(robot)
         self._plans = 0
         self._blocks = 0
         output: Any = _Unbuffered(file)
         writer: Any = Writer(output, chunk_size=_UNLIMITED, enable_data_crcs=True)  # Any: it is only partly typed
         self._writer = writer
         writer.start(library=mcap_layout.SOURCE)
-        self._attach(mcap_layout.HEAD, mcap_layout.JSON, head_of(dump_robot(robot), period))
+        self._attach(mcap_layout.HEAD, mcap_layout.JSON, mcap_layout.head_of(dump_robot(robot), period))
         kinds: dict[str, tuple[str, int]] = {mcap_layout.RECORD: (mcap_layout.PACKED, 0)}
         kinds |= {
             topic: ("json", writer.register_schema(topic[1:], "jsonschema", text))
@@ -117,49 +107,34 @@ class McapFile:
         return number
 
     def end(self, number: int, status: str, reason: str) -> None:
-        """Attach how a plan ended."""
-        self._attach(
-            mcap_layout.END.format("none" if number == NONE else number),
-            mcap_layout.JSON,
-            json.dumps({"status": status, "reason": reason}).encode(),
-        )
+        """Attach the end of a plan."""
+        name = mcap_layout.END.format("none" if number == NONE else number)
+        self._attach(name, mcap_layout.JSON, json.dumps({"status": status, "reason": reason}).encode())
 
     def block(self, columns: Mapping[str, NDArray[Any]], plan: int, zero: Array, rest: Callable[[], Any] = int) -> None:
-        """Write cycles.
-
-        Args:
-            columns: What there is of them.
-            plan: Number of the plan they are of, `NONE` for none.
-            zero: Of homing [m], shape (m,).
-            rest: Called between two messages, for a thread that should let others go on.
-        """
-        stamps = self._stamps(columns["time"])
+        """Write cycles of a plan (`NONE` for none) with the zero of homing [m]; `rest` is called between messages."""
+        stamps = [self.stamp(value) for value in columns["time"].tolist()]
         kept = {**columns, "plan": np.array(plan), "zero": zero, "epoch": np.array(self.epoch)}
-        for stamp, text in zip(stamps, cycle_texts(kept), strict=True):
+        for stamp, text in zip(stamps, mcap_layout.cycle_texts(kept), strict=True):
             self._message(mcap_layout.CYCLE, stamp, text)
             rest()
         for stamp, row in self._known(columns, stamps, mcap_layout.SHARE_TF):
-            self._message(
-                mcap_layout.TF, stamp, transform(stamp, row["position"], row["quaternion"]).SerializeToString()
-            )
+            pose = mcap_layout.transform(stamp, row["position"], row["quaternion"])
+            self._message(mcap_layout.TF, stamp, pose.SerializeToString())
         for stamp, row in self._known(columns, stamps, mcap_layout.SHARE_SCENE):
             rest()
             self._message(mcap_layout.SCENE, stamp, self._scene.at(stamp, **row).SerializeToString())
-        self._message(
-            mcap_layout.RECORD,
-            stamps[-1] if stamps else self.epoch,
-            pack(kept, mcap_layout.DECIMALS, rest),
-            self._blocks,
-        )
+        last = stamps[-1] if stamps else self.epoch
+        self._message(mcap_layout.RECORD, last, pack(kept, mcap_layout.DECIMALS, rest), self._blocks)
         self._blocks += 1
 
     def event(self, event: Event) -> None:
         """Write an event."""
-        self._message(mcap_layout.EVENT, self.stamp(event.time), event_text(event))
+        self._message(mcap_layout.EVENT, self.stamp(event.time), mcap_layout.event_text(event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
-        """Write where the platform really is."""
-        self._message(mcap_layout.TRUTH, self.stamp(time), truth_text(time, position, quaternion))
+        """Write the true pose of the platform at a time [s]."""
+        self._message(mcap_layout.TRUTH, self.stamp(time), mcap_layout.truth_text(time, position, quaternion))
 
     def close_chunk(self) -> None:
         """Write the chunk so far to the file."""
@@ -171,10 +146,7 @@ class McapFile:
 
     def stamp(self, time: float) -> int:
         """The log's own time of a time [s]."""
-        return self.epoch + round(time * NANO)
-
-    def _stamps(self, time: Array) -> list[int]:
-        return [self.stamp(value) for value in time.tolist()]
+        return self.epoch + round(time * mcap_layout.NANO)
 
     def _attach(self, name: str, kind: str, data: bytes) -> None:
         self._writer.flush()
@@ -272,20 +244,14 @@ class Recorder:
         self._put(partial(self._add, cycle))
 
     def event(self, event: Event) -> None:
-        """Take an event; one before the first cycle, whose time nobody knew, waits for it to be dated."""
+        """Take an event; one before the first cycle waits until the log is dated."""
         if self._epoch is None:
             self._early.append(event)
         else:
             self._put(partial(self._mcap.event, event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
-        """Take the true pose of the platform, known to a twin only.
-
-        Args:
-            time: On the twin's clock [s].
-            position: Of the platform's origin [m], shape (3,); a copy is taken.
-            quaternion: Rotation platform -> world, scalar last, shape (4,); so it is of this.
-        """
+        """Take the true pose of the platform at a time [s]; position and quaternion are copied."""
         self._date(time)
         self._put(partial(self._mcap.truth, time, position.copy(), quaternion.copy()))
 
@@ -320,7 +286,7 @@ class Recorder:
     def _date(self, time_of_link: float) -> None:
         """Date the log: from here on its times are times of day."""
         if self._epoch is None:
-            self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * NANO)
+            self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * mcap_layout.NANO)
             for event in self._early:
                 self._put(partial(self._mcap.event, event))
 
@@ -376,7 +342,7 @@ class Recorder:
             return
         none = ExecutionStatus.UNKNOWN
         cycles = execution_of(self._tape, self._robot, None, none, "", self._period, self._zero, ())
-        columns = columns_of(cycles)
+        columns = mcap_layout.columns_of(cycles)
         columns |= {name: round_decimals(columns[name], decimals) for name, decimals in mcap_layout.DECIMALS.items()}
         columns["degraded"] = np.array(self._degraded)
         self._mcap.block(columns, self._plan, self._zero, partial(time.sleep, 0.0))

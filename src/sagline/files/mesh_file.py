@@ -107,11 +107,7 @@ def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
 
 
 def first_crossing(mesh: Mesh) -> Array | None:
-    """A point where a surface meets itself other than along its edges and at its corners.
-
-    Returns:
-        The point [m]; None if there is none.
-    """
+    """Point [m] where a surface meets itself other than along its edges and at its corners; None if there is none."""
     from sagline.interference.meshed import package
 
     fcl = package()

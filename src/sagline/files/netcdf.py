@@ -26,6 +26,23 @@ from sagline.robot.robot import Robot
 if TYPE_CHECKING:
     from xarray import Dataset
 
+OTHERS: Final = {
+    "sagline_format": ("a plan", "Read it with load_plan, or look at it: sagline view ROBOT FILE."),
+    "sagline_simulation_format": ("a simulation", "Read it with load_simulation, or play it: sagline view ROBOT FILE."),
+    "sagline_execution_format": ("an execution", "Open it with xarray.open_dataset; its plan is its group 'plan'."),
+    "sagline_workspace_format": ("a workspace", "Read it with load_workspace."),
+    "sagline_calibration_format": ("a calibration", "Read it with load_calibration."),
+    "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
+}
+Choice = TypeVar("Choice")
+_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # of every file in NetCDF-4
+_KINDS: Final = {
+    **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
+    **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
+    **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
+}
+INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
+HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside texts, such as the robot
 _HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
 _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
 _BLOCK = 1 << 20  # bytes read at once
@@ -56,16 +73,6 @@ def _line(handle: BinaryIO, size: int) -> bytes:
         found.update(block)
         size -= len(block)
     return _HEAD + found.hexdigest().encode() + _TAIL
-
-
-OTHERS: Final = {
-    "sagline_format": ("a plan", "Read it with load_plan, or look at it: sagline view ROBOT FILE."),
-    "sagline_simulation_format": ("a simulation", "Read it with load_simulation, or play it: sagline view ROBOT FILE."),
-    "sagline_execution_format": ("an execution", "Open it with xarray.open_dataset; its plan is its group 'plan'."),
-    "sagline_workspace_format": ("a workspace", "Read it with load_workspace."),
-    "sagline_calibration_format": ("a calibration", "Read it with load_calibration."),
-    "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,17 +123,6 @@ class Content:
     def attributes(self, title: str) -> dict[str, Any]:
         """Attributes of every file of this content."""
         return {"title": title, "source": f"sagline {version('sagline')}", self.key: self.version}
-
-
-Choice = TypeVar("Choice")
-_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # of every file in NetCDF-4
-_KINDS: Final = {
-    **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
-    **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
-    **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
-}
-INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
-HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside texts, such as the robot
 
 
 def labeled_dataset(

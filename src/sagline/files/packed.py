@@ -50,12 +50,7 @@ class _Column:
 
 
 def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
-    """The nearest numbers of so many decimals, each as the float that its digits are read as.
-
-    Args:
-        values: Any shape.
-        decimals: How many.
-    """
+    """Nearest numbers with so many decimals, each the float that its digits are read as; no -0.0."""
     scale = 10.0**decimals
     whole = np.abs(values) < _EXACT / scale  # beyond it a float has no such decimals
     return np.asarray(np.where(whole, np.rint(np.where(whole, values, 0.0) * scale) / scale, values) + 0.0)  # no -0.0

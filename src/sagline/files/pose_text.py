@@ -19,9 +19,10 @@ POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or
 WRENCH_STEP: Final = (
     "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
 )
+UNITS_STEP: Final = "Check its unit: numbers are meters, millimeters are written as 1500 mm."
 
 
-def numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
+def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) -> list[float]:
     """Plain decimal numbers."""
     found = []
     for part in parts:
@@ -48,11 +49,8 @@ def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) ->
     parts = text.split(",", maxsplit=6)
     if len(parts) not in (3, 6):
         raise InvalidValueError(item, repr(text), "three or six numbers", step)
-    whole = numbers(parts, item, unit, largest)
+    whole = decimal_numbers(parts, item, unit, largest)
     return whole + [0.0] * (6 - len(whole))
-
-
-UNITS_STEP: Final = "Check its unit: numbers are meters, millimeters are written as 1500 mm."
 
 
 class _Euler(Entry):
@@ -70,7 +68,7 @@ class PoseEntry(Entry):
 
 
 def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
-    """The pose that a file means."""
+    """Pose of an entry of a file; InvalidValueError if it is none, or farther away than any machine."""
     position = numbers_of(entry.position, 3, "m", f"{item}.position")
     if (far := float(np.abs(position).max())) > FARTHEST:
         raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
@@ -92,11 +90,7 @@ def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
 
 
 def numbers_of(value: Any, count: int, unit: str, item: str) -> Array:
-    """So many numbers in SI.
-
-    Returns:
-        Array of shape (count,).
-    """
+    """Numbers in SI, shape (count,), from a value of a file."""
     numbers = checked(in_si(value, unit, item), item, unit)
     if numbers.shape != (count,):
         raise InvalidValueError(item, f"of shape {numbers.shape}", f"a list of {count} numbers", f"Correct {item}.")

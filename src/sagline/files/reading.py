@@ -44,12 +44,7 @@ def exists(path: Path) -> bool:
 
 
 def read_bytes(path: Path, limit: float) -> bytes:
-    """Bytes of a regular file of up to so many MB; pipes and devices are not opened, as they may never end.
-
-    Args:
-        path: The file.
-        limit: Largest size that is read [MB].
-    """
+    """Bytes of a regular file of up to so many MB; pipes and devices are not opened, as they may never end."""
     most = int(limit * MEGABYTE)
     try:
         check_regular(path, path.stat().st_mode)
@@ -64,12 +59,7 @@ def read_bytes(path: Path, limit: float) -> bytes:
 
 
 def read_text(path: Path, limit: float) -> str:
-    """Text of a file in UTF-8 of up to so many MB, without a byte order mark.
-
-    Args:
-        path: The file.
-        limit: Largest size that is read [MB].
-    """
+    """Text of a file in UTF-8 of up to so many MB, without a byte order mark."""
     data = read_bytes(path, limit)
     if other := _OTHER_TEXT.get(data[:2]):
         raise FileError(path, f"is {other} text, not UTF-8 text", "Save it again as UTF-8.")

@@ -48,17 +48,7 @@ def read_xml(path: Path) -> Element:
 
 
 def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
-    """As many numbers as wanted, between blanks.
-
-    Args:
-        text: The text; None where the file has none.
-        count: How many numbers there must be.
-        item: The name a message uses.
-        unit: Their unit, for the message; "" for none.
-
-    Returns:
-        The numbers, shape (count,).
-    """
+    """So many numbers between blanks, shape (count,); InvalidValueError names the item and the unit."""
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
     values = [number for number in found if number is not None and within_reach(number)]
     if len(found) != count or len(values) != count:
@@ -69,13 +59,7 @@ def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
 
 
 def number(text: str | None, item: str, unit: str) -> float:
-    """One finite number.
-
-    Args:
-        text: The text; None where the file has none.
-        item: The name a message uses.
-        unit: Its unit, for the message; "" for none.
-    """
+    """One finite number; InvalidValueError names the item and the unit."""
     return float(numbers(text, 1, item, unit)[0])
 
 
@@ -148,5 +132,5 @@ class Imported:
 
 
 def with_losses(robot: Robot, lost: tuple[str, ...]) -> Imported:
-    """A robot whose notes tell what was lost, so that its file does too."""
+    """Robot and its losses, which its notes repeat so that its file does too."""
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

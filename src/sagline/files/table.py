@@ -98,28 +98,14 @@ class Table:
             raise line_error(self.path, self.header, "no rows below the columns' names; allowed: at least one")
 
     def refuse(self, wrong: NDArray[np.bool_], item: str, values: Array, unit: str, allowed: str) -> None:
-        """Refuse the first row that is wrong.
-
-        Args:
-            wrong: Which rows are wrong, shape (rows,).
-            item: What is wrong in them, for the message.
-            values: Its values, shape (rows,).
-            unit: Their unit; "" for none.
-            allowed: What would do.
-        """
+        """Refuse the first row that is wrong; the message gives its line, its value with unit, and what is allowed."""
         if wrong.any():
             k = int(np.argmax(wrong))
             value = f"{values[k]:.12g} {unit}".rstrip()
             raise line_error(self.path, self.lines[k], f"{item} is {value}; allowed: {allowed}")
 
     def refuse_millimeters(self, name: str, size: Array | float, whole: str) -> None:
-        """Refuse a column of lengths without a unit, if one is so long that it must have another unit.
-
-        Args:
-            name: The column.
-            size: Size of what the lengths belong to [m], shape () or (rows,).
-            whole: What that is, for the message.
-        """
+        """Refuse lengths without a unit that exceed a hundred times the size [m] of the object, shape () or (rows,)."""
         if name in self.plain:
             far = self.columns[name] > _TOO_LONG * size
             allowed = f"lengths like {whole}; if these are millimeters, call the column {name} [mm]"

@@ -15,6 +15,8 @@ from sagline.core.errors import InvalidValueError, printable
 if TYPE_CHECKING:
     from xarray import Dataset, Variable
 
+STEP = "Write the file again; it was edited, or damaged."
+NEWER = "Read it with a newer sagline."
 NONE: Final = -1  # of an index or a code: there is none
 # labels along the dimensions beside rows and cable
 PARTS = {
@@ -91,10 +93,6 @@ class Quantity(NamedTuple):
             found["flag_values"] = np.array([code.value for code in self.codes], dtype=np.int8)
             found["flag_meanings"] = " ".join(code.name.lower() for code in self.codes)
         return found
-
-
-STEP = "Write the file again; it was edited, or damaged."
-NEWER = "Read it with a newer sagline."
 
 
 def variables_of(result: Any, quantities: Iterable[Quantity], rows: tuple[str, ...] = ()) -> dict[str, Any]:

@@ -263,11 +263,7 @@ def _nearest(text: str) -> Nearest:
 
 
 def field_of(space: Workspace) -> Dataset:
-    """Level, margin, deciding criterion and cable at the nodes of a workspace's grid.
-
-    Returns:
-        Data set with dimensions x, y and z [m].
-    """
+    """Level, margin, deciding criterion and cable at the nodes of the grid, with dimensions x, y and z [m]."""
     from xarray import Dataset
 
     shape = space.level.shape

@@ -30,6 +30,11 @@ from sagline.files.reading import check_regular
 
 LONGEST = 120  # bytes: with the words and the suffix that follow it stays below the 255 of common file systems
 UNNAMED = "robot"
+LOCK = "lock"  # held as long as the folder is in use: the system frees it, however the process ends
+TRIES = 100
+_finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
+_OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes what of it is below the space
+PREFIX, SUFFIX = ".sagline-", ".part"
 _DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", re.IGNORECASE)  # in every folder of Windows
 
 
@@ -55,11 +60,6 @@ def file_stem(name: str, *words: str) -> str:
     if not stem or stem != "-".join(plain.split(" ")):
         stem = f"{stem or UNNAMED}-{sha256(name.encode('utf-8', 'surrogatepass')).hexdigest()[:8]}"
     return "-".join((stem, *words))
-
-
-PREFIX, SUFFIX = ".sagline-", ".part"
-LOCK = "lock"  # held as long as the folder is in use: the system frees it, however the process ends
-TRIES = 100
 
 
 @contextmanager
@@ -123,9 +123,6 @@ def try_lock(lock: int, *, if_unknown: bool) -> bool:
     except OSError:
         return if_unknown
     return True
-
-
-_finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
 
 
 @contextmanager
@@ -269,9 +266,6 @@ def _next_step(target: Path) -> str:
     if not target.parent.is_dir():
         return f"Create the folder {target.parent} first, or name another."
     return "Check the permissions of its folder and the space on the disk, or name another folder."
-
-
-_OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes what of it is below the space
 
 
 def plain(what: Any) -> Any:

@@ -13,7 +13,7 @@ import viser
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.files.pose_text import STRONGEST, numbers, pose_of
+from sagline.files.pose_text import STRONGEST, decimal_numbers, pose_of
 from sagline.files.quantity import plain_number
 from sagline.files.robot_file import dump_robot
 from sagline.robot.pose import Pose
@@ -76,7 +76,7 @@ def numbers_of(text: str, item: str, unit: str, count: int, largest: float) -> A
     parts = text.split(",", maxsplit=count)
     if len(parts) != count:
         raise InvalidValueError(item, repr(text[:60]), f"{count} numbers", STEP)
-    return np.array(numbers(parts, item, unit, largest))
+    return np.array(decimal_numbers(parts, item, unit, largest))
 
 
 LONGEST_TEXT: Final = 60  # characters of a text
