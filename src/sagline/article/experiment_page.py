@@ -12,9 +12,9 @@ from sagline.article.drawing import Drawings, axes, cables_over_time, legend
 from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.files.writing import atomic_files, create_folder, json_text, plain
+from sagline.files.writing import plain
 from sagline.plot.sheet import BLUE, TICK, VERMILLION
-from sagline.present.page import Chapter, Finding, Panel, Table, Verdict, page, table_of
+from sagline.present.page import Chapter, Finding, Panel, Table, Verdict, page, table_of, write_page
 
 NAMES = ("experiment.html", "experiment.json")
 TITLE = "The experiment, done again"
@@ -36,12 +36,8 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
     )
     made = f"Made by sagline {version('sagline')}: sagline experiment article."
     numbers = {finding.key: plain(finding.numbers) for finding in chapter.findings}
-    contents = page(TITLE, lead, NOTATION, [chapter], None, made, summary=False), json_text(numbers) + "\n"
-    place = create_folder(folder)
-    with atomic_files(place, NAMES) as files:
-        for file, content in zip(files, contents, strict=True):
-            file.write_text(content, encoding="utf-8")
-    return place / NAMES[0]
+    text = page(TITLE, lead, NOTATION, [chapter], None, made, summary=False)
+    return write_page(folder, NAMES, text, numbers)[0]
 
 
 def experiment_chapter(result: Experiment, how: str) -> Chapter:

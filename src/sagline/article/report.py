@@ -17,9 +17,9 @@ import sagline as sl
 from sagline.article.drawing import NAME_SIZE, Drawings, axes, legend
 from sagline.article.simulation import ERROR_BAND
 from sagline.core.numbers import n
-from sagline.files.writing import atomic_files, check_files, create_folder, json_text, plain
+from sagline.files.writing import check_files, plain
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Chapter, Panel, page
+from sagline.present.page import Chapter, Panel, page, write_page
 
 NAMES = ("article.html", "article.json")  # both or neither is written
 TITLE = "The article, redone"
@@ -76,12 +76,8 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
         progress(len(chapters), len(chapters), "done")
     numbers = {c.key: {finding.key: plain(finding.numbers) for finding in c.findings} for c in chapters}
     made = f"Made by sagline {version('sagline')}: sagline article {' '.join(parts)}".rstrip() + "."
-    contents = page(TITLE, LEAD, NOTATION, chapters, picture(chapters), made), json_text(numbers) + "\n"
-    place = create_folder(folder)
-    with atomic_files(place, NAMES) as files:
-        for file, content in zip(files, contents, strict=True):
-            file.write_text(content, encoding="utf-8")
-    return ArticleReport(place / NAMES[0], place / NAMES[1], tuple(chapters), numbers)
+    text = page(TITLE, LEAD, NOTATION, chapters, picture(chapters), made)
+    return ArticleReport(*write_page(folder, NAMES, text, numbers), tuple(chapters), numbers)
 
 
 class Part(NamedTuple):

@@ -9,9 +9,11 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from html import escape
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from sagline.core.numbers import n
+from sagline.files.writing import atomic_files, create_folder, json_text
 
 SENTENCE = 40  # characters from which on a cell of a table is text
 NARROW = 3  # columns of a table that stands beside the text
@@ -148,6 +150,19 @@ def page(
         f"{before}<p>{_text(notation)}</p>\n"
         f"<main>\n{body}\n</main>\n<footer>{escape(footer)}</footer>\n</body>\n</html>\n"
     )
+
+
+def write_page(folder: Path | str, names: tuple[str, str], text: str, numbers: dict[str, Any]) -> tuple[Path, Path]:
+    """Write a page and its numbers as JSON into a folder, which is created if missing: both files or neither.
+
+    Raises:
+        FileError: If the folder cannot be written.
+    """
+    place = create_folder(folder)
+    with atomic_files(place, names) as (page_file, numbers_file):
+        page_file.write_text(text, encoding="utf-8")
+        numbers_file.write_text(json_text(numbers) + "\n", encoding="utf-8")
+    return place / names[0], place / names[1]
 
 
 def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
