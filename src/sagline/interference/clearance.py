@@ -79,7 +79,7 @@ class ClearanceRows:
 
         Args:
             state: The equilibrium, a batch of N poses; a single one has N = 1.
-            together: Whether the least of all pairs is enough: of the others then only so much is known.
+            together: True if the least distance of all pairs is enough; the others are then only known to be larger.
 
         Returns:
             Distances.
@@ -171,14 +171,14 @@ class Clearances(Result):
     """Least distances at one pose or N, between cables as they hang, the platform and what stands around.
 
     Attributes:
-        pairs: What is measured against what, P pairs of names.
+        pairs: P pairs of names of measured bodies.
         pair_distance: Least distance of each [m], cable diameters taken off where they are known, shape (P,) or (N, P);
             0 or less where they touch (how deep is not measured), NaN where a pose has no tensions.
         pair_low: Proved: no distance is below it [m], of the same shape.
         nearest: Points between which it is measured, on the middle lines of cables and rods [m], shape (P, 2, 3) or
             (N, P, 2, 3).
-        left_out: What is not measured, and why.
-        precision: How far the proved bound may stay below the distance [m].
+        left_out: Pairs that are not measured, with the reason.
+        precision: Largest difference of the proved bound from the distance [m].
     """
 
     pairs: tuple[tuple[str, str], ...]
@@ -259,13 +259,13 @@ def clearance(
 
     Args:
         state: An equilibrium, single or N of them: of a plan, plan.state.
-        obstacles: What stands around: Box, Capsule, Sphere and Mesh, one or several. Solid: what is inside touches.
-        precision: How far the proved bound may stay below a distance [m], > 0.
+        obstacles: Obstacles: Box, Capsule, Sphere and Mesh, one or several. Solid: what is inside touches.
+        precision: Largest difference of the proved bound from a distance [m], > 0.
         cable_radius: Half the cables' diameters [m], one for all or one a cable, >= 0; None: as the robot's cables
             know, else 0.
         platform: The platform's form in its own frame; None: a box of the robot's platform_size around its anchors,
             where that is known.
-        from_anchor: How much of a cable next to its anchor is left out [m], > 0: at the anchor that two cables share,
+        from_anchor: Length of cable next to its anchor that is left out [m], > 0: at the anchor that two cables share,
             at the platform, and at the frame against what stands around. None: pairs that share an anchor, and
             cables with the platform, are left out as a whole; `left_out` names them.
 

@@ -30,7 +30,7 @@ class Mesh(Result):
     Attributes:
         vertices: Corners [m], shape (V, 3).
         faces: Triangles as numbers of their corners, counter-clockwise seen from outside the solid, shape (F, 3).
-        name: What it is called.
+        name: Name in messages and results.
 
     Examples:
         >>> import sagline as sl
@@ -51,7 +51,7 @@ class Mesh(Result):
         Args:
             vertices: Corners [m], shape (V, 3).
             faces: Triangles as numbers of their corners from 0, shape (F, 3): at least four, at most a million.
-            name: What it is called.
+            name: Name in messages and results.
 
         Raises:
             InvalidValueError: If a face names no corner, or the surface is not closed; the message gives its extent.
@@ -88,7 +88,7 @@ class Mesh(Result):
         """The same mesh somewhere else.
 
         Args:
-            pose: Where its frame's origin goes, and how it turns: a single pose.
+            pose: A single pose of its frame.
 
         Returns:
             Mesh.

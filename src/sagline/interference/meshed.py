@@ -39,7 +39,7 @@ class Solid(NamedTuple):
 
     Attributes:
         geometry: Its form.
-        radius: What is taken off distances from it [m].
+        radius: Radius that is subtracted from distances [m].
         mesh: Its triangles; None for rods and balls.
         inner: A point of it [m].
         place: Rotation and position, of what stands still.

@@ -28,7 +28,7 @@ class Box(Result):
         size: Its edges [m], shape (3,), > 0.
         center: Its middle in the world [m], shape (3,); as a platform, in the platform frame.
         orientation: Rotation from its edges to the world, shape (3, 3).
-        name: What it is called.
+        name: Name in messages and results.
 
     Examples:
         >>> import sagline as sl
@@ -53,7 +53,7 @@ class Box(Result):
             size: Its edges [m], shape (3,), > 0.
             center: Its middle [m], shape (3,).
             orientation: Rotation matrix from its edges to the world, shape (3, 3).
-            name: What it is called.
+            name: Name in messages and results.
 
         Raises:
             InvalidValueError: If an edge is not positive, or orientation is no rotation.
@@ -87,7 +87,7 @@ class Capsule(Result):
         start: One end of its middle line in the world [m], shape (3,).
         end: The other [m], shape (3,).
         radius: [m], >= 0.
-        name: What it is called.
+        name: Name in messages and results.
 
     Examples:
         >>> import sagline as sl
@@ -106,7 +106,7 @@ class Capsule(Result):
             start: One end of its middle line [m], shape (3,).
             end: The other [m], shape (3,).
             radius: [m], >= 0.
-            name: What it is called.
+            name: Name in messages and results.
 
         Raises:
             InvalidValueError: If the radius is negative, or an end is no point.
@@ -133,7 +133,7 @@ class Sphere(Result):
     Attributes:
         center: Its middle in the world [m], shape (3,).
         radius: [m], >= 0.
-        name: What it is called.
+        name: Name in messages and results.
 
     Examples:
         >>> import sagline as sl
@@ -150,7 +150,7 @@ class Sphere(Result):
         Args:
             center: Its middle [m], shape (3,).
             radius: [m], >= 0.
-            name: What it is called.
+            name: Name in messages and results.
 
         Raises:
             InvalidValueError: If the radius is negative, or the center is no point.

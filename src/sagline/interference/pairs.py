@@ -113,7 +113,7 @@ class Pairs(NamedTuple):
         by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
         with_mesh: Numbers of the pairs of which at least one is a mesh, shape (Q, 2).
         names: Of all pairs, in this order.
-        left_out: What is not measured, and why.
+        left_out: Pairs that are not measured, with the reason.
     """
 
     parts: tuple[Part, ...]

@@ -172,8 +172,8 @@ class AnchorErrors:
 
     Attributes:
         deviation: Standard deviation of each coordinate [m].
-        samples: How many robots with errors stand for each candidate.
-        take: Which of their values is the candidate's, "worst" or "mean".
+        samples: Number of robots with errors for each candidate.
+        take: Value of the candidate from those of its samples, "worst" or "mean".
         seed: Of the sample.
     """
 
@@ -187,7 +187,7 @@ class AnchorErrors:
 
         Args:
             deviation: Standard deviation of each coordinate [m], > 0.
-            samples: How many, 1 to 1000.
+            samples: Number of samples, 1 to 1000.
             take: "worst" or "mean".
             seed: Of the sample, a whole number >= 0.
 

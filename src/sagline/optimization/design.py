@@ -53,11 +53,11 @@ def design(
 
     Args:
         robot: The robot to begin with.
-        free: What may change: `FreeAnchors`, `FreeCable`, `FreeLimit`.
-        goals: What it should be better at: `Goal`s, or their names. "cma" and "differential_evolution" add them up by
+        free: Design variables: `FreeAnchors`, `FreeCable`, `FreeLimit`.
+        goals: Goals, or their names. "cma" and "differential_evolution" add them up by
             their weights; "nsga2" finds robots of which none is better than another in every goal.
-        wrenches: What it has to bear at every pose, a `WrenchBox` for instance; None for its weight alone.
-        poses: Where; None for a grid of level poses in a box.
+        wrenches: Set of loads at every pose, a `WrenchBox` for instance; None for its weight alone.
+        poses: Poses; None for a grid of level poses in a box.
         box: The box of that grid; None for the robot's test box, level.
         grid: Poses of it along x, y and z.
         inner: Anchors that the machine itself moves from pose to pose: `FreeAnchors`, at each pose shifted to where
@@ -65,9 +65,9 @@ def design(
         robust: Errors of the anchors that a robot is rated with.
         model: Cable model.
         optimizer: "cma", "differential_evolution" or "nsga2".
-        evaluations: How many robots are rated at most.
+        evaluations: Largest number of robots that are rated.
         seed: Of all that is random.
-        folder: Where rated robots are kept: a search that was interrupted goes on from there, and one that is asked
+        folder: Folder of the rated robots: an interrupted search continues from there, and so does one that is asked
             for more evaluations too. None: nowhere.
         progress: Called after each generation: how many robots are rated, of how many.
 

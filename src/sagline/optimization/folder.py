@@ -69,7 +69,7 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
 
     Args:
         folder: The folder; created if missing.
-        request: What is asked.
+        request: The request.
 
     Yields:
         The record.

@@ -22,12 +22,12 @@ class Part(NamedTuple):
     """One design variable.
 
     Attributes:
-        name: What it is, as messages and tables call it.
+        name: Name in messages and tables.
         unit: Its unit; "" for the number of a choice.
         low: Least [unit].
         high: Largest [unit].
-        start: What the robot has [unit], between the two.
-        choices: How many choices there are, the number being 0, 1, ...; 0 where it is continuous.
+        start: Value of the robot [unit], between the two.
+        choices: Number of choices 0, 1, ...; 0 for a continuous variable.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Free(ByFields):
 
         Args:
             robot: The robot that the search begins with.
-            item: How messages call it.
+            item: Name in messages.
 
         Raises:
             InvalidValueError: If the robot does not have it, or not within the bounds.
@@ -108,10 +108,10 @@ class CableChoice:
     """A cable of a catalogue.
 
     Attributes:
-        name: What it is called.
+        name: Name in messages and files.
         cable: Its material, one cable's.
         cost: Of a meter of it, in any currency; None where no goal asks.
-        tension_max: What it carries [N]; None: the robot's limits stay.
+        tension_max: Upper tension limit [N]; None: the robot's limits stay.
     """
 
     name: str
@@ -123,10 +123,10 @@ class CableChoice:
         """Check name, cable, cost and limit.
 
         Args:
-            name: What it is called.
+            name: Name in messages and files.
             cable: Its material, numbers and no arrays.
             cost: Of a meter, >= 0, or None.
-            tension_max: What it carries [N], > 0, or None.
+            tension_max: Upper tension limit [N], > 0, or None.
 
         Raises:
             InvalidValueError: If the material is that of several cables, or an argument is of the wrong kind.

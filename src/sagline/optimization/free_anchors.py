@@ -36,10 +36,10 @@ def symmetric_shifts(
 
     Args:
         symmetry: One of `NAMES`, or None for anchors that move by themselves.
-        anchors: Where they are [m], shape (c, 3); the first one leads.
+        anchors: Positions of the anchors [m], shape (c, 3); the first one leads.
         along: Directions, shape (K, 3).
         bounds: Least and largest shifts [m], shape (K,) each.
-        item: How messages call it.
+        item: Name in messages.
 
     Returns:
         For each that leads its place among the anchors (None for all of them), and shifts of shape (K, c, 3).
@@ -110,7 +110,7 @@ class FreeAnchors(Free):
         high: Largest shifts [m], shape (K,), >= 0; where both are 0 nothing is free.
         along: Directions, world axes for the frame and platform axes for the platform, shape (K, 3), unit vectors.
         cables: Whose anchors, numbers from 0; empty for all.
-        symmetry: How the others follow the first of them: "x", "xy" or any other axes: mirrored in the planes across
+        symmetry: Symmetry to the first of them: "x", "xy" or any other axes: mirrored in the planes across
             these; "turned": about the vertical, with the angle between them; "together": by the same shift; None:
             each moves by itself.
     """

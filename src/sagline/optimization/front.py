@@ -36,15 +36,15 @@ class Front(Result):
         start: The robot that the search began with.
         robots: The better ones, K of them, best by the first goal first; the start alone where none is better. One
             only, the best by the weights, where the optimizer is not "nsga2".
-        goals: What they are better at, g goals.
+        goals: The g goals.
         values: Of the robots, each goal in its unit, shape (K, g).
         start_values: Of the start, shape (g,).
-        parts: What was free, d numbers.
-        changed: These numbers of the robots, shape (K, d).
-        better: Whether a robot is better than the start.
-        evaluated: The numbers of all candidates, in their order, the start first, shape (N, d).
+        parts: The d design variables.
+        changed: Design variables of the robots, shape (K, d).
+        better: True if a robot is better than the start.
+        evaluated: Design variables of all candidates, in their order, the start first, shape (N, d).
         evaluated_values: Their goals, shape (N, g), NaN where a candidate is no robot.
-        optimizer: Who searched.
+        optimizer: Name of the optimizer.
         seed: Of the search.
     """
 
@@ -84,7 +84,7 @@ class Front(Result):
         """Write the robots as robot files, and a table of them.
 
         Args:
-            folder: Where; created if missing. Files of the same names are replaced.
+            folder: The folder; created if missing. Files of the same names are replaced.
 
         Returns:
             The files: front.csv, and for each robot its name with .yaml.

@@ -38,10 +38,10 @@ class Kind(NamedTuple):
 
     Attributes:
         unit: Its unit; "" for a share or a currency.
-        larger_is_better: Which way it is wanted where nobody says otherwise.
+        larger_is_better: True if it is maximized by default.
         needs: The field of `Measured`.
         over_poses: Its value from that field, over the last axis.
-        text: What it is.
+        text: Description.
     """
 
     unit: str
@@ -98,9 +98,9 @@ class Goal:
         kind: "workspace_share" (of the poses, those whose margin is not negative), "mean_margin" or "least_margin"
             [N], "largest_tension" [N], "largest_sag" [m], "least_stiffness" [N/m] (against a force, whatever its
             direction) or "cable_cost" (each cable as long as the longest chord it spans, by the catalogue's costs).
-        maximize: Whether more of it is wanted.
-        weight: How much it counts beside other goals, > 0.
-        scale: What counts as one, in its unit; None: what the first robot has, or 1 where it has nothing.
+        maximize: True to maximize, False to minimize.
+        weight: Weight beside other goals, > 0.
+        scale: Size that counts as one, in its unit; None: the first robot's value, or 1 where that is 0.
     """
 
     kind: str
@@ -115,9 +115,9 @@ class Goal:
 
         Args:
             kind: One of the seven.
-            maximize: Whether more of it is wanted; None: as its name says.
-            weight: How much it counts beside other goals, > 0.
-            scale: What counts as one, > 0, or None.
+            maximize: True to maximize, False to minimize; None: by its kind.
+            weight: Weight beside other goals, > 0.
+            scale: Size that counts as one, > 0, or None.
 
         Raises:
             InvalidValueError: If there is no such goal, or an argument is of the wrong kind.
@@ -152,8 +152,8 @@ class Goal:
         """Value of the goal of each candidate.
 
         Args:
-            measured: What is known of them.
-            worst: Whether of a sample of anchors the worst counts, and not the mean.
+            measured: Quantities of the candidates.
+            worst: True to take the worst of a sample of anchors, False for the mean.
 
         Returns:
             In the goal's unit, shape (N,).

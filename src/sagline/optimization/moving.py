@@ -37,11 +37,11 @@ class MovingAnchors(Result):
     Attributes:
         robot: The robot with its anchors where it has them.
         pose: The poses, a batch of G.
-        parts: What moves, q numbers.
-        moved: These numbers at each pose, shape (G, q).
+        parts: The q moving coordinates.
+        moved: Their values at each pose, shape (G, q).
         margin: With moved anchors [N], shape (G,).
         fixed_margin: Without [N], shape (G,).
-        moving: What moves, as it was given.
+        moving: Moving anchors as given.
     """
 
     robot: Robot
@@ -81,9 +81,9 @@ def moving_anchors(
 
     Args:
         robot: The robot.
-        moving: What moves: `FreeAnchors`.
-        wrenches: What it has to bear, a `WrenchBox` for instance; None for its weight alone.
-        poses: Where; None for a grid of level poses in a box.
+        moving: Moving anchors: `FreeAnchors`.
+        wrenches: Set of loads, a `WrenchBox` for instance; None for its weight alone.
+        poses: Poses; None for a grid of level poses in a box.
         box: The box of that grid; None for the robot's test box, level.
         grid: Poses of it along x, y and z.
         model: Cable model.

@@ -43,12 +43,12 @@ def distribute(
     the center of mass.
 
     Args:
-        robot: What all candidates share.
+        robot: Robot whose other data all candidates share.
         model: Cable model.
         cables: Tables, one a pose, shape (N, m, CABLE_COLUMNS).
         poses: Pose rows (N, POSE_COLUMNS).
         wrench: On the platform, shape (6,).
-        stiffness: Whether it is asked for.
+        stiffness: True to compute the stiffness.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
@@ -119,7 +119,7 @@ def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Arra
     the sample it climbs to a maximum of its own surroundings.
 
     Args:
-        inner: What may move.
+        inner: Moving anchors.
         margins: Gives margins [N], shape (R,).
         cables: Tables of cables, one a pose, (R, m, CABLE_COLUMNS); they stay as they are.
         poses: Pose rows (R, POSE_COLUMNS).
@@ -177,12 +177,12 @@ class Rating:
 
         Args:
             candidates: The robots.
-            goals: What they are rated by.
-            wrenches: What they have to bear; None for their weight alone.
+            goals: Goals of the ratings.
+            wrenches: Set of loads; None for the weight alone.
             poses: A batch of G.
             model: Cable model.
             robust: Errors of the anchors, or None.
-            inner: What moves at each pose, or None.
+            inner: Anchors that move at each pose, or None.
 
         Raises:
             InvalidValueError: If the load cannot be shared, a cost is missing, or the first robot holds no pose where

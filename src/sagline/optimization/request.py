@@ -83,14 +83,14 @@ class Request:
 
     Attributes:
         robot: The robot that it begins with.
-        free: What may change.
-        goals: What is wanted.
-        wrenches: What every candidate has to bear; None for its weight alone.
-        poses: Where, a batch.
+        free: Design variables.
+        goals: Goals.
+        wrenches: Set of loads; None for the weight alone.
+        poses: Poses, a batch.
         model: Cable model.
-        inner: What moves at each pose.
+        inner: Anchors that move at each pose.
         robust: Errors of the anchors, or None.
-        optimizer: Who searches.
+        optimizer: Name of the optimizer.
         seed: Of all that is random.
     """
 

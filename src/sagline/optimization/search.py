@@ -34,7 +34,7 @@ class Task(NamedTuple):
     Attributes:
         rate: Gives the costs of points of the unit cube; a generation at once.
         first: Points of the first generation, the robot itself first, shape (K, d).
-        goals: How many costs there are, g.
+        goals: Number of costs, g.
         seed: Of the search.
         evaluations: Number of points that may be rated, the first generation included.
     """
@@ -50,7 +50,7 @@ def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
     """Latin hypercube sample: each coordinate has one point in each of `count` equal intervals.
 
     Args:
-        count: How many points.
+        count: Number of points.
         dimensions: Of the cube.
         seed: Of the generator.
 
@@ -74,7 +74,7 @@ def search_cma(task: Task) -> None:
     """Rate generation after generation until the evaluations are used up.
 
     Args:
-        task: What is searched; one goal.
+        task: The problem, with one goal.
 
     Source:
         Hansen & Ostermeier 2001; restarts with a growing population: Auger & Hansen 2005.
@@ -114,7 +114,7 @@ def search_differential_evolution(task: Task) -> None:
     """Rate generation after generation until the evaluations are used up.
 
     Args:
-        task: What is searched; one goal.
+        task: The problem, with one goal.
 
     Source:
         Storn & Price 1997.
@@ -144,7 +144,7 @@ def search_nsga2(task: Task) -> None:
     """Rate generation after generation until the evaluations are used up.
 
     Args:
-        task: What is searched.
+        task: The problem.
 
     Source:
         Deb, Pratap, Agarwal & Meyarivan 2002.

@@ -50,7 +50,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
     """Worker processes of this machine, not reachable from others.
 
     Args:
-        workers: How many.
+        workers: Number of processes.
         tell: Told where the dashboard is.
 
     Yields:
@@ -93,7 +93,7 @@ def remote_workers(address: str) -> Iterator[Any]:
     """The workers of a scheduler.
 
     Args:
-        address: Where it listens: "tcp://10.0.0.1:8786".
+        address: Address of the scheduler: "tcp://10.0.0.1:8786".
 
     Yields:
         The client.

@@ -71,7 +71,7 @@ class SweepFolder(NamedTuple):
     """An open folder of a sweep.
 
     Attributes:
-        path: Where it is.
+        path: Path of the folder.
         group: Its Zarr group.
         request: The request in it.
         digest: Of the request.
@@ -144,7 +144,7 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
     """Make the folder of a sweep, whole or not at all.
 
     Args:
-        path: Where; nothing is there, or an empty folder.
+        path: Path at which there is nothing, or an empty folder.
         request: The request.
         size: Of a task.
 
@@ -176,7 +176,7 @@ def open_folder(path: Path) -> SweepFolder:
     """Open the folder of a sweep.
 
     Args:
-        path: Where.
+        path: Path of the folder.
 
     Returns:
         The folder, with the request.

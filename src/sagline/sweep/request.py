@@ -36,10 +36,10 @@ class Variable(NamedTuple):
     Attributes:
         name: Its name.
         unit: Unit of its values, "" for none.
-        long_name: What it is, in a reader's words.
-        a_cable: Whether it has a value for each cable, along a fourth dimension.
+        long_name: Description.
+        a_cable: True if it has a value for each cable, along a fourth dimension.
         codes: The status that it holds codes of, if any.
-        whole: Whether its values are whole numbers.
+        whole: True for whole numbers.
     """
 
     name: str
@@ -96,10 +96,10 @@ class Request(Result):
         robots: R of them.
         poses: A batch of P.
         wrenches: External wrenches on the platform, about the center of mass in world axes [N, N m], shape (W, 6).
-        quantities: What is asked, in the order of `sl.sweep.QUANTITIES`: "tension", "length",
+        quantities: Quantities, in the order of `sl.sweep.QUANTITIES`: "tension", "length",
             "shortfall", "margin".
         model: Cable model.
-        tension: How the load is shared among redundant cables; each request stands alone.
+        tension: Tension distribution method, applied to each request alone.
         around: Loads around each wrench, all of which the margin is for.
         moment_arm: Of the margin's norm [m]; None for each robot's mean lever arm.
     """
@@ -133,7 +133,7 @@ class Request(Result):
             wrenches: Force [N], then moment [N m], shape (6,) or (W, 6); None for the weight alone.
             quantities: One of `sl.sweep.QUANTITIES`, or several.
             model: Cable model.
-            tension: How the load is shared.
+            tension: Tension distribution method.
             around: Set of loads that is added to each wrench for the margin; None for each wrench alone.
             moment_arm: Of the margin's norm [m], >= 0, as in `sl.margin`.
 
@@ -207,8 +207,8 @@ class Part(NamedTuple):
 
     Attributes:
         robot: Index of the robot.
-        poses: Which poses.
-        wrenches: Which wrenches.
+        poses: Range of poses.
+        wrenches: Range of wrenches.
     """
 
     robot: int

@@ -37,7 +37,7 @@ class Mark(NamedTuple):
 
     Attributes:
         seconds: Time it took a worker [s]; 0 where the chunk was found on the disk.
-        counts: How its requests ended.
+        counts: Outcomes of its requests.
     """
 
     seconds: float
@@ -146,11 +146,11 @@ class Sweep(Result):
     """Sweep in a folder; numbers are read when they are used.
 
     Attributes:
-        folder: Where it is.
-        request: What was asked.
-        tasks: How many tasks it has.
-        done: How many of them are done.
-        counts: How the requests of these ended.
+        folder: Path of the folder.
+        request: The request.
+        tasks: Number of tasks.
+        done: Number of tasks that are done.
+        counts: Outcomes of the requests of these tasks.
         seconds: Time that they took all workers together [s].
     """
 
@@ -181,7 +181,7 @@ class Sweep(Result):
 
         Args:
             name: One of `names`.
-            index: Which robots, poses, wrenches and cables, as numpy takes whole numbers and slices: (0, slice(10)).
+            index: Robots, poses, wrenches and cables, as numpy takes whole numbers and slices: (0, slice(10)).
                 All of them by default.
 
         Returns:

@@ -48,8 +48,8 @@ def run(
     tasks that run are done. A worker that is killed is replaced, and its task done again.
 
     Args:
-        request: What is asked.
-        folder: Where to; made if missing, in a folder that is there. It may hold the same sweep, and nothing else.
+        request: The request.
+        folder: Path of the folder; made if missing. It may hold the same sweep, and nothing else.
         workers: Processes of this machine; None for one a processor. With 1, without Dask, and where four tasks or
             fewer are left, these are done in this process, one after the other.
         scheduler: Address of Dask's scheduler of a cluster, "tcp://10.0.0.1:8786", in place of workers; all its workers

@@ -54,7 +54,7 @@ def numbers_of(request: Request, part: Part) -> dict[str, NDArray[np.generic]]:
 
     Args:
         request: The request.
-        part: Which box of it.
+        part: Box of the request.
 
     Returns:
         Arrays by the names of the variables, (poses, wrenches), those of cables (poses, wrenches, cables): NaN where a

@@ -81,9 +81,9 @@ def boundary(
             but not NaN, and may jump.
         low: Lower corner of the box [m], shape (3,).
         high: Upper corner of the box [m], shape (3,).
-        cells: How many cells along the longest side of the box, 2 to 128; the others have as many as keep cells near
+        cells: Number of cells along the longest side of the box, 2 to 128; the others have as many as keep cells near
             cubes. Or how many along each axis.
-        refine: How many times to halve the step in cells that the boundary passes through, as long as no more than 256
+        refine: Number of times to halve the step in cells that the boundary passes through, as long as no more than 256
             cells stand along an axis; True for once.
 
     Returns:
@@ -230,9 +230,9 @@ class Outline(Result):
         surface: The boundary, closed along the faces of the box.
         margin: At its vertices [N], shape (V,).
         cable: The cable that limits at each vertex, -1 where none does, shape (V,).
-        on_box: Which triangles lie on a face of the box, shape (F,).
+        on_box: True for triangles on a face of the box, shape (F,).
         open_faces: Faces of the robot's box that it reaches, "x low" for instance.
-        volume: What it holds [m^3], or of a plane [m^2]; what bulges between the vertices is not counted.
+        volume: Volume [m^3], or area of a plane [m^2], without the volume between flat triangles and the boundary.
         parts: In how many pieces it is.
         grid: The level at the nodes.
     """

@@ -189,7 +189,7 @@ class Clearance(Criterion):
 
     Attributes:
         limit: Least distance [m], > 0.
-        obstacles: What stands around, Box, Capsule, Sphere and Mesh, one or several.
+        obstacles: Obstacles, Box, Capsule, Sphere and Mesh, one or several.
     """
 
     title: ClassVar[str] = "clearance"

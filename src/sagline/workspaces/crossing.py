@@ -23,7 +23,7 @@ class Brackets(NamedTuple):
         outer: The other [m].
         at_inner: The function there, shape (N,).
         at_outer: The same at the other.
-        found: Whether it changes its sign within the limit at all, shape (N,).
+        found: True where it changes its sign within the limit, shape (N,).
     """
 
     inner: Array
@@ -45,12 +45,12 @@ def brackets(
 
     Args:
         level: The function.
-        points: Where to begin [m], shape (N, 3).
+        points: Start of each search [m], shape (N, 3).
         outward: Direction of length 1, shape (N, 3).
         at_points: The function there, shape (N,).
         step: First step [m], > 0, shape (N,).
-        outer_limit: How far to look outward [m], shape (N,).
-        inner_limit: How far to look inward [m], shape (N,).
+        outer_limit: Largest distance outward [m], shape (N,).
+        inner_limit: Largest distance inward [m], shape (N,).
 
     Returns:
         Brackets.

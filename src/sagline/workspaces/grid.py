@@ -35,7 +35,7 @@ class Grid(Result):
         y: The same along y, shape (ny,).
         z: The same along z, shape (nz,).
         values: The function, >= 0 inside, shape (nx, ny, nz).
-        evaluated: Whether the function was evaluated there, shape (nx, ny, nz); elsewhere the sign alone holds, and
+        evaluated: True where the function was evaluated, shape (nx, ny, nz); elsewhere the sign alone holds, and
             the value is that of a neighbor.
     """
 
@@ -71,7 +71,7 @@ def evaluate(level: Level, positions: Array) -> Array:
 
     Args:
         level: The function.
-        positions: Where [m], shape (N, 3).
+        positions: Positions [m], shape (N, 3).
 
     Returns:
         Its values, shape (N,).
@@ -160,7 +160,7 @@ class Net:
         inner: The node inside, of the edge of each vertex, shape (V, 3).
         outer: The node outside, shape (V, 3); the same as inner at the border.
         faces: The vertices of each triangle, counterclockwise as seen from outside, shape (F, 3).
-        first: Which of the vertices that were merged into it each one was taken from, shape (V,).
+        first: Index of each vertex before merging, shape (V,).
     """
 
     inner: Indices
@@ -173,7 +173,7 @@ def triangulate(inside: Mask) -> Net:
     """The triangles between inside and outside, closed along the border of the grid.
 
     Args:
-        inside: Which nodes are, shape (nx, ny, nz).
+        inside: Mask of the nodes inside, shape (nx, ny, nz).
 
     Returns:
         Net; without triangles where no node is inside.

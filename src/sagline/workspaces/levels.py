@@ -27,9 +27,9 @@ class Details(NamedTuple):
     Attributes:
         level: >= 0 inside, shape (N,).
         margin: Of the loads, in the rotation that decides [N], shape (N,).
-        criterion: Which criterion decides, as an index, shape (N,).
-        cable: Which cable, -1 where none does, shape (N,).
-        rotation: Which rotation, as an index, shape (N,).
+        criterion: Index of the deciding criterion, shape (N,).
+        cable: Deciding cable, -1 for none, shape (N,).
+        rotation: Index of the deciding rotation, shape (N,).
     """
 
     level: Array

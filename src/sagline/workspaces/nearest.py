@@ -33,7 +33,7 @@ class Nearest(Result):
         pose: A single pose.
         level: Of it: < 0, or not below where a region smaller than a cell of the grid was found.
         margin: Of the loads there [N].
-        criterion: What fails most there, as an index of the criteria.
+        criterion: Index of the criterion that is missed most.
         cables: Indices of the cables that stand against it.
         reason: In a sentence.
     """

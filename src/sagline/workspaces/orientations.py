@@ -95,7 +95,7 @@ class Orientations:
 
         Args:
             positions: Of the platform origin [m], shape (N, 3).
-            index: Which of the rotations.
+            index: Index of the rotation.
 
         Returns:
             Positions and quaternions, shape (N, 7).

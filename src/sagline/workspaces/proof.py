@@ -230,12 +230,12 @@ class Proof(Result):
         box: The box of poses.
         wrenches: The set of loads.
         model: The cable model that the proofs hold for.
-        verdict: What is proved of the whole box.
+        verdict: Verdict on the whole box.
         inside: Share of the box at whose poses every load is balanced within the limits, proved, 0 to 1.
         outside: Share at whose poses some load is not, proved.
         open: Share that is not decided.
         cells: The cells.
-        tried: How many boxes were looked at.
+        tried: Number of boxes that were tried.
     """
 
     robot: Robot

@@ -30,7 +30,7 @@ class Region(NamedTuple):
         flat: The axis along which the box has no extent, None for none: positions are taken to lie in that plane, and
             what is searched is so thick that what it holds a meter is an area.
         thickness: Of what is searched along it [m]; 1 where there is none.
-        cells: How many there are along each axis.
+        cells: Number of cells along each axis.
     """
 
     box: PoseBox
@@ -51,9 +51,9 @@ def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
 
     Args:
         robot: The robot.
-        box: What a caller wants; None: where the robot stands, with its test box if that reaches further, and of a
+        box: Box of positions; None: where the robot stands, with its test box if that reaches further, and of a
             planar robot the plane of its cables.
-        cells: How many the longest edge is divided into.
+        cells: Number of cells along the longest edge.
 
     Returns:
         The region.
@@ -126,7 +126,7 @@ class Plane(NamedTuple):
 
     Attributes:
         normal: That axis, 0 to 2.
-        at: Where on it the plane is [m].
+        at: Coordinate of the plane on it [m].
     """
 
     normal: int
@@ -164,8 +164,8 @@ class Slice:
         level: >= 0 inside of the workspace, shape (U, C).
         margin: Signed margins [N], negative where the loads cannot be borne, minus infinity where the robot is
             singular, shape (U, C).
-        criterion: Which criterion decides, as an index, shape (U, C).
-        cable: Which cable limits, -1 where none does, shape (U, C).
+        criterion: Index of the deciding criterion, shape (U, C).
+        cable: Limiting cable, -1 for none, shape (U, C).
     """
 
     plane: Plane

@@ -35,7 +35,7 @@ class Limit(NamedTuple):
 
     Attributes:
         criterion: Its title.
-        cable: Which cable decides, -1 where none does.
+        cable: Deciding cable, -1 for none.
         share: Of the surface without the faces of the box.
         number: Of the criterion, counted from 0.
     """
@@ -59,18 +59,18 @@ class Workspace(Result, Saved):
 
     Attributes:
         robot: The robot.
-        box: Where was looked.
+        box: Box of positions that was searched.
         wrenches: Loads that it bears there besides its weight.
         orientations: Of the platform.
-        criteria: What is met there, the margin first.
+        criteria: Criteria that are met there, the margin first.
         model: Cable model.
-        tension: How the load is shared where a criterion looks at tensions.
+        tension: Tension distribution method, for criteria on tensions.
         moment_arm: As of `margin`; None for the mean lever arm.
         unit: Of the volume, "m³" or "m²".
         volume: In that unit.
         volume_error: By how much the volume can be wrong, but for parts and gaps that are thinner than two cells of the
             finest grid; 0 where it is empty.
-        components: The parts that do not hang together.
+        components: Components of the workspace.
         surface: The boundary, closed, the faces of the box where it reaches them included.
         limiting: At each vertex of the surface the criterion that decides, as an index; -1 where the box does,
             shape (V,).

@@ -56,16 +56,16 @@ def workspace(
 
     Args:
         robot: The robot. Of a planar one, whose plane_normal is along x, y or z, the workspace is an area.
-        box: Where to look; one of no height along an axis: in that plane. Its tilt stands for `Tilts`. None: all of the
-            frame that the robot stands in, or of the box that its anchors span down to the floor.
+        box: Box of positions; one of no height along an axis: in that plane. Its tilt stands for `Tilts`. None: all of
+            the frame that the robot stands in, or of the box that its anchors span down to the floor.
         wrenches: Loads that the platform has to bear besides its weight; None for none.
         orientations: In which it is held: `Tilts`, or `Orientations`; None for level.
-        criteria: What else has to be met, `MaximumSag(0.05)` for instance. Those that look at tensions see those of
+        criteria: Further criteria, `MaximumSag(0.05)` for instance. Those on tensions take the tensions of
             the load in the middle of the set.
         model: Cable model; the default is exact.
-        tension: How the load is shared where a criterion looks at tensions; continuous.
-        cells: How many the box's longest edge is divided into, 4 to 128.
-        refine: How many times cells that the boundary passes through are divided once more, up to 3; True for once.
+        tension: Tension distribution method, for criteria on tensions; continuous.
+        cells: Number of cells along the box's longest edge, 4 to 128.
+        refine: Number of times that cells on the boundary are divided once more, up to 3; True for once.
         moment_arm: Length at which a moment counts as a force in the margin [m]; None for the mean lever arm.
         progress: Called between blocks: how many poses are done, of how many as far as is known.
 

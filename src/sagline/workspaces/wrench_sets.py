@@ -53,7 +53,7 @@ class WrenchSet(ByFields):
         segments: Each adds all wrenches between minus and plus itself, shape (S, 6).
         ellipsoids: Each A adds A s for all s no longer than 1, shape (E, 6, 6).
         corners: Of polytopes [N, N m], those of one after those of the other, shape (C, 6).
-        sizes: How many corners each polytope has, shape (P,).
+        sizes: Number of corners of each polytope, shape (P,).
         accelerations: Largest acceleration of the center of mass along each world axis [m/s^2], and largest angular
             acceleration about each [rad/s^2], shape (2,): the loads of these, by the robot's mass and inertia.
     """
