@@ -33,6 +33,12 @@ DEVIATIONS: Final = {
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
 _NEAR: Final = 0.7  # how like one of the keys a word is that was meant to be one: "name" is not like "frame"
+XYZ: Final = ("x", "y", "z")
+COMMANDED: Final = "_commanded"
+_MOST: Final = 1000  # cables
+_OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # and their units
+_NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:\[.*\])?\s*")
+USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # what a sensor may be off
 
 
 class _Sensors(Entry):
@@ -97,13 +103,6 @@ def comments_of_sensors(sensors: Sensors) -> Iterator[str]:
         yield f"# frame: {{position: {position}, quaternion: {quaternion}}}"
     if sensors.target.any():
         yield f"# target: {sensors.target.tolist()}"
-
-
-XYZ: Final = ("x", "y", "z")
-COMMANDED: Final = "_commanded"
-_MOST: Final = 1000  # cables
-_OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # and their units
-_NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:\[.*\])?\s*")
 
 
 def _read(path: Path, text: str) -> tuple[Table, int]:
@@ -220,9 +219,6 @@ def log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
     for names, unit, values in pairs:
         if values is not None:
             yield from ((f"{name}{unit}", column) for name, column in zip(names, values.T, strict=True))
-
-
-USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # what a sensor may be off
 
 
 def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> WinchLog:

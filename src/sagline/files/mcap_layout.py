@@ -26,6 +26,11 @@ if TYPE_CHECKING:
 
 ROWS: Final = "time"
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
+WORLD, PLATFORM = "world", "platform"
+FINE, COARSE = 2.0**20, 2.0**10  # 1/m: what is drawn is rounded to such steps, of whose bytes most are zero
+POINTS: Final = 7  # of a cable
+_THICKNESS: Final = 3.0  # px
+_STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # red, green, blue, 0 to 1
 
 
 def _real(name: str, parts: tuple[str, ...], unit: str, long_name: str, source: str = "") -> Quantity:
@@ -214,13 +219,6 @@ def _json_values(values: NDArray[Any]) -> list[Any]:
 
 def _text(said: dict[str, Any]) -> bytes:
     return json.dumps(said, separators=(",", ":"), ensure_ascii=False).encode()
-
-
-WORLD, PLATFORM = "world", "platform"
-FINE, COARSE = 2.0**20, 2.0**10  # 1/m: what is drawn is rounded to such steps, of whose bytes most are zero
-POINTS: Final = 7  # of a cable
-_THICKNESS: Final = 3.0  # px
-_STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # red, green, blue, 0 to 1
 
 
 def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:

@@ -39,6 +39,10 @@ from sagline.robot.robot import Robot
 
 PACKAGES: Final = ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "zstandard")
 _UNLIMITED: Final = 1 << 40  # bytes: no chunk ends by its size
+CHUNK: Final = 0.9  # s from chunk to chunk: with what it takes to write one, no more than a second is ever lost
+BLOCK: Final = 100  # cycles of a chunk at the most: on a lockstep clock they come faster
+ROOM: Final = 4096  # of what waits to be written: 41 s of cycles
+PATIENCE: Final = 0.1  # s, between two looks whether the writer still lives
 
 
 class _Unbuffered:
@@ -170,12 +174,6 @@ def check_packages() -> None:
     for name in PACKAGES:
         if find_spec(name) is None:
             raise FileError.not_installed(name, "Logs need it", "log")
-
-
-CHUNK: Final = 0.9  # s from chunk to chunk: with what it takes to write one, no more than a second is ever lost
-BLOCK: Final = 100  # cycles of a chunk at the most: on a lockstep clock they come faster
-ROOM: Final = 4096  # of what waits to be written: 41 s of cycles
-PATIENCE: Final = 0.1  # s, between two looks whether the writer still lives
 
 
 class Recorder:

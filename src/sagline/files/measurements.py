@@ -15,6 +15,7 @@ from sagline.files.table import TABLE_LIMIT, Table
 
 # of each kind of column the other one, and what to do where a file has that
 _OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
+UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
 
 class Lengths(NamedTuple):
@@ -90,9 +91,6 @@ def _samples(table: Table, names: list[str]) -> tuple[Array | None, Array]:
         late = np.diff(time, prepend=-np.inf) <= 0.0
         table.refuse(late, "time", time, "s", "a time after that of the row before")
     return time, locked(np.stack([table.columns[name] for name in names], axis=-1))
-
-
-UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
 
 class Measurements(NamedTuple):

@@ -25,6 +25,8 @@ CHECKED: Final = 20_000  # triangles up to which a mesh is searched for places w
 KINDS: Final = (".stl", ".ply", ".obj", ".glb")
 _CONTACTS: Final = 40  # of a triangle, most of them with its own neighbors
 _UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # of glTF, whose y points up
+ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
+_VTK: Final = (".vtk", ".vtu")
 
 
 def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = None) -> Mesh:
@@ -128,10 +130,6 @@ def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
     """Flags of pairs of triangles without a common corner."""
     one, other = faces[pairs[:, 0]], faces[pairs[:, 1]]
     return np.asarray(~(one[:, :, None] == other[:, None, :]).any(axis=(1, 2)))
-
-
-ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
-_VTK: Final = (".vtk", ".vtu")
 
 
 def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:

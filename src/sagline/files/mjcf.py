@@ -43,6 +43,20 @@ _OFF = 0.05  # of the radius: a tendon that begins nearer to its cylinder would 
 _WIDTH = 0.2  # of a pulley as it is drawn, to its radius
 _BESIDE = 2.0  # radii from the middle of a pulley, on the side on which the cable lies
 _LONGEST = 1e3  # radii: of a tendon before its cylinder
+_NOTE = (
+    " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
+    "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is none of the "
+    "robot's: it lets the platform come to rest, and acts on slack cables too. "
+)
+_RADIUS = 0.002  # of ends of cables, which are only drawn, to the size of the robot
+_THINNEST = 0.02  # of a box that is only drawn, to its longest edge
+_STEPS = 20.0  # in a period of the fastest motion
+_LONGEST_STEP = 0.002  # MuJoCo's own [s]
+_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # how a step is written: it becomes no longer
+_STRETCH_DAMPING = 4.0  # half the bound of the frequencies, about the fastest there is, is damped critically
+_SWING_DAMPING = 0.4  # a fifth of critical
+_ROUNDING = 1e-12
+_SHORTEST = 1e-6  # of a cable [m]
 
 
 class Lead(NamedTuple):
@@ -101,22 +115,6 @@ def add_pulleys(world: Element, robot: Robot, pose: Pose, lead: Lead) -> None:
 def numbers_text(values: Iterable[float]) -> str:
     """Numbers of an attribute, to their last bit."""
     return " ".join(repr(float(value)) for value in values)
-
-
-_NOTE = (
-    " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
-    "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is none of the "
-    "robot's: it lets the platform come to rest, and acts on slack cables too. "
-)
-_RADIUS = 0.002  # of ends of cables, which are only drawn, to the size of the robot
-_THINNEST = 0.02  # of a box that is only drawn, to its longest edge
-_STEPS = 20.0  # in a period of the fastest motion
-_LONGEST_STEP = 0.002  # MuJoCo's own [s]
-_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # how a step is written: it becomes no longer
-_STRETCH_DAMPING = 4.0  # half the bound of the frequencies, about the fastest there is, is damped critically
-_SWING_DAMPING = 0.4  # a fifth of critical
-_ROUNDING = 1e-12
-_SHORTEST = 1e-6  # of a cable [m]
 
 
 class _Dynamics(NamedTuple):

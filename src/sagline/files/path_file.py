@@ -25,6 +25,15 @@ EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
 _LEAST_STEP = 1e-12  # s; over less, differences of positions tell no velocity
+TIMING_UNITS = {
+    "rate": "1/s",
+    "durations": "s",
+    "speed": "m/s",
+    "acceleration": "m/s^2",
+    "angular_speed": "rad/s",
+    "angular_acceleration": "rad/s^2",
+}
+PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
 def path_from_table(path: FilePath, text: str) -> Path:
@@ -63,17 +72,6 @@ def _check_columns(table: Table) -> None:
             table.header,
             f"columns {', '.join(sorted(surplus))} beside {', '.join(EULER)}; allowed: one way",
         )
-
-
-TIMING_UNITS = {
-    "rate": "1/s",
-    "durations": "s",
-    "speed": "m/s",
-    "acceleration": "m/s^2",
-    "angular_speed": "rad/s",
-    "angular_acceleration": "rad/s^2",
-}
-PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
 def load_path(file: str | os.PathLike[str]) -> Path:

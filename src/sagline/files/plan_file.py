@@ -164,6 +164,9 @@ MOTION = (
 )
 # of a path whose jerk is known
 JERK = Quantity("jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate", "path.jerk")
+RESTS = "rests"  # of a path whose rests are known
+FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
+STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 
 def check_plan(data: Dataset, cables: int) -> None:
@@ -178,11 +181,6 @@ def check_plan(data: Dataset, cables: int) -> None:
     quantities = sorted((*QUANTITIES, *machine, *motion, *optional), key=lambda one: one.codes is None)  # codes first
     solved = np.asarray(status.values == PoseStatus.SOLVED)
     check_variables(data, quantities, {"cable": cables, "pose": status.size}, rows, solved)
-
-
-RESTS = "rests"  # of a path whose rests are known
-FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
-STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:

@@ -33,6 +33,33 @@ _KINDS: Final = {  # and the keys that may stand beside each
     "mesh": ("unit", "position", "turned"),
 }
 _EITHER: Final = "one of box, capsule, sphere, mesh"
+_ERROR: Final = "calibration.standard_error."  # where those of a robot's numbers are
+_UNITS: Final = {
+    "frame_anchors": "m",
+    "platform_anchors": "m",
+    "mass": "kg",
+    "center_of_mass": "m",
+    "gravity": "m/s^2",
+    "plane_normal": "",
+    "tension_min": "N",
+    "tension_max": "N",
+    "platform_size": "m",
+    "frame_size": "m",
+    "cables.youngs_modulus": "Pa",
+    "cables.section_area": "m^2",
+    "cables.radius": "m",
+    "inertia.box": "m",
+    "inertia.cylinder_radius": "m",
+    "inertia.cylinder_height": "m",
+    **{f"tolerances.{name}": what.unit for name, what in UNCERTAIN.items()},
+    **{f"{_ERROR}{name}": what.unit for name, what in UNCERTAIN.items()},
+    "test_box.low": "m",
+    "test_box.high": "m",
+    "test_box.tilt": "rad",
+    **{f"cables.{name}": unit for name, unit in units(Cable).items()},
+    **{f"winches.{name}": unit for name, unit in units(Winch).items()},
+}  # every other key of inertia is in kg m^2
+SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
 
 
 class Place(Entry):
@@ -90,35 +117,6 @@ class Place(Entry):
         value = getattr(self, key)
         place = f"{item}.{key}"
         return np.zeros(3) if value is None else exactly(in_si(value, "m", place), place, "m", (3,))
-
-
-_ERROR: Final = "calibration.standard_error."  # where those of a robot's numbers are
-_UNITS: Final = {
-    "frame_anchors": "m",
-    "platform_anchors": "m",
-    "mass": "kg",
-    "center_of_mass": "m",
-    "gravity": "m/s^2",
-    "plane_normal": "",
-    "tension_min": "N",
-    "tension_max": "N",
-    "platform_size": "m",
-    "frame_size": "m",
-    "cables.youngs_modulus": "Pa",
-    "cables.section_area": "m^2",
-    "cables.radius": "m",
-    "inertia.box": "m",
-    "inertia.cylinder_radius": "m",
-    "inertia.cylinder_height": "m",
-    **{f"tolerances.{name}": what.unit for name, what in UNCERTAIN.items()},
-    **{f"{_ERROR}{name}": what.unit for name, what in UNCERTAIN.items()},
-    "test_box.low": "m",
-    "test_box.high": "m",
-    "test_box.tilt": "rad",
-    **{f"cables.{name}": unit for name, unit in units(Cable).items()},
-    **{f"winches.{name}": unit for name, unit in units(Winch).items()},
-}  # every other key of inertia is in kg m^2
-SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
 
 
 class _RobotPart(Entry):

@@ -80,6 +80,7 @@ TYPES: Final[dict[str, Any]] = {"limiting": np.int8, "vertex_component": np.int3
 
 
 UNITS = ("m³", "m²")
+KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Capsule, Sphere, Mesh)}
 
 
 def check_workspace(data: Dataset, cables: int) -> None:
@@ -99,9 +100,6 @@ def check_workspace(data: Dataset, cables: int) -> None:
         "component_nodes": (-1, sizes["component"]),
     }
     check_indices(data, ranges)
-
-
-KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Capsule, Sphere, Mesh)}
 
 
 def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:

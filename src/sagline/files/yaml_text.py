@@ -19,6 +19,16 @@ from sagline.files.reading import error_at_line
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
+YAML_LIMIT: Final = 1.0  # MB; thousands of waypoints or cables
+_DEEPEST: Final = 20  # levels of nesting
+_MOST: Final = 25_000  # values; that many take a second
+_TAG: Final = "tag:yaml.org,2002:"
+_WORDS: Final = {
+    **dict.fromkeys(("", "~", "null", "Null", "NULL"), f"{_TAG}null"),
+    **dict.fromkeys(("true", "True", "TRUE", "false", "False", "FALSE"), f"{_TAG}bool"),
+    "<<": f"{_TAG}merge",
+}
+
 
 class Entry(BaseModel):
     """A mapping in a file: the listed keys and no others, values of the type they are written in."""
@@ -72,17 +82,6 @@ def _at(schema: type[Entry], where: tuple[int | str, ...]) -> type[Entry]:
         kind = schema.model_fields[part].annotation
         schema = next(k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, Entry))
     return schema
-
-
-YAML_LIMIT: Final = 1.0  # MB; thousands of waypoints or cables
-_DEEPEST: Final = 20  # levels of nesting
-_MOST: Final = 25_000  # values; that many take a second
-_TAG: Final = "tag:yaml.org,2002:"
-_WORDS: Final = {
-    **dict.fromkeys(("", "~", "null", "Null", "NULL"), f"{_TAG}null"),
-    **dict.fromkeys(("true", "True", "TRUE", "false", "False", "FALSE"), f"{_TAG}bool"),
-    "<<": f"{_TAG}merge",
-}
 
 
 def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
