@@ -10,7 +10,7 @@ from rich.console import Console
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.core.arrays import Array
-from sagline.kinematics.inverse_rows import decide_rows, solve_rows
+from sagline.kinematics.inverse_rows import decide_rows, solve_inverse_rows
 from sagline.statics.tables import pose_rows
 from sagline.tension.options import kernel_options
 from tests.tension.reference import BORDER_ROBOTS, found_border, random_poses
@@ -67,7 +67,7 @@ def decision_seconds(robot: sl.Robot, poses: sl.Pose, loads: Array) -> float:
     """Time to decide poses that the rounds of sharing left open."""
     options = kernel_options(robot, sl.Catenary(), METHOD)
     rows, nothing = pose_rows(poses), np.full(robot.cable_count, np.nan)
-    found = solve_rows(robot, METHOD, options, rows, loads, nothing)
+    found = solve_inverse_rows(robot, METHOD, options, rows, loads, nothing)
 
     def decide() -> None:
         decide_rows(robot, options, rows, loads, found._replace(pose_status=found.pose_status.copy()))

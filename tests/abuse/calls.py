@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 import sagline as sl
 from sagline.control.link import Command, Mode
 from sagline.core.results import Saved
-from sagline.robot.provenance import Provenance
+from sagline.robot.tolerances import Provenance
 from tests.calibration.made_up import made_up
 from tests.calibration.synthetic import log_of, true_robot, with_drums
 from tests.control.rigs import HOME, at, prototype, rig

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.robot.provenance import Provenance
+from sagline.robot.tolerances import Provenance
 
 UNITS = {
     **dict.fromkeys(("frame_anchors", "platform_anchors", "center_of_mass", "platform_size", "frame_size"), "m"),

@@ -17,7 +17,7 @@ from sagline.files import calibration_file, format
 from sagline.files.calibration_file import FORMAT
 from sagline.files.netcdf import read_dataset
 from sagline.files.robot_file import parse_robot
-from sagline.robot.provenance import Provenance
+from sagline.robot.tolerances import Provenance
 from tests.calibration.made_up import made_up
 from tests.files.wording import wording
 from tests.refusal import refused

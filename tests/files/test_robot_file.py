@@ -14,8 +14,7 @@ from syrupy.assertion import SnapshotAssertion
 from sagline import Cable, FileError, InvalidValueError, PoseBox, Robot, Winch, dump_robot, load_robot, robot_names
 from sagline.core.errors import printable
 from sagline.files.robot_file import parse_robot
-from sagline.robot.provenance import Provenance
-from sagline.robot.tolerances import UNCERTAIN, value_of
+from sagline.robot.tolerances import UNCERTAIN, Provenance, value_of
 from tests.files.wording import wording
 from tests.refusal import refused
 from tests.tiers import wide

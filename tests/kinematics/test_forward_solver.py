@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.kinematics.forward_rows import Found
+from sagline.kinematics.forward_rows import ForwardRows
 from sagline.kinematics.start import search
 from tests.kinematics.feasible import box_poses, feasible_plan
 
@@ -34,7 +34,7 @@ def test_it_searches_once_and_again_when_told_to_forget(monkeypatch: pytest.Monk
     plan = feasible_plan(COGIRO, 1, seed=4)
     solver, searches = sl.ForwardSolver(COGIRO), []
 
-    def counted(*arguments: Any) -> Found:
+    def counted(*arguments: Any) -> ForwardRows:
         searches.append(1)
         return search(*arguments)
 

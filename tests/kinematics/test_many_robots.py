@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import sagline as sl
 from sagline.core.arrays import Array, locked
-from sagline.kinematics.forward_rows import solve_rows
+from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.kinematics.start import outside_limits
 from tests.kinematics.feasible import box_poses, feasible_plan, moved, pose_rows
 from tests.refusal import refused
@@ -150,7 +150,7 @@ def test_a_search_judges_each_sample_by_the_limits_and_cables_of_its_robot(limit
         )
         for density in np.linspace(1.0, 10.0, len(lengths))
     ]
-    found = solve_rows(tuple(robots), sl.Catenary(), lengths, rows, none)
+    found = solve_forward_rows(tuple(robots), sl.Catenary(), lengths, rows, none)
     cables = found.solution(tuple(robots), sl.Catenary(), none[0], (len(lengths),)).state.cables
     tension = np.sort(cables.frame_end_tension if limits_of == "frame_end" else cables.chord_tension, axis=1)
     # limits 5 % beside the tensions of each robot leave out as many cables as are asked for

@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.core.arrays import locked
-from sagline.kinematics.forward_rows import solve_rows
-from sagline.kinematics.start import hung, middle, outside_limits, start_quaternions
+from sagline.kinematics.forward_rows import solve_forward_rows
+from sagline.kinematics.start import centered_positions, outside_limits, start_quaternions, starting_positions
 from tests.kinematics.feasible import pose_rows
 
 COGIRO = sl.load_robot("cogiro")
@@ -20,18 +20,22 @@ def test_the_platform_starts_below_the_middle_of_the_frame_by_a_tenth_of_its_cab
     for rotation in (Rotation.identity(), turned):
         quaternion = np.array(rotation.as_quat())
         ends = COGIRO.platform_anchors @ rotation.as_matrix().T
-        away = hung(COGIRO, lengths, quaternion) + ends.mean(axis=0) - COGIRO.frame_anchors.mean(axis=0)
+        away = starting_positions(COGIRO, lengths, quaternion) + ends.mean(axis=0) - COGIRO.frame_anchors.mean(axis=0)
         np.testing.assert_allclose(away, [(0.0, 0.0, -0.6), (0.0, 0.0, -2.0), (0.0, 0.0, -0.1)], atol=1e-12)
-        found = middle(COGIRO, quaternion) + ends.mean(axis=0)
+        found = centered_positions(COGIRO, quaternion) + ends.mean(axis=0)
         np.testing.assert_allclose(found, COGIRO.frame_anchors.mean(axis=0), atol=1e-12)
 
 
 def test_a_platform_in_a_level_plane_starts_in_it() -> None:
     level = sl.Robot("table", [(1, 0, 0), (-1, 1, 0), (0, -1, 0)], np.zeros((3, 3)), sl.Cable(0.01, 1e4), 1.0,
                      motion_pattern="2T", plane_normal=(0.0, 0.0, 1.0))  # fmt: skip
-    np.testing.assert_allclose(hung(level, np.ones((1, 3)), LEVEL), middle(level, LEVEL)[None], atol=1e-15)
+    np.testing.assert_allclose(
+        starting_positions(level, np.ones((1, 3)), LEVEL), centered_positions(level, LEVEL)[None], atol=1e-15
+    )
     upright = level.replace(plane_normal=(0.0, 1.0, 0.0))
-    np.testing.assert_allclose(hung(upright, np.ones((1, 3)), LEVEL) - middle(upright, LEVEL), [(0.0, 0.0, -0.1)])
+    np.testing.assert_allclose(
+        starting_positions(upright, np.ones((1, 3)), LEVEL) - centered_positions(upright, LEVEL), [(0.0, 0.0, -0.1)]
+    )
 
 
 def test_the_tilts_are_about_the_axes_the_platform_turns_about() -> None:
@@ -59,7 +63,7 @@ def test_cables_are_counted_outside_the_limits_of_the_tension_that_is_limited(
     low = np.where(np.arange(8) < 3, between / 0.99, 0.0)
     high = np.where(np.arange(8) > 5, between / 1.01, np.inf)
     robot = COGIRO.replace(tension_limits_of=limits_of, tension_min=low, tension_max=high)
-    found = solve_rows(robot, model, plan.unstrained_length[None], pose_rows(pose), locked(np.zeros((1, 6))))
+    found = solve_forward_rows(robot, model, plan.unstrained_length[None], pose_rows(pose), locked(np.zeros((1, 6))))
     # a chord tension is below, one at a winch above what lies between them; without weight both are one
     expected = 2 if limits_of == "frame_end" and not isinstance(model, sl.Elastic) else 3
     assert outside_limits(robot, model, found).tolist() == [expected]

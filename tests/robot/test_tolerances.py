@@ -7,8 +7,7 @@ import pytest
 
 from sagline import Cable, InvalidValueError, Robot, Winch
 from sagline.calibration.parameters import KINDS
-from sagline.robot.provenance import Provenance
-from sagline.robot.tolerances import UNCERTAIN, value_of
+from sagline.robot.tolerances import UNCERTAIN, Provenance, value_of
 from tests.refusal import refused
 
 OUTSIDE = {"measuring_frame", "target"}  # kinds of unknowns that no robot has

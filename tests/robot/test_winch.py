@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sagline import Cable, InvalidValueError, Robot, Winch, load_robot, without_cables
-from sagline.robot.several import cables_of
+from sagline.robot.batch import cables_of
 from tests.refusal import refused
 
 # the fields that hold a number for each cable
@@ -233,9 +233,9 @@ def test_pickling_goes_through_the_constructor() -> None:
     assert_same(winch, copy)
     with pytest.raises(ValueError, match="read-only"):
         copy.dead_rise[0] = 9.0
-    make, values = winch.__reduce__()
+    make, (kind, values) = winch.__reduce__()
     with refused("winches: dead_rise[0]", "5 m", kind=InvalidValueError):
-        make({**values[0], "dead_rise": 5.0})
+        make(kind, {**values, "dead_rise": 5.0})
 
 
 COGIRO = load_robot("cogiro")

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.robot.bounds import home_pose
+from sagline.robot.reach import home_pose
 from sagline.share.course import of_plan
 from sagline.share.page import LENGTH, POSITION, TENSION, TIME, TURN, course_page, robot_page
 from sagline.viewer import lines

@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
-from sagline.robot.bounds import bounds
-from sagline.robot.wheels import wheel_centers
+from sagline.robot.batch import pulley_centers
+from sagline.robot.reach import bounds
 from sagline.share.machine import model_data
 from sagline.statics.chords import chord_geometry
 from sagline.viewer.snapshot import Snapshot
@@ -103,7 +103,7 @@ def test_the_page_draws_cables_where_the_library_does(page: Page, name: str) -> 
     np.testing.assert_allclose(drawn[:, -41:], expected[:, -41:], atol=1e-9)
     if expected.shape[1] > 41:  # on the pulleys: all points lie on their rims, from the anchor on
         np.testing.assert_allclose(drawn[:, 0], robot.frame_anchors, atol=1e-12)
-        radius = np.linalg.norm(drawn[:, :16] - wheel_centers(robot, pose)[:, None], axis=2)
+        radius = np.linalg.norm(drawn[:, :16] - pulley_centers(robot, pose)[:, None], axis=2)
         np.testing.assert_allclose(radius, 0.25, atol=1e-9)
 
 

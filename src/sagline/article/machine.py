@@ -9,7 +9,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.robot.several import anything_behind
+from sagline.robot.batch import has_routing
 
 MODULUS, DENSITY, LOAD = "Young's modulus E", "linear density ρ", "load"
 ANCHORS, DRUM, ZERO = "anchor height", "drum radius", "zero of the lengths"
@@ -109,7 +109,7 @@ def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequen
 def _not_counted(robots: Sequence[sl.Robot], home: sl.Plan) -> Array:
     """By how much pulleys and dead cable lengthen the cables that hold the platform at home [m], shape (K, m)."""
     added = np.zeros((len(robots), home.unstrained_length.shape[-1]))
-    behind = [index for index, robot in enumerate(robots) if anything_behind(robot)]
+    behind = [index for index, robot in enumerate(robots) if has_routing(robot)]
     if behind:
         pose = home.state.pose[np.zeros(len(behind), dtype=int)]
         there = [robots[index] for index in behind]

@@ -13,8 +13,7 @@ from sagline.core.progress import Progress, blocks
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pattern import ROTATING
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod

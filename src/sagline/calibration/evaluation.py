@@ -22,8 +22,7 @@ from sagline.calibration.weak_identifiability import cannot_tell_apart
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
-from sagline.robot.provenance import Provenance
-from sagline.robot.tolerances import UNCERTAIN
+from sagline.robot.tolerances import UNCERTAIN, Provenance
 
 DOUBTFUL: Final = 1e-4  # chi squared that would be so far from what is to be expected that rarely is none
 ODD: Final = 0.1  # share of the poses that may fit badly, or not at all, before the whole is in doubt

@@ -22,7 +22,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.terms import Readings
-from sagline.kinematics.forward_rows import solve_rows
+from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.robot import Robot
 
 SIGNIFICANT: Final = 1e-13  # of the largest: smaller eigenvalues are rounding
@@ -171,7 +171,7 @@ def evaluate_step(
         lengths = after.lengths[part]
         lost = ~(kept[part] & np.isfinite(lengths).all(axis=1) & (lengths > 0.0).all(axis=1))
         asked = locked(np.where(lost[:, None], np.nan, lengths))
-        solved = solve_rows(machine.robot, problem.model, asked, locked(starts.copy()), NO_LOAD)
+        solved = solve_forward_rows(machine.robot, problem.model, asked, locked(starts.copy()), NO_LOAD)
         there = solved.stable & ~lost
         after.poses[part][there] = solved.poses[there]
         rows = whitened_at(problem, after, reported, part)

@@ -11,12 +11,11 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import choice, instance, optional, text
 from sagline.core.arrays import Array, Flags, Indices, checked, exactly, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.fields import given, if_known, rule
+from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.indices import part_of
 from sagline.core.results import Result, Saved
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
-from sagline.robot.unit import unit
 
 LENGTH_DEVIATION = 5e-4  # m, of a length off a drum that nobody measured: rope on a grooved drum
 
@@ -89,13 +88,7 @@ class Sensors(Result):
             choice(name, "field", self.__slots__)
         return evolve(self, **changes)
 
-    def __reduce__(self) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
-        """Pickle through the constructor, so that loaded sensors are checked and locked too."""
-        return _again, (Sensors, {about.name: getattr(self, about.name) for about in fields(Sensors)})
-
-
-def _again(kind: type[Any], values: dict[str, Any]) -> Any:
-    return kind(**values)
+    __reduce__ = reduced
 
 
 def reading_deviations(sensors: Sensors, cables: int) -> Array:
@@ -184,9 +177,7 @@ class WinchLog(Result, Saved):
         object.__setattr__(self, "source", text(self.source, "source"))
         _check_sensors(self, m)
 
-    def __reduce__(self) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
-        """Pickle through the constructor, so that a loaded log is checked and locked too."""
-        return _again, (WinchLog, {about.name: getattr(self, about.name) for about in fields(WinchLog)})
+    __reduce__ = reduced
 
     @property
     def readings(self) -> Array:

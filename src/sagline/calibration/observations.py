@@ -17,9 +17,9 @@ from sagline.kernels.calibration.observe import observe
 from sagline.kernels.calibration.terms import BESIDE, Readings, SensingArrays
 from sagline.kernels.forward.problem import ForwardTerms
 from sagline.kernels.memory import memory_for
+from sagline.robot.batch import has_routing
 from sagline.robot.drum import Drums, drums_of
 from sagline.robot.robot import Robot
-from sagline.robot.several import anything_behind
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
@@ -166,7 +166,7 @@ def machine_of(robot: Robot, model: CableModel, parameters: Parameters, sensors:
         InvalidValueError: If counts are read, and data of the drums are missing.
     """
     # pulleys and dead cable that are unknown have slopes, even where the robot has none yet
-    routed = anything_behind(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
+    routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     return Machine(
         robot,
         sensors,

@@ -16,7 +16,7 @@ from sagline.calibration.observations import NO_LOAD, Reference, misfit_at, refe
 from sagline.calibration.problem import Problem, State, reported_lengths
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import Readings
-from sagline.kinematics.forward_rows import solve_rows
+from sagline.kinematics.forward_rows import solve_forward_rows
 
 CHANCE: Final = 0.01  # of one outlier among all poses of a log that has none
 EXAMINED: Final = 100  # poses, the worst of them: where there are more, the calibration is wrong and not the poses
@@ -142,7 +142,9 @@ def _improved(case: Case, counts: Flags, wanted: Array, squares: float) -> Case 
         lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
         if (lengths <= 0.0).any():
             continue
-        found = solve_rows(reference.machine.robot, reference.model, locked(lengths), locked(case.pose.copy()), NO_LOAD)
+        found = solve_forward_rows(
+            reference.machine.robot, reference.model, locked(lengths), locked(case.pose.copy()), NO_LOAD
+        )
         if found.stable[0]:
             new = case._replace(pose=found.poses, lengths=lengths)
             if _squares(new, counts) < squares:

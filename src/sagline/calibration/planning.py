@@ -25,8 +25,7 @@ from sagline.core.numbers import SPACE, counted, n
 from sagline.core.progress import Progress
 from sagline.core.results import Result, Saved
 from sagline.robot.pattern import ROTATING
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 
 WIDTH: Final = 80

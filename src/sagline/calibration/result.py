@@ -18,7 +18,7 @@ from sagline.core.arrays import Array, locked, numbers
 from sagline.core.numbers import counted, n
 from sagline.core.results import Result, Saved
 from sagline.kinematics.forward import forward
-from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_rows import ForwardSolution
 from sagline.kinematics.inverse import inverse
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -13,7 +13,7 @@ from sagline.calibration.log import WinchLog, load_cells_of
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.kinematics.encoder import lengths_from_counts
+from sagline.kinematics.winches import lengths_from_counts
 from sagline.robot.robot import Robot
 
 SPEED_LIMIT: Final = 0.005  # m/s

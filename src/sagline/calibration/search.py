@@ -27,7 +27,7 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
-from sagline.kinematics.forward_rows import solve_rows
+from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 
@@ -208,7 +208,7 @@ def prediction_errors(problem: Problem, machine: Machine, starts: Array, which: 
             continue
         there = which[part] & np.isfinite(reported).all(axis=1) & (reported > 0.0).all(axis=1)
         asked = locked(np.where(there[:, None], reported, np.nan))
-        solved = solve_rows(machine.robot, problem.model, asked, locked(starts[part].copy()), NO_LOAD)
+        solved = solve_forward_rows(machine.robot, problem.model, asked, locked(starts[part].copy()), NO_LOAD)
         there &= solved.stable
         tension = solved.solution(
             machine.robot, problem.model, np.zeros(6), (len(reported),)

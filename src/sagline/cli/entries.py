@@ -82,12 +82,12 @@ def _verdicts() -> None:
     import sagline as sl
     from sagline.core.arrays import locked
     from sagline.kernels.codes import POSE_INFEASIBLE
-    from sagline.kinematics.inverse_rows import Found, decide_rows
+    from sagline.kinematics.inverse_rows import InverseRows, decide_rows
     from sagline.statics.tables import pose_rows
     from sagline.tension.options import kernel_options
 
     robot = sl.load_robot(ROBOT)
-    found = Found.empty(1, robot.cable_count, robot.degrees_of_freedom, behind=False)
+    found = InverseRows.empty(1, robot.cable_count, robot.degrees_of_freedom, behind=False)
     found = found._replace(pose_status=np.full(1, POSE_INFEASIBLE, dtype=np.int8))
     options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
     decide_rows(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), locked(np.zeros((1, 6))), found)
@@ -199,7 +199,7 @@ def _hung_state(name: str = ROBOT) -> Equilibrium:
 
     import sagline as sl
     from sagline.core.arrays import locked
-    from sagline.robot.contact import Contact
+    from sagline.robot.equilibrium import Contact
 
     robot, pose = sl.load_robot(name), sl.Pose(PLACE, LEVEL)
     run = pose.transform(robot.platform_anchors) - robot.frame_anchors

@@ -17,7 +17,7 @@ from sagline.files.writing import check_files, create_folder, write_text
 
 if TYPE_CHECKING:
     from sagline.files.measurements import Lengths
-    from sagline.kinematics.forward_solution import ForwardSolution
+    from sagline.kinematics.forward_rows import ForwardSolution
     from sagline.robot.robot import Robot
 
 SHOWN = 12  # rows of the table on the terminal; the file has them all
@@ -55,7 +55,7 @@ def forward(
     from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
     from sagline.kinematics.forward import forward as solve
-    from sagline.kinematics.forward_status import ForwardStatus
+    from sagline.kinematics.status import ForwardStatus
 
     load = wrench_of(wrench)
     robot = loaded(load_robot(name), payload)
@@ -94,7 +94,7 @@ def _measured(file: Path, robot: Robot) -> Lengths:
 
 def _counted(file: Path, robot: Robot) -> Lengths:
     from sagline.files.measurements import Lengths, load_counts
-    from sagline.kinematics.encoder import lengths_from_counts
+    from sagline.kinematics.winches import lengths_from_counts
 
     read = load_counts(file, robot.cable_count)
     return Lengths(read.time, lengths_from_counts(robot, read.counts))
@@ -102,7 +102,7 @@ def _counted(file: Path, robot: Robot) -> Lengths:
 
 def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:
     """Header and one row a sample; the time if it was given."""
-    from sagline.kinematics.forward_status import ForwardStatus
+    from sagline.kinematics.status import ForwardStatus
 
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}
     numbers = np.hstack((found.pose.position, found.pose.quaternion, found.wrench_residual)).tolist()

@@ -66,8 +66,7 @@ def encoder(
 
         sagline encoder output/my-robot-catenary.nc --out counts.csv
     """
-    from sagline.kinematics.encoder import encoder_counts
-    from sagline.kinematics.winch_rates import winch_rates
+    from sagline.kinematics.winches import encoder_counts, winch_rates
 
     plan = _plan_of(file, out)
     counts = np.atleast_2d(encoder_counts(plan, winding.value))

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
     from sagline.robot.design import Design
-    from sagline.robot.pose import Pose
-    from sagline.robot.pose_box import PoseBox
+    from sagline.robot.pose import Pose, PoseBox
     from sagline.robot.robot import Robot
 
 MIDDLE = 0.5  # of the frame's edges: where the feasible share is told

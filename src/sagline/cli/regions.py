@@ -11,7 +11,7 @@ from sagline.cli.values import quantity
 from sagline.core.errors import InvalidValueError
 from sagline.files.pose_text import FARTHEST, wrench_of
 from sagline.files.quantity import in_si
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import PoseBox
 from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope, WrenchSet
 
 _KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # of loads, and their units

@@ -104,7 +104,7 @@ def simulate(
     from sagline.files.pose_text import wrench_of
     from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
-    from sagline.robot.several import anything_behind
+    from sagline.robot.batch import has_routing
 
     load, robot = wrench_of(wrench), loaded(load_robot(name), payload)
     events = tuple(_break(text, robot) for text in breaks or ())
@@ -122,7 +122,7 @@ def simulate(
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
-    massless = SIMULATION_OVER_PULLEYS if anything_behind(robot) else SIMULATION
+    massless = SIMULATION_OVER_PULLEYS if has_routing(robot) else SIMULATION
     moving = {CableMass.NONE: (massless,), CableMass.LUMPED: (CHAINS,)}.get(cable_mass, ())
     method = tension.build(Variable.CHORD)
     needed = (*needed_for(method), VIBRATION, *moving)

@@ -7,7 +7,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array
 from sagline.kinematics.forward_solver import ForwardSolver
-from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 

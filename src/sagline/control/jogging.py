@@ -16,9 +16,8 @@ from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, checked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kinematics.forward import forward
-from sagline.kinematics.forward_status import ForwardStatus
 from sagline.kinematics.inverse_solver import InverseSolver
-from sagline.kinematics.status import PoseStatus
+from sagline.kinematics.status import ForwardStatus, PoseStatus
 from sagline.robot.drum import drum_tension
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

@@ -12,9 +12,9 @@ from sagline.core.arguments import instance
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kinematics.plan import Plan
+from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
-from sagline.robot.several import first_of
 from sagline.statics.slopes import cable_slopes, on_platform, tension_slopes
 from sagline.statics.stiffness import stiffness
 

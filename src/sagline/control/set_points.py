@@ -13,7 +13,7 @@ from sagline.control.link import RAMP
 from sagline.control.null_space import NullSpace, null_space
 from sagline.core.arrays import Array, Flags
 from sagline.kinematics.forward import forward
-from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.robot.drum import drum_tension
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose

@@ -29,6 +29,16 @@ def rule(unit: str = "", **limits: Any) -> dict[str, Any]:
     return {"unit": unit, **limits}
 
 
+def reduced(value: Any) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
+    """Reduction for pickle: through the constructor, so that a loaded value is checked and locked too."""
+    kind = type(value)
+    return _constructed, (kind, {about.name: getattr(value, about.name) for about in fields(kind)})
+
+
+def _constructed(kind: type[Any], values: dict[str, Any]) -> Any:
+    return kind(**values)
+
+
 def units(kind: type[Any]) -> dict[str, str]:
     """Unit of each field of an input type, "" for none."""
     return {field.name: field.metadata["unit"] for field in fields(kind)}

@@ -26,10 +26,9 @@ from sagline.core.errors import InvalidValueError
 from sagline.kinematics.forward import dead_only
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.batch import dead_cable, outward, points_on_pulleys, pulley_centers, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.wheels import dead_cable, on_wheels, outward, wheel_centers
 from sagline.statics.chords import refuse_missing_chords, touching_angle
 
 NOTE = (
@@ -85,22 +84,22 @@ def lead_of(robot: Robot, pose: Pose) -> Lead:
     first = np.maximum(wrap - before + off, 0.0)
     sine, cosine = np.sin(first), np.cos(first)
     along = np.concatenate((sine[:, None] * outward(robot, pose), (entry * cosine)[:, None]), axis=1)
-    start = on_wheels(robot, pose, first) - (off * radius)[:, None] * along
-    centers = wheel_centers(robot, pose)
-    side = centers + _BESIDE * (on_wheels(robot, pose, 0.5 * (first + wrap)) - centers)
+    start = points_on_pulleys(robot, pose, first) - (off * radius)[:, None] * along
+    centers = pulley_centers(robot, pose)
+    side = centers + _BESIDE * (points_on_pulleys(robot, pose, 0.5 * (first + wrap)) - centers)
     return Lead(start, side, dead_cable(robot) + radius * (first - off))
 
 
 def free_chords(robot: Robot, pose: Pose) -> Array:
     """Chords from where straight cables leave the frame to their platform ends [m], shape (m, 3)."""
-    exits = on_wheels(robot, pose, np.nan_to_num(touching_angle(robot, pose)))
+    exits = points_on_pulleys(robot, pose, np.nan_to_num(touching_angle(robot, pose)))
     return np.asarray(pose.transform(robot.platform_anchors) - exits)
 
 
 def add_pulleys(world: Element, robot: Robot, pose: Pose, lead: Lead) -> None:
     """Add the pulleys, each a body of its own that stands still."""
     radius = pulleys_of(robot).radius
-    toward, centers = outward(robot, pose), wheel_centers(robot, pose)
+    toward, centers = outward(robot, pose), pulley_centers(robot, pose)
     for i in np.flatnonzero(radius > 0.0):
         body = SubElement(world, "body", name=f"pulley_{i}")
         wheel = SubElement(body, "geom", name=f"pulley_{i}", type="cylinder", pos=numbers_text(centers[i]))

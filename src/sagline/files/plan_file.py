@@ -21,10 +21,9 @@ from sagline.files.variables import SOLVED, SOMEWHERE, STEP, Quantity, check_var
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
-from sagline.robot.contact import Contact
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.batch import has_routing
+from sagline.robot.equilibrium import Contact, Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.several import anything_behind
 from sagline.tension.methods import METHODS
 
 if TYPE_CHECKING:
@@ -264,7 +263,7 @@ def plan_of(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     check_plan(data, robot.cable_count)
     values = partial(values_of, data)
     behind = MACHINE[0].name in data.variables
-    if behind != anything_behind(robot):
+    if behind != has_routing(robot):
         said, has = ("is", "none of its") if behind else ("is not", "some of its")
         raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", FORMAT.again)
     pose = Pose.from_quaternion(values("position"), values("quaternion"))

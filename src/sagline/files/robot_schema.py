@@ -19,11 +19,9 @@ from sagline.files.quantity import in_si, plain_number
 from sagline.files.yaml_text import Entry
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.inertia import box_inertia, cylinder_inertia
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
-from sagline.robot.provenance import Provenance
+from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
-from sagline.robot.tolerances import UNCERTAIN, of_share, value_of
+from sagline.robot.tolerances import UNCERTAIN, Provenance, of_share, value_of
 from sagline.robot.winch import Winch
 
 _KINDS: Final = {  # and the keys that may stand beside each

@@ -21,8 +21,7 @@ from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.variables import Quantity, check_indices, check_variables, values_of, variables_of
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import Pose, PoseBox
 from sagline.tension.methods import METHODS
 from sagline.workspaces.criteria import (
     Clearance,

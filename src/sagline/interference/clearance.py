@@ -21,10 +21,10 @@ from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, parts_of, rod_row
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
-from sagline.robot.bounds import bounds
+from sagline.robot.batch import Robots, first_of
 from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, first_of
 
 BLOCK = 1024  # poses
 

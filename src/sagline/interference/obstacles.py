@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import instance, label
 from sagline.core.arrays import Array, exactly, number
 from sagline.core.results import Result, set_fields
-from sagline.robot.bounds import bounds
 from sagline.robot.pose import Pose
+from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 
 _LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -13,9 +13,9 @@ from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.interference import shapes
+from sagline.robot.batch import Robots, anchors_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.several import Robots, anchors_of
 
 
 class Part(NamedTuple):

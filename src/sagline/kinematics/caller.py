@@ -19,7 +19,7 @@ FLOAT: Final = np.dtype(np.float64)
 WHOLE: Final = slice(None)
 
 
-def take(memory: Any, given: Any, item: str, unit: str) -> None:
+def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
     """Write a caller's numbers into memory of ours; that they are finite is for the solver to tell.
 
     Args:
@@ -43,7 +43,7 @@ def take(memory: Any, given: Any, item: str, unit: str) -> None:
     memory[WHOLE] = exactly(given, item, unit, (len(memory),))
 
 
-def give(values: Array, out: Any, item: str) -> None:
+def copy_out(values: Array, out: Any, item: str) -> None:
     """Write an answer to a caller's memory.
 
     Args:

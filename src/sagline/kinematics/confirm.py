@@ -12,14 +12,13 @@ from sagline.core.arrays import Array, Codes, Flags, locked
 from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result
 from sagline.kinematics.forward import forward
-from sagline.kinematics.forward_rows import solve_rows
-from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.kinematics.forward_status import ForwardStatus
+from sagline.kinematics.forward_rows import ForwardSolution, solve_forward_rows
 from sagline.kinematics.plan import Plan
-from sagline.kinematics.winding import settled
-from sagline.robot.behind import differs, kernel_length
+from sagline.kinematics.status import ForwardStatus
+from sagline.kinematics.winding import iterate_routing
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.robot.routing import differs, kernel_length
 from sagline.statics.tables import pose_rows
 
 _CATENARY = Catenary()
@@ -107,8 +106,8 @@ def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
         return forward(robot, state.unstrained_length, state.pose, wrench=state.wrench, progress=progress)
     lengths, planned = (locked(np.atleast_2d(each).view()) for each in (state.unstrained_length, kernel_length(state)))
     loads = locked(np.atleast_2d(state.wrench).view())
-    found = solve_rows(robot, _CATENARY, planned, pose_rows(state.pose), loads, progress=progress)
-    found = settled(robot, _CATENARY, found, lengths, loads, winding, lengths - planned)
+    found = solve_forward_rows(robot, _CATENARY, planned, pose_rows(state.pose), loads, progress=progress)
+    found = iterate_routing(robot, _CATENARY, found, lengths, loads, winding, lengths - planned)
     return found.solution(robot, _CATENARY, state.wrench, state.pose.shape)
 
 

@@ -16,14 +16,13 @@ from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.kernels.forward.problem import ENERGY
 from sagline.kinematics.forward import checked_lengths
-from sagline.kinematics.forward_rows import Found
-from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.kinematics.forward_status import STABLE, ForwardStatus
+from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution
 from sagline.kinematics.start import from_orientations, start_quaternions
-from sagline.kinematics.winding import settled
-from sagline.robot.behind import differs, with_behind
+from sagline.kinematics.status import STABLE, ForwardStatus
+from sagline.kinematics.winding import iterate_routing
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.robot import Robot
+from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 
 START_BYTES = 250.0  # what each cable of a start takes while it is solved
@@ -98,10 +97,10 @@ def equilibria(
     loads = locked(load[None].copy())
     found = from_orientations(robot, model, samples, loads, quaternions)
     if differs(robot, None):
-        found = settled(robot, model, found, samples, loads, None)
+        found = iterate_routing(robot, model, found, samples, loads, None)
     chosen, reached = _distinct(found, float(lengths.mean()))
     solutions = found.part(chosen).solution(robot, model, load, (len(chosen),))
-    solutions = replace(solutions, state=with_behind(solutions.state, None))
+    solutions = replace(solutions, state=with_routing(solutions.state, None))
     return Equilibria(solutions, locked(reached), len(quaternions))
 
 
@@ -121,7 +120,7 @@ def _quaternions(robot: Robot, count: int, seed: int) -> Array:
     return np.vstack((known, drawn))
 
 
-def _distinct(found: Found, length: float) -> tuple[Indices, Indices]:
+def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
     """One index for each distinct stable equilibrium, lowest energy first, and how many starts reached it."""
     kept = np.flatnonzero(np.isin(found.pose_status, _KEPT))
     chosen: list[int] = []

@@ -15,17 +15,15 @@ from sagline.core.arrays import LARGEST, SMALLEST, Array, locked, numbers
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
 from sagline.core.progress import Progress
-from sagline.kinematics.forward_rows import solve_rows
-from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.kinematics.measured import MeasuredTension, corrected
+from sagline.kinematics.forward_rows import ForwardSolution, solve_forward_rows
+from sagline.kinematics.measured import MeasuredTension, fit_measurements
 from sagline.kinematics.start import search
-from sagline.kinematics.winding import checked_winding, settled
-from sagline.robot.behind import differs, with_behind
+from sagline.kinematics.winding import checked_winding, iterate_routing
+from sagline.robot.batch import Robots, check_count, dead_cable, first_of, has_routing, together
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, anything_behind, check_count, first_of, together
-from sagline.robot.wheels import dead_cable
+from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 from sagline.statics.tables import pose_rows
 
@@ -94,7 +92,7 @@ def forward(
     shape = lengths.shape[:-1]
     count = shape[0] if shape else None
     check_count(robots, count)
-    check_poses(count or 1, lengths.shape[-1], anything_behind(robots))
+    check_poses(count or 1, lengths.shape[-1], has_routing(robots))
     load = external_wrench(wrench, count)
     direction = None if winding is None else checked_winding(winding, shape, lengths.shape[-1])
     samples, loads = np.atleast_2d(lengths), np.atleast_2d(load)
@@ -104,14 +102,14 @@ def forward(
         check_reach(first_of(robots), start, "start")
         chained = bool(shape) and not start.shape
         starts = start_rows(start, lengths)
-        found = solve_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
+        found = solve_forward_rows(robots, model, samples, starts, loads, chained=chained, progress=progress)
     if differs(robots, direction):
-        found = settled(robots, model, found, samples, loads, direction)
+        found = iterate_routing(robots, model, found, samples, loads, direction)
     covariance = None
     if tension_measured is not None:
-        covariance = corrected(robots, model, found, loads, tension_measured)
+        covariance = fit_measurements(robots, model, found, loads, tension_measured)
     solution = found.solution(robots, model, load, shape, covariance)
-    return replace(solution, state=with_behind(solution.state, direction))
+    return replace(solution, state=with_routing(solution.state, direction))
 
 
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:

@@ -1,7 +1,8 @@
-"""Forward kinematics in rows: robot, lengths and starts as the kernels take them, and their answers back."""
+"""Forward kinematics in rows: arguments and results of the kernels, and the solution of a batch."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Codes, Flags, Indices, locked
 from sagline.core.progress import Progress, blocks, rows_of
+from sagline.core.results import Result
 from sagline.kernels import codes, tables
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.forward.fit import fit_poses
@@ -25,19 +27,71 @@ from sagline.kernels.forward.problem import (
     FoundArrays,
 )
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.forward_solution import ForwardSolution
-from sagline.kinematics.forward_status import STABLE
-from sagline.kinematics.hung import hung_cables
-from sagline.robot.equilibrium import Equilibrium
+from sagline.kinematics.status import STABLE, ForwardStatus
+from sagline.robot.batch import Robots, first_of, has_routing
+from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose
-from sagline.robot.several import Robots, anything_behind, first_of
 from sagline.statics.tables import body_table, cable_table
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForwardSolution(Result):
+    """Result of `forward`: a single sample, or N of them with a leading axis.
+
+    Attributes:
+        state: Robot, poses, wrench and cables in equilibrium; NaN where the lengths were NaN.
+        status: Codes of `ForwardStatus`, shape () or (N,).
+        stiffness_min: Smallest stiffness of the platform against its free motions [N/m], shape () or (N,). A rotation
+            counts by the arc it makes at the root mean square distance of the platform ends from the center of mass.
+        energy: Potential energy of cables, weight and given force [J], shape () or (N,); frame ends and the origin
+            of the world are at zero. The shallow models have none: NaN. Straight cables: what they minimize
+            instead, half the sum of squared length errors [m^2].
+        wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
+            shape (2,) or (N, 2).
+        iterations: Newton steps taken, shape () or (N,).
+        covariance: Of the pose found from measured tensions: displacement of the center of mass [m] and rotation
+            vector [rad], world axes, shape (6, 6) or (N, 6, 6). None where no tensions were measured.
+    """
+
+    state: Equilibrium
+    status: Codes
+    stiffness_min: Array
+    energy: Array
+    wrench_residual: Array
+    iterations: Indices
+    covariance: Array | None = None
+
+    @property
+    def pose(self) -> Pose:
+        """Where the platform rests."""
+        return self.state.pose
+
+    @property
+    def solved(self) -> Flags:
+        """Whether each sample is a stable equilibrium in which the cables hold the platform, shape () or (N,)."""
+        return np.asarray(self.status == ForwardStatus.SOLVED)
+
+    @property
+    def stable(self) -> Flags:
+        """Whether each sample is a stable equilibrium, however it is held, shape () or (N,)."""
+        return np.isin(self.status, STABLE)
+
+    @property
+    def slack(self) -> Flags:
+        """Which cables hang rather than pull, shape (m,) or (N, m): tau at most half the weight of the chord's length.
+
+        Such a cable sags by a quarter of its chord or more. A weightless one is slack when it carries nothing.
+        """
+        cables = self.state.cables
+        density = np.zeros(()) if cables.model.weightless else cables.cable.linear_density
+        return np.asarray(cables.chord_tension <= 0.5 * density * cables.gravity * cables.chord)
+
 
 BLOCK = 1 << 13  # cables solved at once: from a few to some 130 ms, after which an interrupt is heard
 
 
-class Found(NamedTuple):
-    """What the kernel fills, in its order."""
+class ForwardRows(NamedTuple):
+    """Results of the kernel, in its order."""
 
     poses: Array
     results: Array
@@ -45,30 +99,17 @@ class Found(NamedTuple):
     numbers: Array
     pose_status: Codes
 
-    def keep(self, samples: Indices | slice, other: Found, which: Indices | slice = slice(None)) -> None:
-        """Replace the answers of some samples by some of another's.
-
-        Args:
-            samples: Which to replace (k,).
-            other: The answers to take from.
-            which: Which of those to take (k,); all unless told otherwise.
-        """
+    def keep(self, samples: Indices | slice, other: ForwardRows, which: Indices | slice = slice(None)) -> None:
+        """Replace the results of some samples (k,) by those of some (k,) of another batch."""
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
         self.cable_status[samples] = other.cable_status[which]
         self.numbers[samples] = other.numbers[which]
         self.pose_status[samples] = other.pose_status[which]
 
-    def part(self, samples: Indices) -> Found:
-        """The answers of some samples.
-
-        Args:
-            samples: Which (k,).
-
-        Returns:
-            Copies of their answers.
-        """
-        return Found(
+    def part(self, samples: Indices) -> ForwardRows:
+        """Copies of the results of some samples (k,)."""
+        return ForwardRows(
             self.poses[samples],
             self.results[:, samples],
             self.cable_status[samples],
@@ -77,14 +118,7 @@ class Found(NamedTuple):
         )
 
     def last_pose(self, before: Array) -> Array:
-        """Where a sample that follows these starts.
-
-        Args:
-            before: Pose row at which these started, (1, POSE_COLUMNS).
-
-        Returns:
-            The last pose that was found, (1, POSE_COLUMNS); the one before if none was.
-        """
+        """The last pose row that was found, (1, POSE_COLUMNS); the one before these if none was."""
         found = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
         which = np.flatnonzero(found)[-1:]
         return locked(self.poses[which]) if which.size else before
@@ -95,17 +129,8 @@ class Found(NamedTuple):
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
     @classmethod
-    def empty(cls, count: int, cables: int, behind: bool | None) -> Found:
-        """Room for a batch.
-
-        Args:
-            count: Number of samples N.
-            cables: Number of cables m.
-            behind: Whether anything is behind them.
-
-        Returns:
-            Arrays to be filled.
-        """
+    def empty(cls, count: int, cables: int, behind: bool | None) -> ForwardRows:
+        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead cable."""
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
@@ -135,14 +160,11 @@ class Found(NamedTuple):
             load: External plus inertial wrench, shape (6,) or (N, 6).
             shape: () for a single sample, (N,) for a batch.
             covariance: Of the poses, shape (N, 6, 6), or None.
-
-        Returns:
-            ForwardSolution around these arrays.
         """
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
         residuals = self.numbers[:, [FORCE_RESIDUAL, MOMENT_RESIDUAL]]
-        cables, contact = hung_cables(robot, model, self.results, self.cable_status, shape)
+        cables, contact = cables_of_results(robot, model, self.results, self.cable_status, shape)
         return ForwardSolution(
             state=Equilibrium(robot, pose, whole, cables, contact),
             status=locked(self.pose_status.reshape(shape)),
@@ -154,7 +176,7 @@ class Found(NamedTuple):
         )
 
 
-def solve_rows(
+def solve_forward_rows(
     robot: Robots,
     model: CableModel,
     lengths: Array,
@@ -164,7 +186,7 @@ def solve_rows(
     chained: bool = False,
     freedom: Array | None = None,
     progress: Progress | None = None,
-) -> Found:
+) -> ForwardRows:
     """Run the kernel over samples, in blocks.
 
     Args:
@@ -182,11 +204,11 @@ def solve_rows(
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
-    bodies, cables, behind = body_table(robot), cable_table(robot), anything_behind(robot) or None
+    bodies, cables, behind = body_table(robot), cable_table(robot), has_routing(robot) or None
     chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain goes on from block to block
-    found = Found.empty(count, m, behind)
+    found = ForwardRows.empty(count, m, behind)
     for part in blocks(count, max(1, BLOCK // m), progress):
-        block = Found.empty(part.stop - part.start, m, behind)
+        block = ForwardRows.empty(part.stop - part.start, m, behind)
         per_sample = (rows_of(bodies, part), rows_of(cables, part), lengths[part], rows_of(starts, part))
         given = (allowed, *per_sample, rows_of(wrenches, part))
         if model.code == codes.STRAIGHT:
@@ -200,7 +222,7 @@ def solve_rows(
 
 
 def new_chain(cables: int, freedoms: int) -> ChainArrays:
-    """What a chain of samples remembers, before the first: nothing."""
+    """Memory of a chain of samples, before the first one."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),

@@ -16,16 +16,15 @@ from sagline.kernels import codes, tables
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.caller import give, take
+from sagline.kinematics.caller import copy_in, copy_out
 from sagline.kinematics.forward import dead_only
 from sagline.kinematics.forward_rows import new_chain
-from sagline.kinematics.forward_status import STABLE, ForwardStatus
 from sagline.kinematics.start import search
+from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.kinematics.winding import without_guides
+from sagline.robot.batch import dead_cable, has_routing
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import anything_behind
-from sagline.robot.wheels import dead_cable
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 
@@ -76,7 +75,7 @@ class ForwardSolver:
             raise InvalidValueError(
                 "model", "Straight()", "a model with forces", "Use forward() to fit straight cables."
             )
-        m, behind = robot.cable_count, anything_behind(robot)
+        m, behind = robot.cable_count, has_routing(robot)
         self._dead = None if robot.winches is None else dead_cable(robot)
         self._lengths = np.ones((1, m))
         self._start = np.zeros((1, tables.POSE_COLUMNS))
@@ -185,10 +184,10 @@ class ForwardSolver:
         Raises:
             InvalidValueError: If an argument is no such array of numbers.
         """
-        take(self._own_lengths, unstrained_length, "unstrained_length", "m")
+        copy_in(self._own_lengths, unstrained_length, "unstrained_length", "m")
         if wrench is not None:
             self._loaded = True
-            take(self._load, wrench, "wrench", "N or N m")
+            copy_in(self._load, wrench, "wrench", "N or N m")
         elif self._loaded:
             self._loaded = False
             self._wrench.fill(0.0)
@@ -200,6 +199,6 @@ class ForwardSolver:
         if status in STABLE:
             self._start[0] = self._pose[0]
             self._lost = False
-        give(self._place, position, "position")
-        give(self._turn, quaternion, "quaternion")
+        copy_out(self._place, position, "position")
+        copy_out(self._turn, quaternion, "quaternion")
         return status

@@ -98,38 +98,40 @@ def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
     """Tensions that load cells read, each of which a cable can hold."""
     bias, gain, most = winches.load_cell_bias, winches.load_cell_gain, winches.load_cell_range
     if most is not None:
-        _refuse(reading > most, reading, [f"<= {cell:g} N, its load_cell_range" for cell in most], "Correct it.")
+        _check_readings(
+            reading > most, reading, [f"<= {cell:g} N, its load_cell_range" for cell in most], "Correct it."
+        )
     tension = (reading - bias) / gain
     least = [f"> {b:g} N{', its load_cell_bias' if b else ''}" for b in bias]
-    _refuse(~(tension > 0.0), reading, least, "A cable pulls; correct the reading.")
+    _check_readings(~(tension > 0.0), reading, least, "A cable pulls; correct the reading.")
     strongest = LARGEST_STRAIN * robot.cables.axial_stiffness
     holds = [f"<= {r:.6g} N, where it is {LARGEST_STRAIN:.0%} longer" for r in strongest * gain + bias]
-    _refuse(tension > strongest, reading, holds, "Correct the reading, its unit, or axial_stiffness.")
+    _check_readings(tension > strongest, reading, holds, "Correct the reading, its unit, or axial_stiffness.")
     return tension
 
 
 def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Array:
     """Unstrained lengths off the drums at a pose, with given tensions at the frame ends."""
-    length, held = _held(robot, pose, tension, model)
+    length, held = _lengths_and_reached(robot, pose, tension, model)
     if not (missed := ~held).any():
         return length
     i = int(np.argmax(missed))
-    least = _least(robot, pose, model, i, float(tension[i]))
-    shown, allowed = _read(robot, i, float(tension[i])), "what a cable can have there"
+    least = _least_tension(robot, pose, model, i, float(tension[i]))
+    shown, allowed = _cell_reading(robot, i, float(tension[i])), "what a cable can have there"
     if least is not None:
-        allowed = f">= {_read(robot, i, least):.5g} N there, by the cable's own weight"
+        allowed = f">= {_cell_reading(robot, i, least):.5g} N there, by the cable's own weight"
     step = "Correct the reading, its unit, or the pose."
     raise InvalidValueError(f"cable {i}: frame_end_tension", f"{shown:g} N", allowed, step)
 
 
-def _read(robot: Robot, cable: int, tension: float) -> float:
+def _cell_reading(robot: Robot, cable: int, tension: float) -> float:
     """What a load cell reads of a tension."""
     if robot.winches is None:
         return tension
     return float(tension * robot.winches.load_cell_gain[cable] + robot.winches.load_cell_bias[cable])
 
 
-def _held(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> tuple[Array, Flags]:
+def _lengths_and_reached(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> tuple[Array, Flags]:
     """Unstrained lengths off the drums, and which cables have these tensions with them."""
     m = robot.cable_count
     held, length = np.empty(m), np.empty(m)
@@ -139,20 +141,20 @@ def _held(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> tuple[
     return length, (np.abs(held - tension) <= MISSED * tension) & (length > 0.0)
 
 
-def _least(robot: Robot, pose: Pose, model: CableModel, cable: int, low: float) -> float | None:
+def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low: float) -> float | None:
     """The least tension from `low` on that a cable can have at a pose; None where it holds none that it can have."""
     high = LARGEST_STRAIN * float(robot.cables.axial_stiffness[cable])
 
     def can(tension: float) -> bool:
-        return bool(_held(robot, pose, np.full(robot.cable_count, tension), model)[1][cable])
+        return bool(_lengths_and_reached(robot, pose, np.full(robot.cable_count, tension), model)[1][cable])
 
     if not can(high):
         return None
     for _ in range(HALVINGS):
         if high <= (1.0 + FOUND) * low:
             break
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if can(middle) else (middle, high)
+        centered_positions = math.sqrt(low * high)
+        low, high = (low, centered_positions) if can(centered_positions) else (centered_positions, high)
     return high * (1.0 + FOUND)  # so that the number told will do, with five digits
 
 
@@ -168,7 +170,7 @@ def _check_whole(winches: Winch, length: Array) -> None:
     )
 
 
-def _refuse(wrong: Flags, reading: Array, allowed: list[str], step: str) -> None:
+def _check_readings(wrong: Flags, reading: Array, allowed: list[str], step: str) -> None:
     if wrong.any():
         i = int(np.argmax(wrong))
         raise InvalidValueError(f"cable {i}: frame_end_tension", f"{reading[i]:g} N", allowed[i], step)

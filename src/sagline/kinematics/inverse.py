@@ -17,17 +17,16 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_poses
 from sagline.core.progress import Progress
 from sagline.kernels import codes
-from sagline.kinematics.hung import hung_cables
-from sagline.kinematics.inverse_rows import decide_rows, solve_rows
+from sagline.kinematics.inverse_rows import decide_rows, solve_inverse_rows
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.winding import Winding, checked_winding
 from sagline.motion.path import Path
-from sagline.robot.behind import with_behind
-from sagline.robot.equilibrium import Equilibrium
+from sagline.robot.batch import first_of, has_routing, one_a_pose
+from sagline.robot.equilibrium import Equilibrium, cables_of_results
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import anything_behind, first_of, one_a_pose
+from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
 from sagline.statics.chords import refuse_missing_chords
 from sagline.statics.tables import pose_rows
@@ -94,7 +93,7 @@ def inverse(
     """
     _check_kinds(motion, model, tension)
     callback(progress, "progress")
-    turning = _turning(winding, motion)
+    turning = _given_winding(winding, motion)
     method = tension if isinstance(motion, Path) or previous is not None else tension.alone
     pose = motion.pose if isinstance(motion, Path) else motion
     robots = one_a_pose(robot, len(pose) if pose.shape else None)
@@ -103,26 +102,26 @@ def inverse(
     options = kernel_options(robots, model, method)
     rows = pose_rows(pose)
     count = len(rows)
-    check_poses(count, shared.cable_count, anything_behind(robots))
+    check_poses(count, shared.cable_count, has_routing(robots))
     load = external_wrench(wrench, count if pose.shape else None)
     if isinstance(motion, Path):
         load = locked(inertial_wrench(robots, pose, motion.twist, motion.twist_rate) + load)
     reference = _reference(shared, previous, tension.variable)
     loads = np.atleast_2d(load)
-    found = solve_rows(robots, method, options, rows, loads, reference, progress)
+    found = solve_inverse_rows(robots, method, options, rows, loads, reference, progress)
     if (found.pose_status == codes.POSE_NO_CHORD).any():
         refuse_missing_chords(robots, pose)
     verdicts = decide_rows(robots, options, rows, loads, found, progress)
     whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*pose.shape, 6))))
     direction = None if turning is None else checked_winding(turning, pose.shape, shared.cable_count)
 
-    def hanging() -> Equilibrium:
-        cables, contact = hung_cables(robots, model, found.results, found.cable_status, pose.shape)
-        return with_behind(Equilibrium(robots, pose, whole, cables, contact), direction)
+    def equilibrium() -> Equilibrium:
+        cables, contact = cables_of_results(robots, model, found.results, found.cable_status, pose.shape)
+        return with_routing(Equilibrium(robots, pose, whole, cables, contact), direction)
 
-    state = hanging()
-    if found.leave_out(verdicts, state.unstrained_length):
-        state = hanging()
+    state = equilibrium()
+    if found.reject_slack(verdicts, state.unstrained_length):
+        state = equilibrium()
     plan = Plan(
         state=state,
         path=motion if isinstance(motion, Path) else None,
@@ -137,11 +136,11 @@ def inverse(
         relief=locked(np.ascontiguousarray(_in_world(verdicts.reliefs, shared)[:, :3]).reshape(*pose.shape, 3)),
         at_border=locked(verdicts.at_border.reshape(pose.shape)),
     )
-    return plan if winding is None or turning is not None else _wound_along(plan)
+    return plan if winding is None or turning is not None else _with_path_friction(plan)
 
 
-def _turning(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
-    """The winding as numbers; None for none, or for those of the path."""
+def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
+    """Winding directions as given; None for none, or for those of the path."""
     if not isinstance(winding, str):
         return winding
     if choice(winding, "winding", ("path",)) and isinstance(motion, Path):
@@ -150,13 +149,13 @@ def _turning(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
     raise InvalidValueError("winding", "'path' for poses without one", "numbers, or None", step)
 
 
-def _wound_along(plan: Plan) -> Plan:
-    """A plan with the friction of the way that its lengths go."""
+def _with_path_friction(plan: Plan) -> Plan:
+    """The plan with friction by the direction in which its lengths change."""
     if plan.state.contact is None or plan.length_rate is None:
         return plan
     rate = np.nan_to_num(plan.length_rate)
-    still = np.abs(rate) <= STANDING * np.abs(rate).max(initial=0.0)
-    return replace(plan, state=with_behind(plan.state, locked(np.where(still, 0.0, -np.sign(rate)))))
+    standing = np.abs(rate) <= STANDING * np.abs(rate).max(initial=0.0)
+    return replace(plan, state=with_routing(plan.state, locked(np.where(standing, 0.0, -np.sign(rate)))))
 
 
 def _check_kinds(motion: object, model: object, tension: object) -> None:
@@ -188,7 +187,7 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
             "Continue a plan of this robot.",
         )
     tensions = shared_tension(previous.state, variable)
-    # where the way of sharing had no say, a path does not go on from either
+    # tensions that the distribution method did not choose are no reference
     at_border = np.zeros_like(previous.feasible) if previous.at_border is None else previous.at_border
     feasible = np.flatnonzero(np.atleast_1d(previous.feasible & ~at_border))
     if not feasible.size:

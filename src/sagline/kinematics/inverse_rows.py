@@ -12,18 +12,18 @@ from sagline.kernels import codes, tables
 from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.inverse.verdicts import ENOUGH, PROVED, decide_poses
 from sagline.kernels.memory import memory_for
-from sagline.robot.several import Robots, anything_behind, first_of
+from sagline.robot.batch import Robots, first_of, has_routing
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod
 from sagline.tension.options import Options, takes_default_kernel
 
-UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # what the rounds of sharing leave open
+UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # what the iterations leave open
 BLOCK = 1 << 12  # poses solved at once: a tenth of a second at most, after which an interrupt is heard
 DECIDED = 1 << 10  # and poses decided at once, which take longer
 
 
-class Found(NamedTuple):
-    """What the kernel fills, in its order; arrays lead with the N poses but for results (RESULT_ROWS, N, m)."""
+class InverseRows(NamedTuple):
+    """Results of the kernel, in its order; arrays lead with the N poses but for results (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
@@ -32,18 +32,8 @@ class Found(NamedTuple):
     pose_status: Codes
 
     @classmethod
-    def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> Found:
-        """Room for a batch.
-
-        Args:
-            count: Number of poses N.
-            cables: Number of cables m.
-            freedoms: Number of free motions n.
-            behind: Whether anything is behind the cables.
-
-        Returns:
-            Arrays to be filled.
-        """
+    def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> InverseRows:
+        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead cable."""
         return cls(
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
@@ -52,16 +42,8 @@ class Found(NamedTuple):
             np.empty(count, dtype=np.int8),
         )
 
-    def leave_out(self, verdicts: Verdicts, lengths: Array) -> bool:
-        """Take the answers of solved poses back where a cable is too slack to hang between its guides.
-
-        Args:
-            verdicts: Those of the poses; theirs too.
-            lengths: Unstrained lengths, shape (m,) or (N, m), NaN where one hangs nowhere.
-
-        Returns:
-            Whether there are such poses.
-        """
+    def reject_slack(self, verdicts: Verdicts, lengths: Array) -> bool:
+        """Mark solved poses as TOO_SLACK where lengths (N, m) between guides are NaN; whether there are any."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
         lost = (self.pose_status == codes.POSE_SOLVED) & slack.any(axis=-1)
         if not lost.any():
@@ -79,7 +61,7 @@ class Found(NamedTuple):
         return self.results, self.cable_status, self.residuals, self.needed, self.pose_status
 
 
-def solve_rows(
+def solve_inverse_rows(
     robot: Robots,
     method: TensionMethod,
     options: Options,
@@ -87,7 +69,7 @@ def solve_rows(
     loads: Array,
     reference: Array,
     progress: Progress | None = None,
-) -> Found:
+) -> InverseRows:
     """Run the kernel over poses.
 
     Args:
@@ -103,8 +85,8 @@ def solve_rows(
         The answers.
     """
     shared = first_of(robot)
-    behind = anything_behind(robot)
-    found = Found.empty(len(rows), shared.cable_count, shared.degrees_of_freedom, behind)
+    behind = has_routing(robot)
+    found = InverseRows.empty(len(rows), shared.cable_count, shared.degrees_of_freedom, behind)
     otherwise = None if takes_default_kernel(method) else True
     memory = memory_for(shared.cable_count)
     given = (*options, robot_terms(robot), rows, loads, reference, memory, otherwise, found.answers)
@@ -118,7 +100,7 @@ def solve_rows(
 
 
 class Verdicts(NamedTuple):
-    """Why poses have no answer; arrays lead with the N poses.
+    """Proofs of infeasible poses; arrays lead with the N poses.
 
     Attributes:
         brackets: What is proved, and what suffices, of the smallest change of the force [N], (N, 2): 0 where a pose is
@@ -137,16 +119,7 @@ class Verdicts(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
-        """Room for a batch without verdicts.
-
-        Args:
-            count: Number of poses N.
-            cables: Number of cables m.
-            freedoms: Number of free motions n.
-
-        Returns:
-            Arrays to be filled: NaN, and no cables.
-        """
+        """Arrays for a batch without verdicts: NaN, and no cables."""
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, freedoms), np.nan),
@@ -168,22 +141,19 @@ class Verdicts(NamedTuple):
 
 
 def covers_all(method: int, redundant: int) -> bool:
-    """Whether a way of sharing reaches all that is feasible.
+    """Whether a distribution method finds tensions wherever there are any; formulas without limits do not.
 
     Args:
         method: Its code.
-        redundant: How many cables there are beyond the degrees of freedom.
-
-    Returns:
-        False for formulas that do not look at the limits, where there is something to choose.
+        redundant: Number of cables beyond the degrees of freedom.
     """
     return redundant == 0 or not codes.CLOSED_FORM <= method <= codes.PUNCTURE
 
 
 def decide_rows(
-    robot: Robots, options: Options, rows: Array, loads: Array, found: Found, progress: Progress | None = None
+    robot: Robots, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
 ) -> Verdicts:
-    """Decide the poses that the rounds of sharing called infeasible; fills the answers of those that are not.
+    """Decide the poses that the iterations left open; fill the results of the feasible ones.
 
     Args:
         robot: The robot, or one a pose.

@@ -20,12 +20,12 @@ from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.inverse.verdicts import decide_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, give, take
-from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, covers_all
+from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, copy_in, copy_out
+from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, covers_all
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
+from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
-from sagline.robot.several import anything_behind
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest
@@ -98,7 +98,7 @@ class InverseSolver:
         self._quaternion: Any = self._pose[0, 3:].data
         self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
-        self._found = Found.empty(1, m, n, anything_behind(robot))
+        self._found = InverseRows.empty(1, m, n, has_routing(robot))
         self._status = self._found.pose_status.data  # read five times faster than an array of one
         self._loaded = False  # whether the wrench of the last step was more than zero
         self._lengths = self._found.results[tables.LENGTH, 0]
@@ -180,24 +180,24 @@ class InverseSolver:
             else:
                 raise TypeError
         except (struct.error, TypeError, ValueError, NotImplementedError, OverflowError):
-            take(self._position, place, "position", "m")  # integers and the like, or it is told what is wrong
-            take(self._quaternion, turn, "quaternion", "")
+            copy_in(self._position, place, "position", "m")  # integers and the like, or it is told what is wrong
+            copy_in(self._quaternion, turn, "quaternion", "")
         if wrench is not None:
             self._loaded = True
-            take(self._load, wrench, "wrench", "N or N m")
+            copy_in(self._load, wrench, "wrench", "N or N m")
         elif self._loaded:
             self._loaded = False
             self._wrench.fill(0.0)
         if not -ROUNDING < (length := hypot(*self._quaternion)) - 1.0 < ROUNDING and not self._normalized(length):
             self._lengths.fill(nan)
-            give(self._lengths, out, "out")
+            copy_out(self._lengths, out, "out")
             return PoseStatus.NO_POSE
         self._solve()
         code = self._status[0]
         if code:  # 0 is SOLVED
             if not (isfinite(sum(self._position)) and isfinite(sum(self._load))):
                 self._lengths.fill(nan)
-                give(self._lengths, out, "out")
+                copy_out(self._lengths, out, "out")
                 return PoseStatus.NO_POSE
             if code in UNDECIDED:
                 self._decide()
@@ -207,7 +207,7 @@ class InverseSolver:
                 raise TypeError
             out[WHOLE] = self._lengths
         except (AttributeError, IndexError, TypeError, ValueError):
-            give(self._lengths, out, "out")  # looks closer, or tells what is wrong
+            copy_out(self._lengths, out, "out")  # looks closer, or tells what is wrong
         status: PoseStatus = _STATUSES[code]
         return status
 

@@ -2,62 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from attrs import field, fields, frozen
 
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import given, reduced, rule
 from sagline.core.results import Result
 from sagline.kernels import codes, tables
-from sagline.kinematics.forward_rows import Found, solve_rows
+from sagline.kinematics.forward_rows import ForwardRows, solve_forward_rows
+from sagline.robot.batch import Robots, robot_at
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, robot_at
 from sagline.statics.stiffness import stiffness
 
 _STEPS = 100
 _HALVINGS = 20
-_SETTLED = 1e-8  # of the sum of squares: a step that promises less is within 1e-4 standard deviations of the best
+_TOLERANCE = 1e-8  # of the sum of squares: a step that promises less is within 1e-4 standard deviations of the best
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False, weakref_slot=False)
 class MeasuredTension(Result):
-    """Load cells at the frame ends of the cables, and how far they and the lengths are to be trusted.
+    """Load cells at the frame ends of the cables, and the accuracy of them and of the lengths.
 
     Attributes:
         frame_end_tension: Readings [N], shape (m,) or (N, m); NaN for a cable without a cell.
         tension_deviation: Standard deviation of a reading [N], > 0, a number or shape (m,).
         length_deviation: Standard deviation of an unstrained length [m], > 0, a number or shape (m,).
+
+    Raises:
+        InvalidValueError: If a reading is negative or infinite, or a deviation is not positive.
     """
 
-    frame_end_tension: Array
-    tension_deviation: Array
-    length_deviation: Array
+    frame_end_tension: Array = field(converter=given, metadata=rule("N", low=0.0, missing=True))
+    tension_deviation: Array = field(converter=given, metadata=rule("N", above=0.0))
+    length_deviation: Array = field(converter=given, metadata=rule("m", above=0.0))
 
-    def __init__(self, frame_end_tension: ArrayLike, tension_deviation: ArrayLike, length_deviation: ArrayLike) -> None:
-        """Check the three.
+    def __attrs_post_init__(self) -> None:
+        """Check the three."""
+        for about in fields(MeasuredTension):
+            object.__setattr__(self, about.name, checked(getattr(self, about.name), about.name, **about.metadata))
 
-        Args:
-            frame_end_tension: Readings [N], shape (m,) or (N, m); NaN for a cable without a cell.
-            tension_deviation: Standard deviation of a reading [N], > 0.
-            length_deviation: Standard deviation of a length [m], > 0.
-
-        Raises:
-            InvalidValueError: If a reading is negative or infinite, or a deviation is not positive.
-        """
-        readings = checked(frame_end_tension, "frame_end_tension", "N", low=0.0, missing=True)
-        object.__setattr__(self, "frame_end_tension", readings)
-        for name, value, unit in (
-            ("tension_deviation", tension_deviation, "N"),
-            ("length_deviation", length_deviation, "m"),
-        ):
-            object.__setattr__(self, name, checked(value, name, unit, above=0.0))
+    __reduce__ = reduced
 
 
-def corrected(robot: Robots, model: CableModel, found: Found, loads: Array, measured: MeasuredTension) -> Array:
+def fit_measurements(
+    robot: Robots, model: CableModel, found: ForwardRows, loads: Array, measured: MeasuredTension
+) -> Array:
     """Replace equilibria at measured lengths by those that fit lengths and tensions best; their poses' covariance.
 
     Every sample by itself: Gauss-Newton in the lengths, L_true, that minimize
@@ -116,7 +109,7 @@ class _Fit(NamedTuple):
     tension_deviation: Array
     length_deviation: Array
 
-    def best(self, found: Found) -> tuple[Found, Array]:
+    def best(self, found: ForwardRows) -> tuple[ForwardRows, Array]:
         """The best fit and the covariance of its pose, from the equilibrium at the measured lengths."""
         known = ~np.isnan(self.readings)
         covariance = np.full((6, 6), np.nan)
@@ -129,7 +122,7 @@ class _Fit(NamedTuple):
             downhill = -matrix.T @ self.misfit(found)
             step = inverse @ downhill
             covariance = by_length @ inverse @ by_length.T
-            if step @ downhill <= _SETTLED:
+            if step @ downhill <= _TOLERANCE:
                 return found, covariance
             moved = self.moved(found, step)
             if moved is None:
@@ -138,20 +131,20 @@ class _Fit(NamedTuple):
         found.pose_status[:] = codes.FORWARD_NOT_CONVERGED
         return found, covariance
 
-    def misfit(self, found: Found) -> Array:
-        """What lengths and tensions miss of their readings, in standard deviations."""
+    def misfit(self, found: ForwardRows) -> Array:
+        """Lengths and tensions less their readings, in standard deviations."""
         state = found.solution(self.robot, self.model, self.load, ()).state
         tensions = (state.cables.frame_end_tension - self.readings) / self.tension_deviation
         lengths = (state.unstrained_length - self.lengths) / self.length_deviation
         return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
 
-    def moved(self, found: Found, step: Array) -> Found | None:
+    def moved(self, found: ForwardRows, step: Array) -> ForwardRows | None:
         """The equilibrium after a step, halved until the fit is better; None if no part of it helps."""
         lengths = found.results[tables.LENGTH]
         now = self.misfit(found)
         for _ in range(_HALVINGS):
             if (lengths + step > 0.0).all():
-                new = solve_rows(
+                new = solve_forward_rows(
                     self.robot, self.model, locked(lengths + step), locked(found.poses.view()), self.load[None]
                 )
                 misfit = self.misfit(new)

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from sagline.cables.model import CableStatus
 from sagline.core.arrays import Array, Codes
 from sagline.core.results import Result, Saved
-from sagline.kinematics.length_rate import length_rate
+from sagline.kinematics.rates import length_rate
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
+from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words, out_of_plane
-from sagline.robot.several import first_of
 from sagline.tension.method import TensionMethod
 
 

@@ -9,24 +9,23 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.kernels import codes
 from sagline.kernels.forward.problem import ENERGY
-from sagline.kinematics.forward_rows import BLOCK, Found, solve_rows
-from sagline.kinematics.hung import hung_cables
-from sagline.robot.equilibrium import limited_tension
+from sagline.kinematics.forward_rows import BLOCK, ForwardRows, solve_forward_rows
+from sagline.robot.batch import Robots, anchors_of, first_of, has_routing, limits_of, robots_at
+from sagline.robot.equilibrium import cables_of_results, limited_tension
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, anchors_of, anything_behind, first_of, limits_of, robots_at
 from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # degrees, tried where the level platform leads nowhere
-_BELOW = 0.1  # of the mean length
+_DEPTH = 0.1  # of the mean length
 _LIMIT_SLACK = 0.01  # a measured tension may miss its limit by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # how little each status is worth; fitted is as good as solved
 
 
 def search(
     robot: Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
-) -> Found:
+) -> ForwardRows:
     """Forward kinematics without a start, sample by sample.
 
     With its orientation held, the platform has a single equilibrium, because the energy is convex in the position:
@@ -45,15 +44,15 @@ def search(
         The best answer to each sample.
     """
     count, m = lengths.shape
-    found = Found.empty(count, m, anything_behind(robot))
+    found = ForwardRows.empty(count, m, has_routing(robot))
     for part in blocks(count, max(1, BLOCK // m), progress):
         robots = robots_at(robot, part)
         found.keep(part, _search_block(robots, model, lengths[part], rows_of(wrenches, part)))
     return found
 
 
-def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> Found:
-    found = Found.empty(len(lengths), lengths.shape[1], anything_behind(robot))
+def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Array) -> ForwardRows:
+    found = ForwardRows.empty(len(lengths), lengths.shape[1], has_routing(robot))
     open_samples = np.arange(len(lengths))
     for round_, quaternion in enumerate(start_quaternions(first_of(robot))):
         loads = wrenches if len(wrenches) == 1 else locked(wrenches[open_samples])
@@ -63,14 +62,16 @@ def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Ar
         if round_:
             better = _is_better(_rank(robots, model, answer), _rank(robots, model, found.part(open_samples)))
         found.keep(open_samples[better], answer, np.flatnonzero(better))
-        settled = _is_plausible(robots, model, answer)
-        open_samples = open_samples[~settled]
+        iterate_routing = _is_plausible(robots, model, answer)
+        open_samples = open_samples[~iterate_routing]
         if not len(open_samples):
             break
     return found
 
 
-def from_orientations(robot: Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array) -> Found:
+def from_orientations(
+    robot: Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array
+) -> ForwardRows:
     """From the middle of the frame: first the position alone, then all motions.
 
     Args:
@@ -85,15 +86,15 @@ def from_orientations(robot: Robots, model: CableModel, lengths: Array, wrenches
     """
     shared = first_of(robot)
     freedom = shared.freedom
-    starts = pose_rows(Pose.from_quaternion(hung(robot, lengths, quaternion), quaternion))
+    starts = pose_rows(Pose.from_quaternion(starting_positions(robot, lengths, quaternion), quaternion))
     if shared.motion_pattern not in ROTATING:
-        return solve_rows(robot, model, lengths, starts, wrenches)
+        return solve_forward_rows(robot, model, lengths, starts, wrenches)
     translations = locked(freedom[~freedom[:, 3:].any(axis=1)])
-    placed = solve_rows(robot, model, lengths, starts, wrenches, freedom=translations)
-    return solve_rows(robot, model, lengths, locked(placed.poses), wrenches)
+    placed = solve_forward_rows(robot, model, lengths, starts, wrenches, freedom=translations)
+    return solve_forward_rows(robot, model, lengths, locked(placed.poses), wrenches)
 
 
-def hung(robot: Robots, lengths: Array, quaternion: Array) -> Array:
+def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Array:
     """Where the platform hangs a little below the middle of the frame ends, as far as it can move.
 
     Not in the middle itself, because the two ends of a single cable must not coincide.
@@ -107,12 +108,12 @@ def hung(robot: Robots, lengths: Array, quaternion: Array) -> Array:
         Positions of the platform origin [m], shape (N, 3).
     """
     freedom = first_of(robot).freedom
-    depth = _BELOW * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
-    position: Array = middle(robot, quaternion) - depth * (freedom[:, 2] @ freedom[:, :3])
+    depth = _DEPTH * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
+    position: Array = centered_positions(robot, quaternion) - depth * (freedom[:, 2] @ freedom[:, :3])
     return position
 
 
-def middle(robot: Robots, quaternion: Array) -> Array:
+def centered_positions(robot: Robots, quaternion: Array) -> Array:
     """Position at which the middle of the platform ends is in the middle of the frame ends.
 
     Args:
@@ -147,7 +148,7 @@ def start_quaternions(robot: Robot) -> Array:
     return np.array(rows)
 
 
-def outside_limits(robot: Robots, model: CableModel, found: Found) -> Indices:
+def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indices:
     """How many cables of each sample are outside their robot's tension limits.
 
     Args:
@@ -159,7 +160,7 @@ def outside_limits(robot: Robots, model: CableModel, found: Found) -> Indices:
         Counts (N,); 0 for straight cables, whose tensions are not known.
     """
     limits = limits_of(robot)
-    cables, contact = hung_cables(robot, model, found.results, found.cable_status, found.pose_status.shape)
+    cables, contact = cables_of_results(robot, model, found.results, found.cable_status, found.pose_status.shape)
     tension = limited_tension(robot, cables, contact)
     low = (1.0 - _LIMIT_SLACK) * limits.low
     high = (1.0 + _LIMIT_SLACK) * limits.high
@@ -167,12 +168,12 @@ def outside_limits(robot: Robots, model: CableModel, found: Found) -> Indices:
     return count
 
 
-def _is_plausible(robot: Robots, model: CableModel, found: Found) -> Flags:
+def _is_plausible(robot: Robots, model: CableModel, found: ForwardRows) -> Flags:
     done = np.isin(found.pose_status, (codes.FORWARD_SOLVED, codes.FORWARD_NO_LENGTHS))
     return np.asarray(done & (outside_limits(robot, model, found) == 0))
 
 
-def _rank(robot: Robots, model: CableModel, found: Found) -> Array:
+def _rank(robot: Robots, model: CableModel, found: ForwardRows) -> Array:
     """Rows (status, cables outside their limits, energy) of which the smaller is the better, (N, 3)."""
     energy = np.nan_to_num(found.numbers[:, ENERGY], nan=0.0)
     return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, model, found), energy), axis=1)

@@ -12,16 +12,16 @@ from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kinematics.forward_rows import Found, solve_rows
-from sagline.robot.behind import with_behind
+from sagline.kinematics.forward_rows import ForwardRows, solve_forward_rows
+from sagline.robot.batch import Robots, robots_at
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, robots_at
+from sagline.robot.routing import with_routing
 
 Winding = ArrayLike | Literal["path"]
-ROUNDS: Final = 100  # some ten of them, unless far more cable is behind than before, or a lot rubs
+ITERATIONS: Final = 100  # some ten of them, unless far more cable is behind than before, or a lot rubs
 MEMORY: Final = 5  # of rounds before, from which the next is mixed
 _RANK: Final = 1e-6
-SETTLED: Final = 1e-13  # of a length
+TOLERANCE: Final = 1e-13  # of a length
 _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
 
 
@@ -74,15 +74,15 @@ def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
     raise InvalidValueError("winches: guides", "given", f"None for {solver}", step)
 
 
-def settled(
+def iterate_routing(
     robot: Robots,
     model: CableModel,
-    found: Found,
+    found: ForwardRows,
     lengths: Array,
     loads: Array,
     winding: Array | None,
     taken: Array | None = None,
-) -> Found:
+) -> ForwardRows:
     """Equilibria at lengths that count what is really behind the pulleys.
 
     Kernels get the lengths less what guides and friction add at the tensions of the round before, until that stays.
@@ -102,18 +102,18 @@ def settled(
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
     past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # what was taken, and what it missed
     still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         if not still.size:
             return found
         some = found.part(still)
         turning = winding if winding is None or winding.ndim == 1 else winding[still]
-        added = _added(robots_at(robot, still), model, some, turning)
+        added = _routing_change(robots_at(robot, still), model, some, turning)
         slack = np.isnan(added)
         missed = np.where(slack, 0.0, added - more[still])
-        moving = (np.abs(missed) > SETTLED * lengths[still]).any(axis=1)
+        moving = (np.abs(missed) > TOLERANCE * lengths[still]).any(axis=1)
         whole = np.zeros(lengths.shape)
         whole[still] = missed
-        mixed = more[still] + _mixed(more[still], missed, [(x[still], f[still]) for x, f in past])
+        mixed = more[still] + _anderson_step(more[still], missed, [(x[still], f[still]) for x, f in past])
         past.append((more.copy(), whole))
         given = lengths[still] - mixed
         lost = np.where(moving, ~(given > 0.0).all(axis=1), slack.any(axis=1))
@@ -123,13 +123,13 @@ def settled(
         if still.size:
             more[still] = mixed[again]
             load = loads if len(loads) == 1 else locked(loads[still])
-            found.keep(still, solve_rows(robots_at(robot, still), model, locked(given[again]), starts, load))
+            found.keep(still, solve_forward_rows(robots_at(robot, still), model, locked(given[again]), starts, load))
             still = still[~np.isin(found.pose_status[still], _OPEN)]
     found.pose_status[still] = codes.FORWARD_NOT_CONVERGED
     return found
 
 
-def _mixed(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Array:
+def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Array:
     """The next step from what was missed before too, (N, m): by Anderson's mixing."""
     if not past:
         return missed
@@ -140,11 +140,11 @@ def _mixed(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Arra
     return step
 
 
-def _added(robot: Robots, model: CableModel, found: Found, winding: Array | None) -> Array:
+def _routing_change(robot: Robots, model: CableModel, found: ForwardRows, winding: Array | None) -> Array:
     """What guides and friction add to the lengths behind the pulleys [m], (N, m); NaN where a cable is too slack."""
     shape = (len(found.poses),)
     plain = found.solution(robot, model, np.zeros(6), shape).state
-    real = with_behind(plain, winding)
+    real = with_routing(plain, winding)
     assert plain.contact is not None
     assert real.contact is not None
     return (real.contact.wrapped_length - plain.contact.wrapped_length) + (

@@ -21,8 +21,7 @@ from sagline.optimization.front import Front, Ledger
 from sagline.optimization.goals import Goal
 from sagline.optimization.request import COUNTS, MOST_EVALUATIONS, checked_request, poses_of
 from sagline.optimization.search import SEARCHES, Task, latin_hypercube, population_of
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 

@@ -19,7 +19,7 @@ from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.free import CableChoice, Free, FreeCable, FreeLimit
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.goals import KINDS, Goal
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import PoseBox
 from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchSet
 
 T = TypeVar("T")

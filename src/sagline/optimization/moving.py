@@ -21,8 +21,7 @@ from sagline.optimization.free import Free, Part
 from sagline.optimization.goals import Goal
 from sagline.optimization.rating import Rating, move_anchors
 from sagline.optimization.request import COUNTS, poses_of
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 

@@ -16,13 +16,13 @@ from sagline.kernels.cable.shape import sags
 from sagline.kernels.forward.sensitivity import DATA, describe_states
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.inverse_rows import Found
+from sagline.kinematics.inverse_rows import InverseRows
 from sagline.optimization.candidates import AnchorErrors, Candidates, Solid, impossible
 from sagline.optimization.goals import AT_POSES, Goal, Measured
 from sagline.optimization.search import latin_hypercube
+from sagline.robot.batch import has_routing
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import anything_behind
 from sagline.statics.stiffness import compliance_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.methods import MinimumNorm
@@ -53,8 +53,8 @@ def distribute(
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
     count, m = cables.shape[:2]
-    behind = anything_behind(robot)
-    found = Found.empty(count, m, robot.degrees_of_freedom, behind)
+    behind = has_routing(robot)
+    found = InverseRows.empty(count, m, robot.degrees_of_freedom, behind)
     body, load, memory = body_table(robot), locked(np.atleast_2d(wrench).copy()), memory_for(m)
     cables, poses = locked(np.ascontiguousarray(cables)), locked(np.ascontiguousarray(poses))
     terms = (robot.freedom, body, cables)

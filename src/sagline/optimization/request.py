@@ -17,8 +17,7 @@ from sagline.optimization.free import Free
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.goals import Goal
 from sagline.optimization.search import SEARCHES, latin_hypercube
-from sagline.robot.pose import Pose
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet

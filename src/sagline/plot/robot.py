@@ -21,10 +21,9 @@ from sagline.kinematics.inverse import inverse
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import VERMILLION, sheet
 from sagline.plot.style import current
+from sagline.robot.batch import points_on_pulleys, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.wheels import on_wheels
 from sagline.viewer import lines
 from sagline.viewer.tension_scale import TensionScale
 
@@ -81,7 +80,7 @@ def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple
     Of dead cable only its length and its rise are known: of a run that is not upright its rise is drawn.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
-    pulleys = np.swapaxes(on_wheels(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
+    pulleys = np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
     known = None if robot.winches is None else robot.winches.drum_radius
     radii = np.empty(0) if known is None else known
     drums = [_rims(ends, radius) for ends, radius in zip(lines.drum_axes(robot), radii, strict=False)]

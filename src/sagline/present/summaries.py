@@ -15,7 +15,7 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.vibration import Vibration
 from sagline.kernels.jit import is_compiled
 from sagline.kinematics.confirm import Confirmation
-from sagline.kinematics.forward_solution import ForwardSolution
+from sagline.kinematics.forward_rows import ForwardSolution
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus

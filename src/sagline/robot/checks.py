@@ -1,4 +1,4 @@
-"""What a robot's numbers must satisfy beyond being numbers; each check returns what the robot stores."""
+"""Checks of a robot's fields; each returns the value that the robot stores."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sagline.core.arguments import instance, optional
 from sagline.core.arrays import SMALLEST, Array, checked, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.robot.pattern import PLANAR, ROTATING
-from sagline.robot.unit import unit
+from sagline.robot.pose import unit
 from sagline.robot.winch import Winch
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
@@ -18,18 +18,7 @@ _ROUNDED = 0.01  # what moments printed with three digits may lack: a thin plate
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
-    """Frame and platform anchors of shape (m, 3), one pair a cable, no pair twice.
-
-    Args:
-        frame: Frame ends [m].
-        platform: Platform ends [m].
-
-    Returns:
-        Both, shape (m, 3), write-locked.
-
-    Raises:
-        InvalidValueError: If they are no such points, their counts differ, or two cables have the same ends.
-    """
+    """Frame and platform anchors [m], (m, 3) each, one pair a cable, no pair twice."""
     pair = []
     for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
         array = checked(value, item, "m", shape=(None, 3))
@@ -64,18 +53,7 @@ def _refuse_twins(ends: Array) -> None:
 
 
 def cables(given: Cable, count: int) -> Cable:
-    """The cables' material, one value a cable; each weighs something.
-
-    Args:
-        given: Material of all cables, or one for all.
-        count: Number of cables m.
-
-    Returns:
-        Cable with fields of shape (m,).
-
-    Raises:
-        InvalidValueError: If it is no Cable, has another count, or a cable weighs nothing.
-    """
+    """The cables' material with fields of shape (m,); each weighs something."""
     instance(given, Cable, "cables")
     fields = {name: per_cable(field, f"cables: {name}", count) for name, field in given.known().items()}
     if not (density := fields["linear_density"]).all():
@@ -89,18 +67,7 @@ def cables(given: Cable, count: int) -> Cable:
 
 
 def winches(given: Winch | None, frame: Array) -> Winch | None:
-    """The winches, one a cable, or none; dead cable follows from guides.
-
-    Args:
-        given: Winches of all cables, one for all, or None.
-        frame: Frame anchors [m], shape (m, 3).
-
-    Returns:
-        Winch with fields of shape (m,), or None.
-
-    Raises:
-        InvalidValueError: If it is no Winch, of another count, or its guides do not lead to the frame anchors.
-    """
+    """The winches, one a cable, or None; dead cable follows from guides that lead to the frame anchors (m, 3)."""
     winch = optional(given, Winch, "winches")
     return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 
@@ -171,18 +138,7 @@ def _check_moments(moments: Array, *, everywhere: bool) -> None:
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
-    """Unit normal of the plane a planar platform moves in; none for the others.
-
-    Args:
-        given: A vector of any length but zero, or None.
-        pattern: The motion pattern, which says whether there is a plane.
-
-    Returns:
-        Unit vector, shape (3,), or None.
-
-    Raises:
-        InvalidValueError: If it is missing, given where there is no plane, or zero.
-    """
+    """Unit normal of the plane a planar platform moves in, of any length but zero as given; None for the others."""
     if (given is None) == (pattern in PLANAR):
         has = "not given" if given is None else "given"
         allowed = "a vector of three numbers" if given is None else "nothing"
@@ -198,19 +154,7 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
 
 
 def tension_limits(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
-    """Lower and upper tension limit of each cable, shape (m,).
-
-    Args:
-        low: Lower limits [N], one or one a cable.
-        high: Upper limits [N], which may be infinite.
-        count: Number of cables m.
-
-    Returns:
-        Lower and upper limits [N], shape (m,).
-
-    Raises:
-        InvalidValueError: If one is negative, or a lower limit above its upper one.
-    """
+    """Lower and upper tension limits [N], (m,); none negative, no lower one above its upper one."""
     lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
     upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)
     crossed = np.flatnonzero(lower > upper)
@@ -226,35 +170,12 @@ def tension_limits(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, 
 
 
 def per_cable(array: Array, item: str, count: int) -> Array:
-    """One value a cable, shape (m,), from that or from one value for all.
-
-    Args:
-        array: One value, or m of them.
-        item: The name a message uses.
-        count: Number of cables m.
-
-    Returns:
-        Array of shape (m,).
-
-    Raises:
-        InvalidValueError: If the shape is another.
-    """
+    """One value a cable, (m,), from that or from one value for all."""
     if array.shape not in ((), (1,), (count,)):
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value a cable.")
     return array if array.shape == (count,) else locked(np.full(count, array))
 
 
 def size(given: ArrayLike | None, item: str) -> Array | None:
-    """Edge lengths for drawing, or None.
-
-    Args:
-        given: Edges along x, y, z [m], or None.
-        item: The name a message uses.
-
-    Returns:
-        Array of shape (3,), or None.
-
-    Raises:
-        InvalidValueError: If they are not three positive numbers.
-    """
+    """Edge lengths [m] for drawing, (3,), or None."""
     return None if given is None else exactly(given, item, "m", (3,), above=0.0)

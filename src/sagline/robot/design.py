@@ -13,7 +13,7 @@ from sagline.core.arguments import choice
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.robot.inertia import box_inertia
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 
 LAYOUTS: Final = ("top", "mixed", "bottom")

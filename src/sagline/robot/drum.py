@@ -14,9 +14,9 @@ from sagline.core.arrays import Array, checked, kernel_input, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable import drum
 from sagline.kernels.codes import CATENARY
-from sagline.robot.behind import differs, real_behind
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
+from sagline.robot.routing import actual_routing, differs
 from sagline.robot.winch import Winch
 
 MOST_LAYERS: Final = 1000
@@ -253,7 +253,7 @@ def drum_tension(state: Equilibrium) -> Array:
     """
     robot, cables = state.one_robot, state.cables
     if state.contact is not None and differs(robot, state.contact.winding) and state.contact.winding is not None:
-        return locked(real_behind(state).drum_tension)
+        return locked(actual_routing(state).drum_tension)
     if cables.model.code != CATENARY:
         return state.chord_tension
     height = robot.frame_anchors[:, 2]

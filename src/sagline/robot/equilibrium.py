@@ -1,4 +1,4 @@
-"""A robot at rest, or in quasi-static motion: where its platform is and what its cables carry."""
+"""What lies behind the free spans of cables that run over pulleys, or have dead cable behind their frame anchors."""
 
 from __future__ import annotations
 
@@ -7,16 +7,58 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sagline.cables.model import CableState
-from sagline.core.arrays import Array, locked
+from sagline.cables.model import CableModel, CableState
+from sagline.core.arrays import Array, Codes, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.indices import length_of, part_of
 from sagline.core.results import Result
-from sagline.robot.contact import Contact
+from sagline.kernels import tables
+from sagline.robot.batch import (
+    Index,
+    Robots,
+    anchors_of,
+    cables_of,
+    first_of,
+    has_routing,
+    points_on_pulleys,
+    robots_at,
+)
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Index, Robots, anchors_of, first_of, robots_at
-from sagline.robot.wheels import on_wheels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact(Result):
+    """Where cables leave their pulleys, and what of them is behind; fields of shape (m,) or (N, m).
+
+    Attributes:
+        wrap_angle: Psi, the angle over which a cable lies on its pulley [rad].
+        wrapped_length: Unstrained length on the pulley [m].
+        dead_length: Unstrained length between pulley and drum [m].
+        chord_tension: T_x/cos phi along the chord that touches the pulley and ends at the platform end [N]: the tension
+            that is shared and limited. The free span's own chord starts where the cable really leaves.
+        chord_sine: sin phi of that chord.
+        winding: The direction of friction: +1 winding in, -1 paying out, 0 standing; None: nothing rubs.
+    """
+
+    wrap_angle: Array
+    wrapped_length: Array
+    dead_length: Array
+    chord_tension: Array
+    chord_sine: Array
+    winding: Array | None = None
+
+    def part(self, index: Index) -> Contact:
+        """That of a part of a batch.
+
+        Args:
+            index: As of an array.
+
+        Returns:
+            Contact of the poses that the index names.
+        """
+        known = {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
+        return Contact(**{name: locked(field[index, ...]) for name, field in known.items()})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +117,7 @@ class Equilibrium(Result):
         """Where the cables leave the frame, world axes [m], shape (m, 3) or (N, m, 3): pulleys, or frame anchors."""
         if self.contact is None:
             return locked(np.array(np.broadcast_to(anchors_of(self.robot).frame, (*self.cables.shape, 3))))
-        return locked(on_wheels(self.robot, self.pose, self.contact.wrap_angle))
+        return locked(points_on_pulleys(self.robot, self.pose, self.contact.wrap_angle))
 
     @property
     def one_robot(self) -> Robot:
@@ -136,3 +178,49 @@ def limited_tension(robot: Robots, cables: CableState, contact: Contact | None =
     if first_of(robot).tension_limits_of == "frame_end":
         return cables.frame_end_tension
     return cables.chord_tension if contact is None else contact.chord_tension
+
+
+def cables_of_results(
+    robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
+) -> tuple[CableState, Contact | None]:
+    """State of the free spans of solved poses, and of their routing, or None without pulleys and dead cable.
+
+    Args:
+        robot: The robot, or one a pose.
+        model: Cable model.
+        results: Rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m).
+        status: Status of each cable, (N, m).
+        shape: () for a single pose, (N,) for a batch.
+    """
+    m = results.shape[2]
+
+    def row(which: int) -> Array:
+        return locked(results[which].reshape(*shape, m))
+
+    span, rise, length, tension = (row(k) for k in (tables.SPAN, tables.RISE, tables.LENGTH, tables.TENSION))
+    contact = None
+    if has_routing(robot):
+        rows = (tables.WRAP, tables.WRAPPED, tables.DEAD, tables.TENSION, tables.SINE)
+        contact = Contact(*(row(k) for k in rows))
+        length = locked(length - (contact.wrapped_length + contact.dead_length))
+        tension = locked(_free_chord_tension(span, rise, row(tables.HORIZONTAL), tension))
+    cables = CableState(
+        model=model,
+        cable=cables_of(robot),
+        gravity=first_of(robot).gravity,
+        span=span,
+        rise=rise,
+        unstrained_length=length,
+        horizontal_tension=row(tables.HORIZONTAL),
+        vertical_force=row(tables.VERTICAL),
+        chord_tension=tension,
+        status=locked(status.reshape(*shape, m)),
+    )
+    return cables, contact
+
+
+def _free_chord_tension(span: Array, rise: Array, horizontal: Array, tension: Array) -> Array:
+    """Chord tensions of the free spans; on a vertical one that of the given chord."""
+    level = np.where(span > 0.0, span, 1.0)
+    own: Array = np.where(span > 0.0, horizontal * (np.hypot(span, rise) / level), tension)
+    return own

@@ -1,4 +1,4 @@
-"""Where the platform is: position of its origin and rotation from platform to world."""
+"""Poses of the platform: position of its origin and rotation from platform to world; boxes of poses."""
 
 from __future__ import annotations
 
@@ -8,16 +8,80 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from attrs import field, fields, frozen
 from numpy.typing import ArrayLike, NDArray
 
-from sagline.core.arrays import Array, checked, locked
+from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import given, reduced, rule
 from sagline.core.indices import length_of, part_of
 from sagline.core.memory import check_memory
-from sagline.robot.unit import unit
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
+
+# Rounding leaves a freshly normalized vector of 3 or 4 numbers within 2.5 eps of length 1.
+_ROUNDING = 4.0 * np.finfo(np.float64).eps
+
+
+def unit(vectors: Array) -> Array:
+    """Scale vectors along the last axis to length 1; those that have it to rounding keep every bit.
+
+    Files, pickles and copies pass here again and must not drift. Zero vectors give NaN: check lengths first.
+
+    Args:
+        vectors: Shape (..., k).
+
+    Returns:
+        Array of the same shape; the same array where nothing was to be done.
+    """
+    length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., np.newaxis]
+    if (np.abs(length - 1.0) <= _ROUNDING).all():
+        return vectors
+    scaled: Array = vectors / np.where(np.abs(length - 1.0) <= _ROUNDING, 1.0, length)
+    return scaled
+
+
+@frozen(eq=False, weakref_slot=False)
+class PoseBox:
+    """Positions of the platform origin in a box, tilted about any axis by up to an angle.
+
+    Attributes:
+        low: Lowest position of the platform origin [m], shape (3,).
+        high: Highest position of the platform origin [m], shape (3,), not below low.
+        tilt: Largest angle of rotation [rad], 0 to pi.
+
+    Raises:
+        InvalidValueError: If a number is not finite, a corner has not three numbers, high is below low, or the tilt is
+            more than half a turn.
+    """
+
+    low: Array = field(converter=given, metadata=rule("m", shape=(3,)))
+    high: Array = field(converter=given, metadata=rule("m", shape=(3,)))
+    tilt: float = 0.0
+
+    def __attrs_post_init__(self) -> None:
+        """Check the three."""
+        for about in fields(PoseBox)[:2]:
+            item = f"test_box: {about.name}"
+            object.__setattr__(self, about.name, checked(getattr(self, about.name), item, **about.metadata))
+        low, high = self.low, self.high
+        for name, corner in (("low", low), ("high", high)):
+            if corner.ndim != 1:
+                step = "Give one x, y, z."
+                raise InvalidValueError(f"test_box: {name}", f"of shape {corner.shape}", "shape (3,)", step)
+        if (low > high).any():
+            axis = int(np.argmax(low > high))
+            item, allowed = f"test_box: high[{axis}]", f">= low, {low[axis]:g} m"
+            raise InvalidValueError(item, f"{high[axis]:g} m", allowed, "Exchange low and high.")
+        angle = number(self.tilt, "test_box: tilt", "rad", low=0.0)
+        if angle > np.pi:
+            value, step = f"{angle:.6g} rad", "Give it in radians: no rotation turns by more than half a turn."
+            raise InvalidValueError("test_box: tilt", value, "0 to pi rad", step)
+        object.__setattr__(self, "tilt", angle)
+
+    __reduce__ = reduced
+
 
 _MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 of what still counts as a rotation
 _QUATERNION_TOLERANCE = 1e-6  # a quaternion printed with seven digits still counts as one

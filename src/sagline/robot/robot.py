@@ -17,9 +17,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Shown
 from sagline.robot import checks
 from sagline.robot.pattern import MOTION_PATTERNS, MotionPattern, freedom_matrix
-from sagline.robot.pose_box import PoseBox
-from sagline.robot.provenance import Provenance
-from sagline.robot.tolerances import deviations, value_of
+from sagline.robot.pose import PoseBox
+from sagline.robot.tolerances import Provenance, deviations, value_of
 from sagline.robot.winch import Winch
 
 TensionLimitsOf = Literal["chord", "frame_end"]

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from sagline.core.arguments import choice, whole_number
 from sagline.core.arrays import SMALLEST, Array, checked, locked, spread
 from sagline.core.errors import InvalidValueError
-from sagline.core.fields import given, if_known, rule
+from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.memory import check_memory
-from sagline.robot.unit import unit
+from sagline.robot.pose import unit
 
 UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
 _AGREEING: Final = 1e-9  # of the dead cable: how far a given one may be from that of the guides
@@ -259,17 +259,11 @@ class Winch:
         """
         return {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
 
-    def __reduce__(self) -> tuple[Any, tuple[dict[str, Any]]]:
-        """Pickle through the constructor, so that a loaded winch is checked and locked too."""
-        return _from_fields, (self.known(),)
+    __reduce__ = reduced
 
 
 # in the order of the checks
 _FIELDS: Final = dict(sorted(fields_dict(Winch).items(), key=lambda each: each[0] in _AXES))
-
-
-def _from_fields(values: dict[str, Any]) -> Winch:
-    return Winch(**values)
 
 
 def _checked(value: ArrayLike, about: Attribute[Any]) -> Array:

@@ -16,10 +16,9 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.kernels.cable import geometry
 from sagline.kinematics.plan import Gap, Plan
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.batch import dead_cable, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.wheels import dead_cable
 from sagline.statics.chords import chord_geometry
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ import numpy as np
 
 from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
-from sagline.robot.bounds import bounds, home_pose
+from sagline.robot.batch import pulleys_of
 from sagline.robot.pose import Pose
+from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
 from sagline.share.packing import Channel, encode_channels
 from sagline.viewer import lines, solids
 from sagline.viewer.tension_scale import TensionScale

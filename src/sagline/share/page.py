@@ -14,7 +14,7 @@ import numpy as np
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.robot.bounds import bounds, home_pose
+from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.course import Course
 from sagline.share.machine import colors, model_data, numbers, robot_drawing, solids_data

@@ -13,9 +13,9 @@ from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.balance.wrench import structure_matrices
 from sagline.kernels.cable import geometry as rows
+from sagline.robot.batch import Robots, bodies_of, first_of, one_a_pose
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, bodies_of, first_of, one_a_pose
 from sagline.statics.chords import chord_geometry, refuse_missing_chords
 
 

@@ -9,9 +9,9 @@ from sagline.core.errors import CableGeometryError
 from sagline.kernels.balance.setting import SHORTEST_CHORD
 from sagline.kernels.cable import geometry as rows
 from sagline.kernels.cable.geometry import cable_geometries
+from sagline.robot.batch import Robots, anchors_of, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, anchors_of, pulleys_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 

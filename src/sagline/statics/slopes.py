@@ -19,9 +19,9 @@ from sagline.kernels.forward.sensitivity import (
     describe_states,
 )
 from sagline.kernels.memory import memory_for
-from sagline.robot.behind import kernel_length
+from sagline.robot.batch import first_of, has_routing, pulleys_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import anything_behind, first_of, pulleys_of
+from sagline.robot.routing import kernel_length
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 BLOCK = 1 << 12  # samples at once: a tenth of a second, after which an interrupt is heard
@@ -66,7 +66,7 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
     shared, cables = first_of(state.robot), state.cables
     bodies, robots = body_table(state.robot), cable_table(state.robot)
     poses, lengths = pose_rows(state.pose), np.atleast_2d(kernel_length(state))
-    behind = anything_behind(state.robot) or None
+    behind = has_routing(state.robot) or None
     shape, (count, m) = state.pose.shape, lengths.shape
     matrices = np.empty((count, 6, 6))
     stiffness = np.empty((count, m, 3, 3))

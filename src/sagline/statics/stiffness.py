@@ -10,8 +10,8 @@ from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, locked
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
+from sagline.robot.batch import bodies_of, first_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import bodies_of, first_of
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
 

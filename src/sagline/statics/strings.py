@@ -13,8 +13,8 @@ from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics import string as columns
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
 from sagline.kernels.dynamics.routing import fill_routing_compliance
+from sagline.robot.batch import anchors_of, cables_of, first_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import anchors_of, cables_of, first_of
 from sagline.statics.tables import cable_table
 
 FOLD = 1e-6  # of its weight: a cable whose least tension is below is folded, and has no linear vibration

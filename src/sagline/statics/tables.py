@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.core.arrays import Array, locked
+from sagline.robot.batch import Robots, first_of, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, first_of, pulleys_of
 
 
 def cable_table(robot: Robots) -> Array:

@@ -13,9 +13,9 @@ import numpy as np
 
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels import codes
-from sagline.kinematics.inverse_rows import UNDECIDED, Found, Verdicts, decide_rows
+from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, decide_rows
+from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
-from sagline.robot.several import anything_behind
 from sagline.tension.options import Options
 
 ITERATIONS: Final = 32  # loads of each pose whose proofs are tried on the others
@@ -23,7 +23,7 @@ TRUST: Final = 1e-8  # of the forces at hand: ten times of what a verdict takes 
 PROVED: Final = 0  # column of the brackets
 
 
-def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: Found) -> Array:
+def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
     """Decide the requests that the tension distribution left open; complete the feasible ones.
 
     Args:
@@ -83,13 +83,13 @@ def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) 
 
 
 def _decide(
-    robot: Robot, options: Options, poses: Array, loads: Array, found: Found, which: Indices, proof: Array
+    robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows, which: Indices, proof: Array
 ) -> tuple[Array, Array, Flags]:
     """Decide some requests: proved least changes, Farkas directions, and a mask of those that are proofs."""
     rows = locked(poses[which // len(loads)])
     wrenches = locked(loads[which % len(loads)])
     n, m = robot.degrees_of_freedom, robot.cable_count
-    some = Found.empty(len(which), m, n, anything_behind(robot))
+    some = InverseRows.empty(len(which), m, n, has_routing(robot))
     some.pose_status[:] = codes.POSE_INFEASIBLE
     some.results[:] = np.nan
     verdicts: Verdicts = decide_rows(robot, options, rows, wrenches, some)

@@ -14,7 +14,7 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import FileError
 from sagline.kernels import tables
 from sagline.kernels.inverse.verdicts import PROVED
-from sagline.kinematics.inverse_rows import decide_rows, solve_rows
+from sagline.kinematics.inverse_rows import decide_rows, solve_inverse_rows
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -101,7 +101,7 @@ class _Inverse:
         rows = locked(np.repeat(poses, len(loads), axis=0))
         wrenches = locked(np.tile(loads, (len(poses), 1)))
         none = np.full(self._robot.cable_count, np.nan)
-        found = solve_rows(self._robot, request.tension, self._options, rows, wrenches, none)
+        found = solve_inverse_rows(self._robot, request.tension, self._options, rows, wrenches, none)
         answers: dict[str, NDArray[Any]] = {}
         if "shortfall" in request.quantities:
             verdicts = decide_rows(self._robot, self._options, rows, wrenches, found)

@@ -9,8 +9,8 @@ from sagline.core.arrays import Array, locked
 from sagline.core.progress import blocks, rows_of
 from sagline.kernels.inverse.queries import margins_of_poses
 from sagline.kernels.memory import memory_for
+from sagline.robot.batch import first_of, limits_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import first_of, limits_of
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.options import LIMITS_OF
 

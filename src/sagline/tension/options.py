@@ -11,8 +11,8 @@ from sagline.core.arrays import locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
 from sagline.kernels.inverse.poses import DistributionTerms, LimitTerms, ModelTerms
+from sagline.robot.batch import Robots, first_of
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, first_of
 from sagline.tension.method import TensionMethod
 
 LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_END}

@@ -17,11 +17,11 @@ from sagline.kernels.cable.drum import lengths_of_turns, turns_of_lengths
 from sagline.kernels.dynamics import drives as d
 from sagline.kinematics.forward import forward
 from sagline.kinematics.inverse import inverse
+from sagline.robot.batch import dead_cable
 from sagline.robot.drum import drum_lever, drums_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.wheels import dead_cable
 from sagline.twin.plc_program import LEFT, Limits
 
 

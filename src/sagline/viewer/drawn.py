@@ -8,10 +8,9 @@ import numpy as np
 
 from sagline.cables.models import Catenary
 from sagline.core.arrays import Array
+from sagline.robot.batch import dead_cable, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.wheels import dead_cable
 from sagline.statics.chords import touching_angle
 from sagline.viewer import lines
 from sagline.viewer.tension_scale import Colors, TensionScale

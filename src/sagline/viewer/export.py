@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from trimesh.transformations import compose_matrix, quaternion_matrix
 
-from sagline.robot.several import pulleys_of
+from sagline.robot.batch import pulleys_of
 from sagline.viewer import lines, solids
 from sagline.viewer.drawn import Drawn
 from sagline.viewer.snapshot import Snapshot

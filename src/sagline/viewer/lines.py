@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from sagline.cables.model import CableState
 from sagline.core.arrays import Array, locked
+from sagline.robot.batch import points_on_pulleys, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.wheels import on_wheels
 from sagline.statics.chords import touching_angle
 
 POINTS = 41  # along a hanging cable: an odd number, so that dashes end as they begin
@@ -32,7 +31,7 @@ def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
     if not pulleys_of(robot).radius.any():
         return robot.frame_anchors[:, None]
     angle = np.nan_to_num(touching_angle(robot, pose)) if wrap_angle is None else wrap_angle
-    return np.swapaxes(on_wheels(robot, pose, np.linspace(0.0, 1.0, WRAP_POINTS)[:, None] * angle), 0, 1)
+    return np.swapaxes(points_on_pulleys(robot, pose, np.linspace(0.0, 1.0, WRAP_POINTS)[:, None] * angle), 0, 1)
 
 
 def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:

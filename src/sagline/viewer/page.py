@@ -12,10 +12,9 @@ import viser
 
 from sagline.calibration.result import Calibration
 from sagline.core.arrays import Array
-from sagline.robot.bounds import home_pose
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.reach import check_reach
+from sagline.robot.reach import check_reach, home_pose
 from sagline.robot.robot import Robot
 from sagline.viewer import solids
 from sagline.viewer.camera import Framing

@@ -11,9 +11,9 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.dynamics.vibration.mode_list import MASSLESS
 from sagline.kinematics.status import PoseStatus
+from sagline.robot.batch import pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
 from sagline.tension.margin import capacity_margin
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.lines import dead_runs

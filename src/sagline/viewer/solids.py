@@ -12,11 +12,10 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array, Indices
-from sagline.robot.bounds import bounds as bounds
+from sagline.robot.batch import outward, pulleys_of
 from sagline.robot.pose import Pose
+from sagline.robot.reach import bounds as bounds
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.wheels import outward
 from sagline.viewer import lines
 
 Faces = NDArray[np.int64]

@@ -9,11 +9,10 @@ import viser
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
+from sagline.robot.batch import pulleys_of
 from sagline.robot.pattern import ROTATING
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
-from sagline.robot.several import pulleys_of
-from sagline.robot.unit import unit
 from sagline.viewer import lines, solids
 from sagline.viewer.drawn import Drawn
 from sagline.viewer.readout import headline

@@ -12,8 +12,8 @@ from sagline.calibration.result import Calibration
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.kinematics.plan import Plan
-from sagline.robot.bounds import home_pose as home_pose
 from sagline.robot.pose import Pose
+from sagline.robot.reach import home_pose as home_pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
 from sagline.viewer import playback, readout, session

@@ -20,7 +20,7 @@ from sagline.core.arrays import Array, locked
 from sagline.interference.clearance import ClearanceRows, check_obstacles, obstacles_of
 from sagline.interference.pairs import Obstacle
 from sagline.kinematics.confirm import confirm
-from sagline.robot.bounds import bounds
+from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of, modes

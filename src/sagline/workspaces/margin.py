@@ -18,10 +18,10 @@ from sagline.core.progress import Progress
 from sagline.core.results import Result
 from sagline.core.status import Status
 from sagline.kernels import codes
+from sagline.robot.batch import Robots, first_of, one_a_pose
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.robot.several import Robots, first_of, one_a_pose
 from sagline.statics.tables import pose_rows
 from sagline.workspaces.margin_rows import MarginRows
 from sagline.workspaces.wrench_sets import WrenchSet, load_of

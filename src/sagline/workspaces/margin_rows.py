@@ -17,8 +17,8 @@ from sagline.kernels import tables
 from sagline.kernels.memory import memory_for
 from sagline.kernels.workspaces.signed_margin import FACET_SIZE, signed_margins
 from sagline.kernels.workspaces.wrench_set import SetTerms
+from sagline.robot.batch import bodies_of, first_of, together
 from sagline.robot.robot import Robot
-from sagline.robot.several import bodies_of, first_of, together
 from sagline.statics.tables import robot_terms
 from sagline.tension.options import LIMITS_OF
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet

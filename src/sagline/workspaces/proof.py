@@ -19,7 +19,7 @@ from sagline.core.progress import Progress
 from sagline.core.results import Result
 from sagline.core.status import Status
 from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN, OUTSIDE, prove_boxes, room_for
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.options import LIMITS_OF

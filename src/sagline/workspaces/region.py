@@ -11,9 +11,8 @@ import numpy as np
 from sagline.core.arguments import optional
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
-from sagline.robot.bounds import bounds
-from sagline.robot.pose_box import PoseBox
-from sagline.robot.reach import ROUNDING
+from sagline.robot.pose import PoseBox
+from sagline.robot.reach import ROUNDING, bounds
 from sagline.robot.robot import Robot
 from sagline.workspaces.levels import Details
 

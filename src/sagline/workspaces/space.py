@@ -12,7 +12,7 @@ from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.core.numbers import SPACE, counted, n
 from sagline.core.results import Result, Saved, formats
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.workspaces.criterion import Criterion

@@ -14,7 +14,7 @@ from sagline.core.arguments import brief, callback, instance, whole_number
 from sagline.core.arrays import Array, Flags, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
-from sagline.robot.pose_box import PoseBox
+from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import MinimumNorm

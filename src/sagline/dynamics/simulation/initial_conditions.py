@@ -18,12 +18,12 @@ from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
 from sagline.motion.path import checked_time
-from sagline.robot.behind import differs
+from sagline.robot.batch import dead_cable
 from sagline.robot.drum import drum_tension
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.wheels import dead_cable
+from sagline.robot.routing import differs
 from sagline.statics.balance import inertial_wrench
 
 TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and as many rows

@@ -19,9 +19,9 @@ from sagline.kernels.dynamics import motion
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.winding import BIN
+from sagline.robot.batch import has_routing
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.several import anything_behind
 from sagline.statics.tables import cable_table
 
 MARGIN: Final = 5.0  # m of cable that a drum may let out beyond what it is asked for, and still remember
@@ -104,7 +104,7 @@ class Plant:
         self._table = cable_table(robot)[0].copy()
         anchors = slice(tables.PLATFORM_X, tables.PLATFORM_Z + 1)
         self._table[:, anchors] = (robot.platform_anchors - robot.center_of_mass) @ self.axes
-        self._behind = anything_behind(robot) or None
+        self._behind = has_routing(robot) or None
         self.state = self._state_at(pose, twist)
         self.rows = np.full((CABLE_ROWS, m), np.nan)
         self.rows[LENGTH_ROW] = length

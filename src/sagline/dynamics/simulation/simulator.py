@@ -31,12 +31,12 @@ from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.massless import LOADED
 from sagline.kernels.dynamics.period import begin_period
 from sagline.kernels.jit import machine_code
-from sagline.kinematics.caller import take
+from sagline.kinematics.caller import copy_in
 from sagline.kinematics.inverse import inverse
+from sagline.robot.batch import dead_cable
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.robot.wheels import dead_cable
 
 NEAR: Final = 1e-6  # of a step: so far may a period be from whole steps
 MOST_STEPS: Final = 10**7  # in one period
@@ -206,11 +206,11 @@ class Simulator:
                 argument is no such array: then nothing has changed. Or if energy grows by itself.
         """
         count = self._count(dt)
-        take(self._asked, unstrained_length, "unstrained_length", "m")
+        copy_in(self._asked, unstrained_length, "unstrained_length", "m")
         if tension is not None:
             self._take_tension(tension)
         if wrench is not None:
-            take(self._wrench, wrench, "wrench", "N or N m")
+            copy_in(self._wrench, wrench, "wrench", "N or N m")
         end = (self._counters[k.STEPS] + count) * self._step
         if not self._begin(*self._next, tension is not None, wrench is not None, end):
             self._refuse(tension is not None)
@@ -224,7 +224,7 @@ class Simulator:
         if self._kind != d.DRUMS:
             step = "Leave it out: these winches have no motors."
             raise InvalidValueError("tension", "given", 'None but for winches="robot"', step)
-        take(self._expected, tension, "tension", "N")
+        copy_in(self._expected, tension, "tension", "N")
 
     def _refuse(self, with_tension: bool) -> NoReturn:
         """Say what of what was asked for cannot be."""

@@ -14,8 +14,8 @@ from sagline.dynamics.vibration.component_modes import Components, component_mod
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_counts, in_world
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
+from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.several import first_of
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
 from sagline.statics.strings import COUNTING, Strings, strings_of, undamped

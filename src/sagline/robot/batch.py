@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from sagline.cables.cable import Cable
 from sagline.core.arguments import brief
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 Robots: TypeAlias = Robot | tuple[Robot, ...]  # `together` makes it from what a caller gives
@@ -54,15 +55,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
 
 
 def check_count(robot: Robots, poses: int | None) -> None:
-    """Refuse several robots that are not one a pose.
-
-    Args:
-        robot: The robot or robots.
-        poses: How many poses (or samples) there are; None for a single one, without batch axis.
-
-    Raises:
-        InvalidValueError: If the counts differ.
-    """
+    """Refuse several robots that are not one a pose; poses: their number, None for a single one without batch axis."""
     if isinstance(robot, Robot) or len(robot) == poses:
         return
     allowed = "one robot" if poses is None else f"one robot, or a sequence of {poses}"
@@ -71,35 +64,14 @@ def check_count(robot: Robots, poses: int | None) -> None:
 
 
 def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
-    """`together` and `check_count` in one.
-
-    Args:
-        robot: A robot, or a sequence of them.
-        poses: How many poses there are; None for a single one.
-
-    Returns:
-        The robot, or a tuple of one a pose.
-
-    Raises:
-        InvalidValueError: As those two.
-    """
+    """The robot, or several as a tuple of one a pose: `together` and `check_count` in one."""
     robots = together(robot)
     check_count(robots, poses)
     return robots
 
 
 def first_of(robot: Robots) -> Robot:
-    """The robot, or the first of several: for what all of them share.
-
-    Args:
-        robot: The robot or robots.
-
-    Returns:
-        One robot.
-
-    Raises:
-        InvalidValueError: If there is none, as in a selection that chose no pose.
-    """
+    """The robot, or the first of several, for what all of them share; refuses an empty selection."""
     if isinstance(robot, Robot):
         return robot
     if not robot:
@@ -108,15 +80,7 @@ def first_of(robot: Robots) -> Robot:
 
 
 def robots_at(robot: Robots, index: Index) -> Robots:
-    """The robot of all poses, or of several those of the poses that an index names.
-
-    Args:
-        robot: The robot or robots.
-        index: As of a batch.
-
-    Returns:
-        One robot, or a tuple.
-    """
+    """The robot of all poses, or of several those of the poses that an index names."""
     if isinstance(robot, Robot):
         return robot
     chosen = np.arange(len(robot))[index]
@@ -124,27 +88,12 @@ def robots_at(robot: Robots, index: Index) -> Robots:
 
 
 def robot_at(robot: Robots, pose: int) -> Robot:
-    """The robot of one pose.
-
-    Args:
-        robot: The robot or robots.
-        pose: Index of the pose.
-
-    Returns:
-        One robot.
-    """
+    """The robot of one pose."""
     return robot if isinstance(robot, Robot) else robot[pose]
 
 
 def cables_of(robot: Robots) -> Cable:
-    """Material of the cables.
-
-    Args:
-        robot: The robot or robots.
-
-    Returns:
-        Cable with fields of shape (m,), or (N, m) for several robots; of these a field is known where all know it.
-    """
+    """Material of the cables, (m,), or (N, m) for several robots; of these a field is known where all know it."""
     if isinstance(robot, Robot):
         return robot.cables
     materials = [one.cables.known() for one in robot]
@@ -152,21 +101,14 @@ def cables_of(robot: Robots) -> Cable:
     return Cable(**{name: np.stack([material[name] for material in materials]) for name in names})
 
 
-def anything_behind(robot: Robots) -> bool:
-    """Whether a cable of the robot or robots runs over a pulley, or has dead cable behind its frame anchor.
-
-    Args:
-        robot: The robot or robots.
-
-    Returns:
-        False where all cables start at their frame anchors.
-    """
+def has_routing(robot: Robots) -> bool:
+    """Whether any cable runs over a pulley, or has dead cable behind its frame anchor."""
     robots = (robot,) if isinstance(robot, Robot) else robot
     return any(one.winches is not None and one.winches.anything_behind for one in robots)
 
 
 class Bodies(NamedTuple):
-    """What moves: the platform's inertia, once for all poses or, for several robots, with a leading axis N.
+    """Inertia of the platform, once for all poses or, for several robots, with a leading axis N.
 
     Attributes:
         mass: [kg], shape () or (N,).
@@ -180,19 +122,12 @@ class Bodies(NamedTuple):
 
 
 def bodies_of(robot: Robots) -> Bodies:
-    """Mass, center of mass and inertia of the platform or platforms.
-
-    Args:
-        robot: The robot or robots.
-
-    Returns:
-        Bodies, with a leading axis N for several robots.
-    """
+    """Mass, center of mass and inertia of the platform or platforms."""
     return Bodies(*_each(robot, lambda one: (np.asarray(one.mass), one.center_of_mass, one.inertia)))
 
 
 class Anchors(NamedTuple):
-    """Where the cables are fixed.
+    """Anchors of the cables.
 
     Attributes:
         frame: Frame anchors in the world [m], shape (m, 3) or, for several robots, (N, m, 3).
@@ -204,14 +139,7 @@ class Anchors(NamedTuple):
 
 
 def anchors_of(robot: Robots) -> Anchors:
-    """Anchors of the robot or robots.
-
-    Args:
-        robot: The robot or robots.
-
-    Returns:
-        Anchors, with a leading axis N for several robots.
-    """
+    """Anchors of the robot or robots."""
     return Anchors(*_each(robot, lambda one: (one.frame_anchors, one.platform_anchors)))
 
 
@@ -228,14 +156,7 @@ class Pulleys(NamedTuple):
 
 
 def pulleys_of(robot: Robots) -> Pulleys:
-    """Pulleys of the robot or robots.
-
-    Args:
-        robot: The robot or robots.
-
-    Returns:
-        Pulleys, with a leading axis N for several robots.
-    """
+    """Pulleys of the robot or robots."""
 
     def own(one: Robot) -> tuple[Array, ...]:
         if one.winches is None:
@@ -258,14 +179,7 @@ class Limits(NamedTuple):
 
 
 def limits_of(robot: Robots) -> Limits:
-    """Tension limits of the robot or robots.
-
-    Args:
-        robot: The robot or robots.
-
-    Returns:
-        Limits, with a leading axis N for several robots.
-    """
+    """Tension limits of the robot or robots."""
     return Limits(*_each(robot, lambda one: (one.tension_min, one.tension_max)))
 
 
@@ -289,3 +203,46 @@ def _check_alike(first: Robot, other: Robot, index: int) -> None:
     normal, wanted = other.plane_normal, first.plane_normal  # both or neither: the pattern says which
     if normal is not None and wanted is not None and not np.array_equal(normal, wanted):
         raise InvalidValueError(f"robot[{index}]: plane_normal", normal, f"{wanted}, as robot[0]", step)
+
+
+_TINY = 1e-300
+
+
+def outward(robot: Robots, pose: Pose) -> Array:
+    """Horizontal unit vectors from frame anchors to platform ends, (..., m, 2); zero for a vertical one."""
+    anchors = anchors_of(robot)
+    ends = pose.position[..., None, :] + anchors.platform @ np.swapaxes(pose.matrix, -1, -2)
+    level = (ends - anchors.frame)[..., :2]
+    unit: Array = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), _TINY)
+    return unit
+
+
+def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
+    """Points on the pulleys, from where the cables enter them.
+
+    Args:
+        robot: The robot, or one a pose.
+        pose: One pose, or a batch of N: the pulleys have turned towards the platform ends.
+        angle: Along the cable from the frame anchor [rad], shape (..., m); the wrap angle gives the exit point.
+
+    Returns:
+        Points in the world [m], shape (..., m, 3); frame anchors where there is no pulley.
+    """
+    radius, entry = pulleys_of(robot)
+    away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
+    up = (radius * entry * np.sin(angle))[..., None]
+    return np.asarray(anchors_of(robot).frame + np.concatenate((away, up), axis=-1))
+
+
+def pulley_centers(robot: Robot, pose: Pose) -> Array:
+    """Middles of the pulleys [m], shape (m, 3): beside the frame anchors, at their height."""
+    centers = robot.frame_anchors.copy()
+    centers[:, :2] += pulleys_of(robot).radius[:, None] * outward(robot, pose)
+    return locked(centers)
+
+
+def dead_cable(robot: Robots) -> Array:
+    """Length of each cable between pulley and drum [m], (m,) or (N, m): the least length off the drum."""
+    if not isinstance(robot, Robot):
+        return np.stack([dead_cable(one) for one in robot])
+    return np.zeros(robot.cable_count) if robot.winches is None else robot.winches.dead_cable

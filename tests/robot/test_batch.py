@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.robot.wheels import dead_cable, on_wheels, outward, wheel_centers
+from sagline.robot.batch import dead_cable, outward, points_on_pulleys, pulley_centers
 
 BASE = sl.load_robot("article-suspended")
 RADII = [0.05, 0.0, 0.1, 0.2, 0.3, 0.15, 0.25, 0.1]
@@ -21,7 +21,7 @@ def pose_of(seed: int) -> sl.Pose:
 def test_pulleys_stand_beside_their_anchors_towards_the_platform(seed: int) -> None:
     pose = pose_of(seed)
     ends = pose.transform(ROBOT.platform_anchors)
-    away = wheel_centers(ROBOT, pose) - ROBOT.frame_anchors
+    away = pulley_centers(ROBOT, pose) - ROBOT.frame_anchors
     np.testing.assert_allclose(np.linalg.norm(away, axis=1), RADII, atol=1e-15)
     assert not away[:, 2].any()
     reach = (ends - ROBOT.frame_anchors)[:, :2]
@@ -36,7 +36,7 @@ def test_cables_leave_their_pulleys_along_the_force_there(seed: int) -> None:
     plan = sl.inverse(ROBOT, pose)
     assert plan.feasible
     assert plan.wrap_angle is not None
-    centers = wheel_centers(ROBOT, pose)
+    centers = pulley_centers(ROBOT, pose)
     arm = plan.exit_point - centers
     np.testing.assert_allclose(np.linalg.norm(arm, axis=1), RADII, rtol=1e-13, atol=1e-15)
     cables = plan.state.cables
@@ -45,13 +45,13 @@ def test_cables_leave_their_pulleys_along_the_force_there(seed: int) -> None:
     force = np.concatenate((level, (cables.vertical_force - weight)[:, None]), axis=1)
     force /= np.linalg.norm(force, axis=1, keepdims=True)
     np.testing.assert_allclose(np.einsum("ij,ij->i", arm, force), 0.0, atol=1e-9)
-    np.testing.assert_array_equal(on_wheels(ROBOT, pose, plan.wrap_angle), plan.exit_point)
+    np.testing.assert_array_equal(points_on_pulleys(ROBOT, pose, plan.wrap_angle), plan.exit_point)
 
 
 def test_cables_enter_upward_or_downward_at_their_anchors() -> None:
     pose, step = pose_of(9), 1e-6
-    np.testing.assert_array_equal(on_wheels(ROBOT, pose, np.zeros(8)), ROBOT.frame_anchors)
-    first = (on_wheels(ROBOT, pose, np.full(8, step)) - ROBOT.frame_anchors) / step
+    np.testing.assert_array_equal(points_on_pulleys(ROBOT, pose, np.zeros(8)), ROBOT.frame_anchors)
+    first = (points_on_pulleys(ROBOT, pose, np.full(8, step)) - ROBOT.frame_anchors) / step
     np.testing.assert_allclose(first, np.array(RADII)[:, None] * WINCH.swivel_axis, atol=1e-6)
 
 

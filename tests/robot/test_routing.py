@@ -11,8 +11,8 @@ from scipy.optimize import minimize_scalar, root
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.robot.behind import kernel_length
 from sagline.robot.drum import drum_tension
+from sagline.robot.routing import kernel_length
 from tests.tiers import extended
 
 DENSITY, STIFFNESS, GRAVITY = 0.4, 5e4, 9.81

@@ -1,7 +1,7 @@
-"""What really is behind the points where cables leave their pulleys: friction, and spans that hang between guides.
+"""Routing behind the exit points of pulleys: friction, and catenary spans between guides.
 
-Kernels take it as a straight, guided run without friction. That is left as it is, in the energy and the stiffness too:
-here is the difference of unstrained length between what is there and that run; docs/model.md, section 10.
+Kernels take it as a straight, guided run without friction, in the energy and the stiffness too. This module gives the
+difference of unstrained length between the actual routing and that run; docs/model.md, section 10.
 
 Friction: over a bend of the angle psi tensions differ by exp(mu psi), and the pulley's bearing takes the share f; both
 are larger toward the drum while winding in. What the weight on the pulley changes is kept to first order: as if nothing
@@ -27,15 +27,15 @@ from sagline.robot.winch import Winch
 
 PASSES: Final = 40  # of bends that follow from tensions, and tensions from bends; each gains a digit or more
 STEPS: Final = 60  # of Newton's method for one span
-_SETTLED: Final = 1e-15  # change of a length, of that length
-_MOVED: Final = 1e-14  # change of a tension, of that tension
+_TOLERANCE: Final = 1e-15  # change of a length, of that length
+_TENSION_TOLERANCE: Final = 1e-14  # change of a tension, of that tension
 _BALANCED: Final = 1e-12  # what tensions may miss, relatively
 _STEP: Final = 1e-6  # of the tension, for its slope
 _TINY: Final = 1e-300
 
 
-class Behind(NamedTuple):
-    """The part behind the points where cables leave their pulleys, arrays of shape (N, m).
+class Routing(NamedTuple):
+    """Cable behind the exit points, arrays of shape (N, m).
 
     Attributes:
         wrapped: Unstrained length on the pulleys [m].
@@ -48,7 +48,7 @@ class Behind(NamedTuple):
     drum_tension: Array
 
 
-class _Leaving(NamedTuple):
+class _ExitState(NamedTuple):
     """Cables where they leave their pulleys, arrays of shape (K,) for those that are looked at.
 
     Attributes:
@@ -79,11 +79,11 @@ class _Leaving(NamedTuple):
         """Tension behind the pulley [N], after a further bend of its frame anchor [rad]."""
         rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
         drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
-        return _after(rubbed, drop, self.stiffness)
+        return _tension_after(rubbed, drop, self.stiffness)
 
 
 def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
-    """Whether there is a difference to a straight guided run without friction.
+    """Whether the routing differs from a straight guided run without friction.
 
     Args:
         robot: The robot, or one a pose.
@@ -97,8 +97,8 @@ def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
     )
 
 
-def with_behind(state: Equilibrium, winding: Array | None) -> Equilibrium:
-    """An equilibrium of the kernels with what really is behind its pulleys.
+def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
+    """An equilibrium of the kernels with the actual routing behind its pulleys.
 
     Args:
         state: Robot, pose and cables as kernels have them.
@@ -113,7 +113,7 @@ def with_behind(state: Equilibrium, winding: Array | None) -> Equilibrium:
     kept = None if winding is None else locked(np.array(np.broadcast_to(winding, state.cables.shape)))
     contact = replace(state.contact, winding=kept)
     if differs(state.robot, kept):
-        real = real_behind(replace(state, contact=contact))
+        real = actual_routing(replace(state, contact=contact))
         contact = replace(contact, wrapped_length=locked(real.wrapped), dead_length=locked(real.dead))
     return replace(state, contact=contact)
 
@@ -124,61 +124,61 @@ def kernel_length(state: Equilibrium) -> Array:
     if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
         return state.unstrained_length
     plain = replace(state, contact=replace(contact, winding=None))
-    modeled = _each(plain, guided=True)
+    modeled = _routing(plain, guided=True)
     return locked(state.free_length + (modeled.wrapped + modeled.dead))
 
 
-def real_behind(state: Equilibrium) -> Behind:
+def actual_routing(state: Equilibrium) -> Routing:
     """The part behind the pulleys, with its guides, and friction where the state's contact knows the winding.
 
     Args:
         state: An equilibrium with something behind its frame anchors.
 
     Returns:
-        Behind, of the shape of the state's cables.
+        Routing, of the shape of the state's cables.
     """
-    return _each(state, guided=False)
+    return _routing(state, guided=False)
 
 
-def _each(state: Equilibrium, *, guided: bool) -> Behind:
+def _routing(state: Equilibrium, *, guided: bool) -> Routing:
     """The part behind; of several robots one by one. guided: as if it were a straight guided run."""
     if isinstance(state.robot, Robot):
-        return _of_robot(state, state.robot, guided=guided)
-    parts = [_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
-    return Behind(*(np.stack(each) for each in zip(*parts, strict=True)))
+        return _routing_of_robot(state, state.robot, guided=guided)
+    parts = [_routing_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
+    return Routing(*(np.stack(each) for each in zip(*parts, strict=True)))
 
 
-def _of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> Behind:
+def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> Routing:
     contact, winches, shape = state.contact, robot.winches, state.cables.shape
     assert contact is not None
     if winches is None or not winches.anything_behind:
-        return Behind(np.zeros(shape), np.zeros(shape), _tension(state))
+        return Routing(np.zeros(shape), np.zeros(shape), _exit_tension(state))
     if state.cables.model.code == codes.STRAIGHT:  # does not stretch, whatever rubs
         dead = np.broadcast_to(winches.dead_cable, shape)
-        return Behind(winches.pulley_radius * contact.wrap_angle, dead, _tension(state))
-    found = Behind(*(np.full(shape, np.nan) for _ in Behind._fields))
-    known = np.isfinite(_tension(state))
+        return Routing(winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state))
+    found = Routing(*(np.full(shape, np.nan) for _ in Routing._fields))
+    known = np.isfinite(_exit_tension(state))
     if not known.any():
         return found
     cable = np.broadcast_to(np.arange(shape[-1]), shape)[known]
-    leaving = _leaving(state, robot, winches, known, cable)
+    leaving = _exit_state(state, robot, winches, known, cable)
     if guided or winches.guides is None:
         part = _straight_run(leaving, winches.dead_cable[cable], winches.dead_rise[cable])
     else:
         points = np.concatenate((winches.guides, robot.frame_anchors[:, None]), axis=1)[:, ::-1]
-        part = _hanging(leaving, points[cable], winches, robot, state.cables.model, cable)
-    for whole, some in zip(found, (_wrapped(leaving), *part), strict=True):
+        part = _guided_spans(leaving, points[cable], winches, robot, state.cables.model, cable)
+    for whole, some in zip(found, (_wrapped_length(leaving), *part), strict=True):
         whole[known] = some
     return found
 
 
-def _tension(state: Equilibrium) -> Array:
+def _exit_tension(state: Equilibrium) -> Array:
     """Tensions at P as kernels have them there [N]: only the exact cable's differ along it."""
     cables = state.cables
     return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
 
 
-def _leaving(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cable: Indices) -> _Leaving:
+def _exit_state(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cable: Indices) -> _ExitState:
     cables, contact = state.cables, state.contact
     assert contact is not None
     material = robot.cables
@@ -191,8 +191,8 @@ def _leaving(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cab
     wrap, entry = contact.wrap_angle[known], winches.swivel_axis[cable, 2]
     sine = np.sin(wrap)
     sign = np.zeros(wrap.shape) if contact.winding is None else contact.winding[known]
-    return _Leaving(
-        _tension(state)[known],
+    return _ExitState(
+        _exit_tension(state)[known],
         weight[cable],
         material.axial_stiffness[cable],
         wrap,
@@ -205,7 +205,7 @@ def _leaving(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, cab
     )
 
 
-def _after(tension: Array, drop: Array, stiffness: Array) -> Array:
+def _tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
     """Tension [N] where (1 + e)^2 is smaller by a drop: T + T^2/(2 EA) - w z is constant."""
     strain = tension / stiffness
     gained = strain * (2.0 + strain) - drop  # (1 + strain)^2 - 1
@@ -213,7 +213,7 @@ def _after(tension: Array, drop: Array, stiffness: Array) -> Array:
         return np.asarray(stiffness * gained / (1.0 + np.sqrt(1.0 + gained)))
 
 
-def _wrapped(at: _Leaving) -> Array:
+def _wrapped_length(at: _ExitState) -> Array:
     """Unstrained length on the pulleys [m]."""
     strain = at.tension / at.stiffness
     strained = 1.0 + strain
@@ -227,15 +227,15 @@ def _wrapped(at: _Leaving) -> Array:
     return np.asarray(at.radius * (at.wrap - stretched - falls / strained**3))
 
 
-def _straight_run(at: _Leaving, length: Array, rise: Array) -> tuple[Array, Array]:
+def _straight_run(at: _ExitState, length: Array, rise: Array) -> tuple[Array, Array]:
     """Unstrained length of straight guided runs [m], and the tension at the drum [N]."""
     first = at.entering(np.zeros(1))
-    last = _after(first, 2.0 * at.weight * rise / at.stiffness, at.stiffness)
+    last = _tension_after(first, 2.0 * at.weight * rise / at.stiffness, at.stiffness)
     return 2.0 * length / (2.0 + (first + last) / at.stiffness), last
 
 
-def _hanging(
-    at: _Leaving, points: Array, winches: Winch, robot: Robot, model: CableModel, cable: Indices
+def _guided_spans(
+    at: _ExitState, points: Array, winches: Winch, robot: Robot, model: CableModel, cable: Indices
 ) -> tuple[Array, Array]:
     """Unstrained length between pulley and drum [m], and the tension at the drum [N]; points (K, k + 1, 3) from A on.
 
@@ -262,7 +262,7 @@ def _hanging(
             length, tension = length + span.unstrained_length, span.frame_end_tension
             arriving, departing = _tangents(span, step)
             bends[j], leaving = _angle(arriving, leaving), departing
-        settled = np.isnan(length) | (np.abs(length - last) <= _SETTLED * length)
+        settled = np.isnan(length) | (np.abs(length - last) <= _TOLERANCE * length)
         if settled.all() or not at.friction.any():
             break
     return length, tension
@@ -289,7 +289,7 @@ def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity:
         with np.errstate(invalid="ignore", divide="ignore"):
             move = np.where(slope > _STEP, wrong / slope, 0.0)
         chord = chord - np.nan_to_num(move, nan=0.0)
-        if not (np.abs(move) > _MOVED * chord).any():
+        if not (np.abs(move) > _TENSION_TOLERANCE * chord).any():
             break
     wrong, state = missed(chord)
     lost = ~(np.abs(wrong) <= _BALANCED * tension) | ~(chord > least)

@@ -1,0 +1,371 @@
+"""Rates of a plan's lengths and tensions, by its motion an instant before and after each sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from sagline.cables.model import CableState
+from sagline.core.arrays import Array, Flags, Indices, locked
+from sagline.kernels import tables
+from sagline.kinematics.inverse_rows import InverseRows, solve_inverse_rows
+from sagline.motion.path import Path
+from sagline.motion.sampled import spline_rates
+from sagline.robot.batch import Robots, anchors_of, bodies_of, first_of, has_routing, limits_of, robot_at
+from sagline.robot.equilibrium import Equilibrium, cables_of_results, limited_tension
+from sagline.robot.pose import Pose
+from sagline.robot.routing import with_routing
+from sagline.statics.balance import inertial_wrench
+from sagline.statics.tables import pose_rows
+from sagline.tension.method import TensionMethod, shared_tension
+from sagline.tension.methods import Closest
+from sagline.tension.options import kernel_options
+
+SHARE = 1e-5  # of the time in which the motion changes: differences over it are good to 1e-9
+LONGEST = 1e-2  # of the time between samples
+_CONSTANT = 1e-9  # of the largest part of a wrench: what differs by less does not change
+
+
+class Instant(NamedTuple):
+    """Poses, a batch of N, and external plus inertial wrenches (N, 6), at one moment near every sample."""
+
+    pose: Pose
+    wrench: Array
+
+    def part(self, samples: Indices) -> Instant:
+        """Those near some of the samples, (k,)."""
+        return Instant(self.pose[samples], self.wrench[samples])
+
+
+class Instants(NamedTuple):
+    """Moments one step [s] before, one step after and two steps after every sample."""
+
+    before: Instant
+    after: Instant
+    later: Instant
+    step: float
+
+
+def instants(robot: Robots, path: Path, wrench: Array) -> Instants:
+    """Poses and wrenches a step before and after each sample of a path, the step chosen by its speed.
+
+    Args:
+        robot: The robot, or one a sample.
+        path: The path; without a jerk, that is taken from a spline through its accelerations.
+        wrench: External plus inertial wrench at the samples (N, 6); the external part is interpolated by a spline.
+    """
+    jerk = path.jerk if path.jerk is not None else _rate(path.time, path.twist_rate)
+    external = wrench - inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
+    changing = float(np.ptp(external, axis=0).max()) > _CONSTANT * float(np.abs(wrench).max())
+    external_rate = _rate(path.time, external) if changing else np.zeros_like(external)
+    step = _step(path, jerk)
+
+    def at(h: float) -> Instant:
+        pose = _poses_later(path, jerk, h)
+        twist = path.twist + h * (path.twist_rate + 0.5 * h * jerk)
+        inertial = inertial_wrench(robot, pose, twist, path.twist_rate + h * jerk)
+        return Instant(pose, inertial + external + h * external_rate)
+
+    return Instants(at(-step), at(step), at(2.0 * step), step)
+
+
+def _rate(time: Array, values: Array) -> Array:
+    return spline_rates(time, values)[0] if len(time) > 1 else np.zeros_like(values)
+
+
+def _step(path: Path, jerk: Array) -> float:
+    """Step [s]: a small share of the time of a change by a meter or a radian, and of that between samples."""
+    rates = (path.twist, path.twist_rate, jerk)
+    quickest = max(float(np.abs(rate).max()) ** (1.0 / order) for order, rate in enumerate(rates, start=1))
+    between = float(np.diff(path.time).min()) if len(path) > 1 else 1.0
+    return min(LONGEST * between, SHARE / quickest if quickest > 0.0 else np.inf)
+
+
+def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
+    """The poses a time h later, to third order in position and second in orientation, whose third is even in h."""
+    from scipy.spatial.transform import Rotation  # takes a third of the time that sagline takes to load
+
+    move = h * (path.twist + 0.5 * h * (path.twist_rate + h / 3.0 * jerk))
+    turned = path.pose.quaternion
+    if path.twist[:, 3:].any() or path.twist_rate[:, 3:].any():
+        turned = (Rotation.from_rotvec(move[:, 3:]) * path.pose.rotation).as_quat()
+    return Pose.from_quaternion(path.pose.position + move[:, :3], turned)
+
+
+TENSION_STEP = 1e-5  # of a tension, for slopes at a fixed place
+LEAST_STEP = 1e-6  # N, where there is no tension
+AT_LIMIT = 1e-8  # of a tension: as near to its limit it is at it
+OUTWARD = 1e-9  # of the largest rate: a slower one does not leave a limit
+
+
+class PlacedCables(NamedTuple):
+    """Cables of given chord tensions at given poses, and the matrices of their forces.
+
+    Attributes:
+        cables: Their state, fields of shape (N, m).
+        pull: T_z - tau sin phi [N], shape (N, m).
+        structure: Structure matrix J, shape (N, n, m).
+        hanging: The same for forces straight up, shape (N, n, m).
+    """
+
+    cables: CableState
+    pull: Array
+    structure: Array
+    hanging: Array
+
+
+def cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> PlacedCables:
+    """The cables of a batch of N at other poses and chord tensions [N], (N, m)."""
+    anchors, body, shared = anchors_of(state.robot), bodies_of(state.robot), first_of(state.robot)
+    turn = np.swapaxes(pose.matrix, -1, -2)
+    reach = pose.position[:, None] + anchors.platform @ turn - anchors.frame
+    lever = (anchors.platform - body.center_of_mass[..., None, :]) @ turn
+    span, rise = np.hypot(reach[..., 0], reach[..., 1]), reach[..., 2]
+    cables = state.cables.model.from_tension(state.cables.cable, span, rise, chord_tension, shared.gravity)
+    toward = -reach / cables.chord[..., None]
+    up = np.broadcast_to((0.0, 0.0, 1.0), toward.shape)
+    structure, hanging = (
+        shared.freedom @ np.swapaxes(np.concatenate((force, np.cross(lever, force)), axis=-1), -1, -2)
+        for force in (toward, up)
+    )
+    return PlacedCables(cables, cables.vertical_force - chord_tension * rise / cables.chord, structure, hanging)
+
+
+def closest_rates(state: Equilibrium, method: TensionMethod, before: Instant, after: Instant, step: float) -> Array:
+    """Rates of the chord tensions of `Closest` as the platform moves on.
+
+    Each set of tensions is the one nearest to the set before: in the limit, of all rates that keep the balance and do
+    not leave the limits, the smallest in the sharing's variable. Where cables are at limits that the smallest rates
+    would leave, they are held there, the worst first.
+
+    Args:
+        state: A batch of N with tensions.
+        method: `Closest` with its variable and bound.
+        before: Poses and wrenches a step before.
+        after: The same, a step after.
+        step: The step [s].
+
+    Returns:
+        d(tau)/dt [N/s], shape (N, m).
+    """
+    tension = state.cables.chord_tension
+    change = np.maximum(TENSION_STEP * tension, LEAST_STEP)
+    low, high = np.maximum(tension - change, 0.0), tension + change
+    here = cables_at(state, state.pose, tension)
+    by_tension = cables_at(state, state.pose, low), cables_at(state, state.pose, high), high - low
+    by_time = cables_at(state, before.pose, tension), cables_at(state, after.pose, tension), np.full((1, 1), 2.0 * step)
+
+    def slopes(values: Callable[[PlacedCables], Array]) -> tuple[Array, Array]:
+        """d/d(tau) at a held place, and d/dt at held tensions."""
+        by_tau, drift = ((values(last) - values(first)) / by for first, last, by in (by_tension, by_time))
+        return by_tau, drift
+
+    gap, gaps = _nearest_limits(here, state, method)
+    load = (after.wrench - before.wrench) @ first_of(state.robot).freedom.T
+    drift = _supplied_wrench(by_time[1], tension) - _supplied_wrench(by_time[0], tension) + load
+    pull_slope = slopes(lambda cables: cables.pull)[0]
+    return _smallest_rates(
+        _RateConditions(
+            here.structure,
+            here.structure - here.hanging * pull_slope[:, None],
+            -drift / (2.0 * step),
+            *slopes(lambda cables: _variable_tension(cables.cables, method)),
+            *slopes(gaps),
+        ),
+        np.abs(gap) <= AT_LIMIT * np.maximum(tension, 1.0),
+    )
+
+
+class _RateConditions(NamedTuple):
+    """Conditions on the rates x of the chord tensions.
+
+    Attributes:
+        structure: J, whose rows the rates of the sharing's variable are made of, shape (N, n, m).
+        matrix: The balance is kept where matrix x = right, shape (N, n, m).
+        right: Shape (N, n).
+        scale: The sharing's variable changes by scale x + drift, which is to be small, shape (N, m).
+        drift: Shape (N, m).
+        gap_slope: The distance to the nearest limit changes by gap_slope x + gap_drift, shape (N, m).
+        gap_drift: Shape (N, m).
+    """
+
+    structure: Array
+    matrix: Array
+    right: Array
+    scale: Array
+    drift: Array
+    gap_slope: Array
+    gap_drift: Array
+
+    def solved(self, held: Flags) -> Array:
+        """The smallest rates, (N, m), with some cables held at their limits."""
+        count, n, m = self.matrix.shape
+        system, right = np.zeros((count, m + n, m + n)), np.empty((count, m + n))
+        index = np.arange(m)
+        # scale (scale x + drift) = J^T multipliers: the gradient of half the square is a combination of the rows
+        system[:, :m, m:] = -np.swapaxes(self.structure, 1, 2)
+        system[:, :m][held] = 0.0
+        system[:, index, index] = np.where(held, self.gap_slope, self.scale**2)
+        system[:, m:, :m] = self.matrix
+        right[:, :m] = np.where(held, -self.gap_drift, -self.scale * self.drift)
+        right[:, m:] = self.right
+        try:
+            found: Array = np.linalg.solve(system, right[..., None])[:, :m, 0]
+        except np.linalg.LinAlgError:  # somewhere the balance itself determines a cable that is held
+            found = (np.linalg.pinv(system) @ right[..., None])[:, :m, 0]
+        return found
+
+
+def _smallest_rates(conditions: _RateConditions, at_limit: Flags) -> Array:
+    """The smallest rates that leave no limit; cables are held one by one, the one that would leave fastest first."""
+    _, n, m = conditions.matrix.shape
+    held = np.zeros_like(at_limit)
+    rates = conditions.solved(held)
+    for _ in range(m - n):
+        leaving = -(conditions.gap_slope * rates + conditions.gap_drift)
+        leaving = np.where(at_limit & ~held, leaving, 0.0)
+        worst = leaving.argmax(axis=1)
+        rows = np.flatnonzero(leaving.max(axis=1) > OUTWARD * np.abs(rates).max(axis=1))
+        if not rows.size:
+            break
+        held[rows, worst[rows]] = True
+        rates = conditions.solved(held)
+    return rates
+
+
+def _variable_tension(cables: CableState, method: TensionMethod) -> Array:
+    """Tension in the variable of the distribution method."""
+    if method.variable == "frame_end":
+        return cables.frame_end_tension
+    return cables.horizontal_tension if method.variable == "horizontal" else cables.chord_tension
+
+
+def _supplied_wrench(cables: PlacedCables, tension: Array) -> Array:
+    """Wrench of the cables along the free motions, (N, n)."""
+    forces = cables.structure @ tension[..., None] - cables.hanging @ cables.pull[..., None]
+    found: Array = forces[..., 0]
+    return found
+
+
+def _nearest_limits(
+    here: PlacedCables, state: Equilibrium, method: TensionMethod
+) -> tuple[Array, Callable[[PlacedCables], Array]]:
+    """Distance of each cable from its nearest limit (N, m), and that distance as a function of other cables."""
+    limits = limits_of(state.robot)
+
+    def gaps(at: PlacedCables) -> Array:
+        """Distances to all limits (N, m, 2 or 3), positive within."""
+        cables = at.cables
+        limited = limited_tension(state.robot, cables)
+        found = [limited - limits.low, limits.high - limited]
+        if method.lowest_point_margin is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):  # a level cable has no such bound
+                weight = 0.5 * cables.cable.linear_density * cables.gravity * cables.chord
+                bound = weight * cables.chord / np.abs(cables.rise)
+                if method.lowest_point_margin > 0.0:  # on a vertical cable a bound of zero is zero
+                    bound += method.lowest_point_margin * cables.chord / cables.span
+            found.append(np.where(cables.rise == 0.0, np.inf, cables.chord_tension - bound))
+        return np.stack(found, axis=-1)
+
+    nearest = np.abs(gaps(here)).argmin(axis=-1)[..., None]
+
+    def nearest_gap(at: PlacedCables) -> Array:
+        return np.take_along_axis(gaps(at), nearest, axis=-1)[..., 0]
+
+    return nearest_gap(here), nearest_gap
+
+
+def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
+    """Rate of the unstrained lengths while the platform follows the path and the load is shared as planned.
+
+    Geometry and tensions both change: L(t) = L(pose(t), tau(t)). A method that depends on the pose alone is solved
+    again an instant before and after each sample, where the path's twist, its rate and its jerk lead; `Closest` follows
+    the tensions it has, so that its tensions' rates are solved for: of all that keep the balance, the smallest, with
+    cables held at the limits that they would cross. Over pulleys the path is followed for two more steps instead.
+
+    Args:
+        state: Robot, poses, wrench and cables along the path.
+        path: The path; where it knows no jerk, a spline through its accelerations gives it.
+        tension: How the load was shared.
+        feasible: Which samples have an answer, shape (N,).
+
+    Returns:
+        dL/dt [m/s], shape (N, m): good to 1e-8 of its largest value; NaN where the plan has no answer. Where the rate
+        jumps, as where a cable reaches a limit, it is one of the two sides'.
+
+    Source:
+        docs/model.md, section 7.
+    """
+    near = instants(state.robot, path, state.wrench)
+    kept = np.flatnonzero(feasible)
+    rates = np.full(state.cables.shape, np.nan)
+    if not isinstance(tension, Closest):
+        rates[kept] = _resolved_rates(state, tension, near)[kept]
+    elif state.contact is not None:
+        rates[kept] = _one_sided_rates(state, tension, near)[kept]
+    elif kept.size:
+        rates[kept] = _closest_rates(state[kept], tension, near, kept)
+    return locked(rates)
+
+
+def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
+    """Rates from poses solved again an instant before and after; to one side, where the path leaves the feasible."""
+    options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
+    none = np.full(first_of(state.robot).cable_count, np.nan)
+    before, after = (
+        _total_lengths(
+            state,
+            moment,
+            solve_inverse_rows(state.robot, tension, options, pose_rows(moment.pose), locked(moment.wrench), none),
+        )
+        for moment in (near.before, near.after)
+    )
+    sides = (after - before) / (2.0 * near.step)
+    ahead, behind = (after - lengths) / near.step, (lengths - before) / near.step
+    rates: Array = np.where(np.isnan(sides), np.where(np.isnan(ahead), behind, ahead), sides)
+    return rates
+
+
+def _one_sided_rates(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
+    """Rates of `Closest` over pulleys, from two steps on: backward it would leave the limits that hold it."""
+    options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
+    held, moments = shared_tension(state, tension.variable), (near.after, near.later)
+    rows = np.stack([pose_rows(moment.pose) for moment in moments], axis=1)
+    loads = np.stack([moment.wrench for moment in moments], axis=1)
+    freedoms = first_of(state.robot).degrees_of_freedom
+    steps = [InverseRows.empty(len(held), held.shape[1], freedoms, has_routing(state.robot)) for _ in moments]
+    for i in range(len(held)):
+        given = (robot_at(state.robot, i), tension, options, locked(rows[i].copy()), locked(loads[i].copy()))
+        answer = solve_inverse_rows(*given, held[i].copy())
+        for k, step in enumerate(steps):
+            step.results[:, i], step.cable_status[i] = answer.results[:, k], answer.cable_status[k]
+    after, later = (_total_lengths(state, *pair) for pair in zip(moments, steps, strict=True))
+    twice = (4.0 * after - later - 3.0 * lengths) / (2.0 * near.step)
+    rates: Array = np.where(np.isnan(twice), (after - lengths) / near.step, twice)
+    return rates
+
+
+def _total_lengths(state: Equilibrium, moment: Instant, found: InverseRows) -> Array:
+    """Unstrained lengths of solved poses, with the guides and friction of the state."""
+    if state.contact is None:
+        lengths: Array = found.results[tables.LENGTH]
+        return lengths
+    cables, contact = cables_of_results(
+        state.robot, state.cables.model, found.results, found.cable_status, state.pose.shape
+    )
+    there = Equilibrium(state.robot, moment.pose, moment.wrench, cables, contact)
+    return with_routing(there, state.contact.winding).unstrained_length
+
+
+def _closest_rates(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:
+    """Rates of `Closest`, at the samples that have an answer: the state is theirs."""
+    before, after = (moment.part(kept) for moment in (near.before, near.after))
+    rates = closest_rates(state, tension, before, after, near.step)
+    lengths = [
+        cables_at(state, moment.pose, state.cables.chord_tension + h * rates).cables.unstrained_length
+        for moment, h in ((before, -near.step), (after, near.step))
+    ]
+    found: Array = (lengths[1] - lengths[0]) / (2.0 * near.step)
+    return found
