@@ -109,8 +109,8 @@ class Candidates:
                 ):
                     changed["cables"] = chosen.cable
         assumed = {key: why for key, why in self.robot.assumed.items() if key not in changed}
-        told = f"found by sagline from {self.robot.name}"
-        notes = f"{self.robot.notes}; {told}" if self.robot.notes else told
+        origin = f"found by sagline from {self.robot.name}"
+        notes = f"{self.robot.notes}; {origin}" if self.robot.notes else origin
         return self.robot.replace(**changed, name=name, assumed=assumed, notes=notes)
 
     def _column(self, which: int) -> int:

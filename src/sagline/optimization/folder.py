@@ -90,8 +90,8 @@ def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
         if not try_lock(handle, if_unknown=True):
             raise FileError(place, "is in use: another process searches there", "Wait for it, or name another folder.")
         if not exists(place / REQUEST):
-            told = {"request": digest, "robot": request.robot.name, "optimizer": request.optimizer}
-            write_text(place / REQUEST, json_text({**told, "seed": request.seed}) + "\n")
+            stored = {"request": digest, "robot": request.robot.name, "optimizer": request.optimizer}
+            write_text(place / REQUEST, json_text({**stored, "seed": request.seed}) + "\n")
         known, whole = _read(file, heads)
         os.ftruncate(handle, whole)
         record = DesignFolder(file, handle, known)
@@ -134,8 +134,8 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
             raise FileError(place / EVALUATIONS, f"stands without its {REQUEST}: nobody knows of what", ANOTHER)
         return
     try:
-        told = json.loads(read_text(file, 1.0))
-        own = str(told["request"])
+        stored = json.loads(read_text(file, 1.0))
+        own = str(stored["request"])
     except (ValueError, TypeError, KeyError, RecursionError):
         raise FileError(file, "is no request of a search", ANOTHER) from None
     if own != digest:

@@ -51,7 +51,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
 
     Args:
         workers: Number of processes.
-        tell: Told where the dashboard is.
+        tell: Called with the address of the dashboard.
 
     Yields:
         The client.
@@ -142,7 +142,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
         job: Folder and digest.
         numbers: The tasks.
         finish: Told of each that is done.
-        tell: Told that it stops.
+        tell: Called with a text when it stops.
 
     Raises:
         SaglineError: If the scheduler is gone, or a task ends its workers.

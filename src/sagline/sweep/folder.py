@@ -1,7 +1,7 @@
 """Folders of sweeps: a Zarr group with the request in it, one chunk of each variable a task.
 
 Whoever has the folder has the request, to the last bit; so a task is a number, on any machine that sees the folder.
-Chunks carry their checksum: one that is torn is told from one that is whole.
+Chunks carry their checksum: one that is incomplete is recognized.
 """
 
 from __future__ import annotations

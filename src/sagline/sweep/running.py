@@ -82,7 +82,7 @@ def run(
             step = "Leave one of them out."
             raise InvalidValueError("workers", "given with scheduler", "one of the two", step)
         check_package("distributed", "a scheduler")
-    told, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
+    report, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
     check_package("zarr", "sweeps")
     opened = _made(path, request)
     with open_marks(opened) as marks:
@@ -94,11 +94,11 @@ def run(
             done += 1
             left = (time.monotonic() - start) / done * (len(waiting) - done)
             marks.add(number, Mark(seconds, Counts(*counts)), left)
-            if told is not None:
-                told(len(marks.marks), opened.tasks)
+            if report is not None:
+                report(len(marks.marks), opened.tasks)
 
-        if told is not None:
-            told(len(marks.marks), opened.tasks)
+        if report is not None:
+            report(len(marks.marks), opened.tasks)
         job = (str(path.absolute()), opened.digest)
         with _workers(count, scheduler, len(waiting), say) as client:
             start = time.monotonic()

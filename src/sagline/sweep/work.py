@@ -177,7 +177,7 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
     """
     start = time.perf_counter()
     opened = _opened(folder, digest)
-    numbers = opened.read(number)  # of a worker that ended before it told
+    numbers = opened.read(number)  # written by a worker that ended before it reported
     if numbers is None:
         numbers = numbers_of(opened.request, opened.part(number))
         opened.write(number, numbers)

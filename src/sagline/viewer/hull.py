@@ -176,7 +176,7 @@ def hull_of(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull
         The hull.
     """
     region, levels = region_in(asked, rough), asked.levels()
-    levels.told = _Told(told, region)
+    levels.on_block = _Told(told, region)
     found = outline(levels, region)
     closer = None if rough else _around(found, region)
     if closer is not None:

@@ -55,7 +55,7 @@ class Levels:
         tension: Tension distribution method.
         moment_arm: As of `margin` [m].
         held: Axis along which all positions are the same, and their coordinate [m]; None for none.
-        told: Called after each block with its number of poses.
+        on_block: Called after each block with its number of poses.
         middle: Middle of the wrench set, which the tensions balance, shape (6,).
     """
 
@@ -67,7 +67,7 @@ class Levels:
     tension: TensionMethod
     moment_arm: float | None
     held: tuple[int, float] | None = None
-    told: Callable[[int], None] | None = None
+    on_block: Callable[[int], None] | None = None
 
     def __post_init__(self) -> None:
         """Prepare the margin."""
@@ -87,8 +87,8 @@ class Levels:
             own = self._block(self._in_plane(positions[part]))
             for whole, piece in zip(found, own, strict=True):
                 whole[part] = piece
-            if self.told is not None:
-                self.told(len(own.level))
+            if self.on_block is not None:
+                self.on_block(len(own.level))
         return Details(*map(locked, found))
 
     def _in_plane(self, positions: Array) -> Array:

@@ -329,11 +329,11 @@ def prove(
         raise InvalidValueError("wrenches: angular accelerations", "given", "none where the box is tilted", step)
     seconds = number(budget, "budget", "s", above=0.0)
     least = 0.0 if smallest is None else number(smallest, "smallest", "m", above=0.0)
-    told = callback(progress, "progress")
+    report = callback(progress, "progress")
     instance(model, CableModel, "model")
     # loading or compiling the kernel is not part of the budget
     Prover(robot, load, model).verdicts(box.low[None], np.zeros(3))
-    prover = Prover(robot, load, model, progress=told)
+    prover = Prover(robot, load, model, progress=report)
     prover.deadline = time.monotonic() + seconds
     cells = _bisect(prover, box, least)
     extent = box.high - box.low

@@ -24,8 +24,8 @@ from sagline.workspaces.surface import Components, Surface, vertex_areas
 from sagline.workspaces.wrench_sets import WrenchSet
 
 BY_BOX: Final = -1  # of `limiting`: the surface is the face of the box
-MOST_LIMITS: Final = 10  # shares that are told
-_MOST_PARTS: Final = 5  # whose volumes are told
+MOST_LIMITS: Final = 10  # shares that are printed
+_MOST_PARTS: Final = 5  # whose volumes are printed
 _WIDTH: Final = 80  # columns of what is printed
 _HEAD: Final = 12  # of them, before each line
 

@@ -100,7 +100,7 @@ class Components(Result):
     Attributes:
         volume: Of each piece, as of the whole [m^3], shape (K,).
         vertices: The piece of each vertex of the surface, shape (V,).
-        x: Coordinates of the nodes of the grid that tells pieces apart [m], shape (nx,).
+        x: Coordinates of the nodes of the grid that separates the components [m], shape (nx,).
         y: The same along y, shape (ny,).
         z: The same along z, shape (nz,).
         nodes: The piece of each node, -1 outside all of them, shape (nx, ny, nz).

@@ -90,13 +90,13 @@ def workspace(
     """
     asked = _checked(robot, criteria, model, tension)
     count = whole_number(cells, "cells", LEAST_CELLS, MOST_CELLS)
-    told = callback(progress, "progress")
+    report = callback(progress, "progress")
     region = region_of(robot, box, count)
     turned = orientations_of(robot, orientations, region.box.tilt)
     loads = load_of(wrenches)
     arm = None if moment_arm is None else number(moment_arm, "moment_arm", "m", low=0.0)
     levels = Levels(robot, loads, turned, asked, model, tension, arm, flat_axis(region.box))
-    levels.told = None if told is None else _progress_of(told, region.cells)
+    levels.on_block = None if report is None else _progress_of(report, region.cells)
     found = boundary(levels, region.low, region.high, region.cells, refine)
     surface, components = found.surface, found.components
     decided = levels.details(surface.vertices)
