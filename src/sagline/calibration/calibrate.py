@@ -42,7 +42,7 @@ def calibrate(
     folds: int = 5,
     progress: Progress | None = None,
 ) -> Calibration:
-    """What a robot's anchors, zeros and cables really are, from its own readings, and how far that is known.
+    """Actual anchors, zeros and cables of a robot, from its own readings, with their standard errors.
 
     One least squares on exact cables finds all numbers at once, with the true lengths at every pose, which nobody
     knows: what the encoders say of them counts as far as `log.sensors` trusts it. Numbers that the readings do not tell

@@ -1,4 +1,4 @@
-"""Where a robot might stand to be calibrated: feasible poses of a box, each with several sets of tensions."""
+"""Candidates of calibration poses: feasible poses of a box, each with several sets of tensions; short tours."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def _feasible(
 
 
 def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) -> tuple[Codes, Array, Array]:
-    """How each pose was solved, its lengths and its tensions at the frame ends."""
+    """Status of each pose, its lengths and its tensions at the frame ends."""
     try:
         plan = inverse(robot, poses, model, method)
     except CableGeometryError:  # one of them is inside an anchor, or a pulley
@@ -153,7 +153,7 @@ def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) 
 
 
 def _different(tensions: Array) -> Flags:
-    """Which sets of tensions (N, sets, m) are none of those before them at their pose, shape (N, sets)."""
+    """Flags of the sets of tensions (N, sets, m) that differ from those before them at their pose, (N, sets)."""
     apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
     same = apart <= SAME * np.nanmax(tensions, initial=0.0)
     different: Flags = ~np.tril(same, -1).any(axis=-1)
@@ -161,7 +161,7 @@ def _different(tensions: Array) -> Flags:
 
 
 def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
-    """Where the winches have so much cable and their load cells read so much, both of shape (..., m)."""
+    """Flags of lengths and tensions (..., m) within the winches' cable and the range of their load cells."""
     winches = robot.winches
     fits = np.ones(lengths.shape, dtype=np.bool_)
     if winches is not None and winches.cable_length is not None:
@@ -173,7 +173,7 @@ def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
 
 
 def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
-    """That no pose will do, and why most will not."""
+    """Error of a box without a feasible pose, with the most frequent reason."""
     codes, counts = np.unique(statuses, return_counts=True)
     reason = PoseStatus(int(codes[np.argmax(counts)]))
     beyond = "the winches have not so much cable, or their load cells do not read so much"
@@ -210,7 +210,7 @@ def shortest_tour(places: Array) -> Indices:
 
 
 def length_of(places: Array, order: Indices) -> float:
-    """How long a tour is, in the unit of the places.
+    """Length of a tour, in the unit of the places.
 
     Args:
         places: Shape (N, d).

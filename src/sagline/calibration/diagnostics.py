@@ -1,4 +1,4 @@
-"""What looks wrong with a log before anything is calibrated by it: units, columns, signs, times and zeros."""
+"""Diagnostics of a log before a calibration: units, columns, signs, times and zeros."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FULLY: Final = 3  # changes of those that promise most which are tried to the e
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
-    """What looks wrong with a log, in sentences with the next step; none for an honest one.
+    """Likely mistakes in a log, in sentences with the next step; none for a consistent one.
 
     First the sizes of readings: lengths and positions in mm, load cells in kN. Then whether some robot, nearly this
     one, fits some two dozen of the rows. Where none does, the readings are changed, by one mistake at a time (columns
@@ -184,7 +184,7 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
 
 
 def _length_changes(trial: Trial) -> Iterator[Change]:
-    """What may be wrong with lengths or counts, alone or with the load cells of the same cables."""
+    """Possible mistakes in lengths or counts, alone or with the load cells of the same cables."""
     m = trial.robot.cable_count
     for two in combinations(range(m), 2):
         yield Change(lengths=two)
@@ -201,7 +201,7 @@ def _length_changes(trial: Trial) -> Iterator[Change]:
 
 
 def _load_cell_changes(trial: Trial) -> Iterator[Change]:
-    """What may be wrong with the load cells alone."""
+    """Possible mistakes in the load cells alone."""
     if trial.log.load_cells is None:
         return
     for two in combinations(range(trial.robot.cable_count), 2):

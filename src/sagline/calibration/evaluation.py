@@ -165,7 +165,7 @@ def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bo
 def provenance_of(
     parameters: Parameters, standard_error: Array, status: CalibrationStatus, log: str, date: str
 ) -> Provenance:
-    """Where the numbers of a calibrated robot come from, each with its standard error.
+    """Provenance of the numbers of a calibrated robot, each with its standard error.
 
     Args:
         parameters: What was looked for.

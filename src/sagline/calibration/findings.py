@@ -1,4 +1,4 @@
-"""How a calibration ended, and why rows of a log were left out."""
+"""Findings of a calibration as data: status, omitted rows, directions, outliers, cross-validation."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sagline.robot.robot import Robot
 
 
 class CalibrationStatus(Status):
-    """How a calibration ended; `text` says what to do."""
+    """Status of a calibration; `text` says what to do."""
 
     FOUND = 0, "found"
     DOUBTFUL = (
@@ -78,7 +78,7 @@ class Outlier(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CrossValidation(Result):
-    """How well poses are predicted that the calibration did not see.
+    """Errors of predictions at poses that the calibration did not use.
 
     Attributes:
         folds: Into how many parts the poses were divided.

@@ -1,4 +1,4 @@
-"""What may be wrong with a log that no robot fits: each is tried on some rows, and how well the rest then fits."""
+"""Hypotheses on a log that no robot fits: each change of the readings is tested on some of the rows."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _WIDE: Final = {
 
 
 class Change(NamedTuple):
-    """How readings are taken instead of as they are.
+    """A change of the readings.
 
     Attributes:
         lengths: Two cables whose lengths or counts are exchanged, or None.
@@ -56,7 +56,7 @@ class Change(NamedTuple):
 
 
 class TrialResult(NamedTuple):
-    """What came of a change.
+    """Fit of the readings after a change.
 
     Attributes:
         quality: Median over the rows of the sum of squares for each reading: 1 where a robot fits as well as the
@@ -90,7 +90,7 @@ class Trial:
     found: dict[tuple[Change, int], Pose] = field(default_factory=dict)
 
     def result(self, change: Change) -> TrialResult:
-        """How well any robot like this one fits the readings.
+        """Fit of any robot like this one to the readings.
 
         Args:
             change: How they are taken.
@@ -107,7 +107,7 @@ class Trial:
         return TrialResult(quality, departure, moved + off[zeros])
 
     def promise(self, change: Change, steps: int) -> float:
-        """What the least squares promise of the sum of squares for each row after some steps; infinite for nothing.
+        """Predicted sum of squares for each row after some steps of the least squares; infinite without a fit.
 
         Args:
             change: How the readings are taken.
@@ -140,7 +140,7 @@ class Trial:
         return sorted((change for change in promises if promises[change] < limit), key=promises.__getitem__)[:most]
 
     def offsets(self) -> tuple[Array, Array]:
-        """How far lengths are from those that hold the platform where it was commanded.
+        """Distance of lengths from those that hold the platform at the commanded poses.
 
         Returns:
             Median of what is read less what holds it, and the median distance from that [m], both of shape (m,).
@@ -182,7 +182,7 @@ class Trial:
         return problem, poses, moved
 
     def _poses(self, problem: Problem, change: Change, most: int) -> Pose | None:
-        """Where the lengths put the platform, or None where they put it nowhere."""
+        """Poses by forward kinematics of the lengths; None where there is an unsolved one."""
         key = change._replace(cells=None), most
         if key not in self.found:
             rows = start_of(problem, None).poses

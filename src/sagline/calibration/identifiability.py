@@ -1,4 +1,4 @@
-"""What the readings leave open: directions in the unknowns that change nothing that is read, each by its name."""
+"""Unobservable directions of the parameters: combinations that change no reading, each with its name."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def open_directions(triangle: Array, frame: PriorUnits) -> Array:
 
 
 def told(values: Array) -> int:
-    """How many singular values, falling, are more than rounding: those above the widest gap near `OPEN`."""
+    """Number of singular values, falling, above rounding: those above the widest gap near `OPEN`."""
     largest = values[0] if values.size else 0.0
     if largest == 0.0:
         return 0
@@ -255,7 +255,7 @@ def measurement_rank(name: str) -> int:
 
 
 def easiest_measurement(names: Iterable[str]) -> str:
-    """What tells numbers of some kinds apart with the least work.
+    """Measurement that separates numbers of some kinds with the least work.
 
     Args:
         names: Of `unknowns.KINDS`.

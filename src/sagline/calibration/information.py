@@ -1,4 +1,4 @@
-"""What poses tell together, and which of many tell most: greedy choice by the determinant, and exchanges."""
+"""Information of poses on the parameters, and D-optimal choice of poses: greedy, with exchanges."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _WORTH: Final = 1e-9  # of a log det: an exchange that gains less is rounding
 
 
 class Information:
-    """What some of N candidates tell of P numbers, each candidate by k rows of one standard deviation.
+    """Information of some of N candidates on P parameters, each candidate with k whitened rows.
 
     Attributes:
         rows: Slopes of the readings by the numbers, shape (N, k, P).
@@ -38,7 +38,7 @@ class Information:
         self.covariance, self._heard = self._recompute()
 
     def gains(self) -> Array:
-        """By how much each candidate would raise the log det of what is known, shape (N,); -1 for what was taken."""
+        """Gain of log det of the information by each candidate, shape (N,); -1 for those chosen."""
         gains: Array = np.linalg.slogdet(self._unit + self._heard)[1]
         gains[self.chosen] = -1.0
         return gains
@@ -72,7 +72,7 @@ class Information:
 
 
 def prior_information(rows: Array) -> Array:
-    """What is taken as known of each number where priors are its unit: 1, but no less than rounding of what is told.
+    """Prior information in units of the priors: 1, but no less than rounding of what is observed.
 
     Args:
         rows: Slopes of the readings of all candidates, shape (N, k, P).
@@ -158,7 +158,7 @@ def deviations_of(rows: Array, held: Array) -> Array:
 
 
 def information_of(rows: Array) -> Array:
-    """What readings tell together: the sum of J^T J.
+    """Information of readings: the sum of J^T J.
 
     Args:
         rows: Slopes of readings of one standard deviation each, shape (..., P).

@@ -30,7 +30,7 @@ def _default_if_none(sensors: Sensors | None) -> Sensors:
 
 @frozen(eq=False, weakref_slot=False)
 class Sensors(Result):
-    """What measures a robot: standard deviations, and where its measuring system stands.
+    """Accuracy of a robot's sensors, and the pose of its measuring system.
 
     Attributes:
         length_deviation: Standard deviation of a length off a drum, by counts or given [m], > 0, shape () or (m,).
@@ -221,7 +221,7 @@ class WinchLog(Result, Saved):
         return evolve(self, **changes)
 
     def __str__(self) -> str:
-        """How many rows of what."""
+        """Number of rows and the kinds of readings."""
         n, m = self.readings.shape
         parts = ["counts" if self.counts is not None else "lengths"]
         for values, one, many in (

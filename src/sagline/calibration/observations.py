@@ -88,7 +88,7 @@ def _given(of: Winch | Cable, name: str) -> Array:
 
 
 class Observed(NamedTuple):
-    """What N equilibria tell, whitened: every row one standard deviation, independent of the others.
+    """Whitened observations at N equilibria: independent rows of one standard deviation each.
 
     R is m + 6, or m where no system measures positions or rotations.
 

@@ -1,4 +1,4 @@
-"""What a calibration may ask for: kinds of unknowns, and the single numbers that they are."""
+"""Unknowns of a calibration: their kinds, the parameters of a robot, and robots with other parameters."""
 
 from __future__ import annotations
 
@@ -230,7 +230,7 @@ def _listed(unknowns: Any) -> list[Any]:
 
 
 def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
-    """What there is of a kind, shape (m or 1, axes)."""
+    """Values of a kind, shape (m or 1, axes)."""
     m = robot.cable_count
     if name == "measuring_frame":
         return np.concatenate((sensors.frame.position, np.zeros(3)))[None]
@@ -250,7 +250,7 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
 
 
 def _field(robot: Robot, name: str) -> Array | None:
-    """What a robot has of a kind; None where it has none."""
+    """Values of a kind in a robot; None where it has none."""
     owner = robot if name in _OF_ROBOT else robot.cables if name in _CABLE_FIELDS else robot.winches
     value: Array | None = None if owner is None else getattr(owner, name)
     return value
@@ -290,7 +290,7 @@ def _shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
 
 
 def _deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> tuple[Array, bool]:
-    """What is known beforehand, in the unit of the kind, shape of own; and whether somebody said so."""
+    """Prior deviation in the unit of the kind, shape of own, and whether it was stated."""
     if unknown.deviation is not None:
         width = np.full(own.shape, unknown.deviation)
         return (width * np.abs(own) if kind.logarithmic else width), True
@@ -318,7 +318,7 @@ def external(parameters: Parameters, found: Array) -> Array:
 
 
 def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
-    """How the values of a robot change with what is looked for: themselves where logarithms are, else 1; (P,)."""
+    """Slopes of the values by the internal parameters (P,): the value itself for logarithms, else 1."""
     slopes = np.ones(len(parameters.names))
     for name in dict.fromkeys(parameters.names):
         kind = KINDS[name]
@@ -383,7 +383,7 @@ def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sen
 
 
 def offset_with(robot: Robot, parameters: Parameters, values: Array) -> Array:
-    """What is to be added to lengths that the machine believes [m], (m,)."""
+    """Offset of reported lengths [m], (m,)."""
     if parameters.counted or "length_zero" not in parameters.names:
         return np.zeros(robot.cable_count)
     offset: Array = values[parameters.where[kinds.ZERO]]

@@ -74,7 +74,7 @@ class CalibrationPoses(Result, Saved):
         return len(self.poses)
 
     def __str__(self) -> str:
-        """What to expect of them, in lines of at most 80 columns."""
+        """Expected errors, in lines of at most 80 columns."""
         return in_words(self)
 
     def table(self) -> str:
@@ -83,7 +83,7 @@ class CalibrationPoses(Result, Saved):
 
 
 def in_words(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """What to expect of poses to calibrate by, beside random ones, in lines of at most 80 columns.
+    """Expected errors of calibration poses, beside random ones, in lines of at most 80 columns.
 
     Args:
         plan: The poses.

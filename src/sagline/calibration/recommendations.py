@@ -1,4 +1,4 @@
-"""Which measurement beside the readings would tell most of what is unknown."""
+"""Recommended measurements: those beside the readings that are most informative of the unknowns."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ BESIDE: Final[dict[str, Tool]] = {
 
 
 class Situation(NamedTuple):
-    """What will be known after the poses.
+    """Information on the parameters after the poses.
 
     Attributes:
         robot: The robot.
@@ -80,7 +80,7 @@ class Situation(NamedTuple):
         return told
 
     def read_by(self, sensors: Sensors) -> Array:
-        """What the poses tell when other sensors read, in the scale, shape (N, m + 6, P)."""
+        """Whitened rows of the poses with other sensors, in the scale, shape (N, m + 6, P)."""
         poses, lengths = self.standing.poses, self.standing.lengths
         rows: Array = (
             predicted_rows(self.robot, self.model, self.parameters, sensors, poses, lengths).matrix * self.scale
@@ -101,7 +101,7 @@ class Recommendation(NamedTuple):
 
 
 def most_helpful(situation: Situation) -> str:
-    """Which further measurement lowers the errors most, on average of their logarithms.
+    """Recommended measurement: the one that lowers the errors most, on average of their logarithms.
 
     Args:
         situation: What will be known without it.
@@ -196,7 +196,7 @@ def _deviations(known: Array) -> Array:
 
 
 def _largest_reduction(situation: Situation, before: Array, after: Array) -> str:
-    """By how much the errors of the kind fall that fall most."""
+    """Largest reduction of errors among the kinds."""
     names = np.array(situation.parameters.names)
     name = min(dict.fromkeys(names), key=lambda name: float(np.log(after / before)[names == name].mean()))
     mine = names == name

@@ -1,4 +1,4 @@
-"""Where the platform is to be expected around a commanded pose, after a calibration."""
+"""Result of a calibration, and the expected errors of commanded poses."""
 
 from __future__ import annotations
 
@@ -157,11 +157,11 @@ class Calibration(Findings, Saved):
         return float(self.values[k]), float(self.standard_error[k])
 
     def __str__(self) -> str:
-        """What was found and how far it is to be trusted, in lines of 80 columns, the verdict first."""
+        """Values with their standard errors and diagnostics, in lines of 80 columns, the verdict first."""
         return summary.in_words(self)
 
     def pose_error(self, pose: Pose) -> PoseError:
-        """How far from a commanded pose the platform is to be expected, with this calibration.
+        """Expected error of the platform at a commanded pose, with this calibration.
 
         The lengths that `inverse` gives the calibrated robot are paid out by the true one: what the calibration does
         not know moves the platform, and what the winches' lengths are off, `sensors.length_deviation`.
@@ -186,7 +186,7 @@ class Calibration(Findings, Saved):
         return PoseError(pose, locked(whole.reshape(*shape, 6, 6)), locked(own.reshape(*shape, 6, 6)))
 
     def forward(self, unstrained_length: ArrayLike, start: Pose | None = None) -> ForwardSolution:
-        """Where the platform rests at lengths that the machine believes, with the covariance of that.
+        """Pose of the platform at reported lengths, with its covariance.
 
         Args:
             unstrained_length: [m], shape (m,) or (N, m); `length_offset` is added to them.

@@ -1,4 +1,4 @@
-"""Which rows of a log are fit for a calibration, and why the others are not."""
+"""Screening of a log: rows fit for a calibration, and reasons for the others."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
 
 
 def reading_count(log: WinchLog) -> int:
-    """How many readings of a log tell of unknowns: lengths do not, every row has as many unknown lengths as read ones.
+    """Number of informative readings: lengths are none, every row has as many unknown lengths as read ones.
 
     Args:
         log: The log.

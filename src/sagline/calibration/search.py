@@ -37,7 +37,7 @@ FAR: Final = 0.03  # m from where the lengths that were read put it: another equ
 
 
 class SearchResult(NamedTuple):
-    """How the search for all numbers ended.
+    """Result of the search for all parameters.
 
     Attributes:
         fit: The last of them.
@@ -98,13 +98,13 @@ def search_from_priors(
 
 
 def _without_equilibrium(current: Evaluated) -> Flags:
-    """Which poses find no equilibrium, (N,)."""
+    """Flags of the poses without an equilibrium, (N,)."""
     lost: Flags = ~np.isfinite(current[1].squares)
     return lost
 
 
 def _improbable(fit: Fit, kept: Flags) -> Flags:
-    """Which poses fit so badly that no noise does it, (N,)."""
+    """Flags of the poses whose misfit no noise explains, (N,)."""
     limit = exceeded_with(STRANGE, fit.normal.readings)
     improbable: Flags = kept & (fit.normal.squares > limit)
     return improbable
@@ -122,7 +122,7 @@ def _restart(problem: Problem, state: State, which: Flags) -> State:
 
 
 def _single_cable_outliers(problem: Problem, state: State, which: Flags) -> Flags:
-    """Which of some poses, if they are few, are as they were read but for single cables: outliers that count little."""
+    """Flags of the poses, among few ones, that fit but for single cables: outliers of little weight."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))
@@ -131,7 +131,7 @@ def _single_cable_outliers(problem: Problem, state: State, which: Flags) -> Flag
 
 
 def _other_equilibrium(problem: Problem, state: State, which: Flags) -> Flags:
-    """Which of some poses are far from where the lengths that the winches say put the platform, (N,)."""
+    """Flags of the poses, among some, far from those by forward kinematics of the reported lengths, (N,)."""
     reported = reported_lengths(problem, state.machine, slice(None))[which]
     found = search(state.machine.robot, problem.model, locked(reported), NO_LOAD, None)
     far = which.copy()

@@ -60,7 +60,7 @@ def table(found: Findings) -> str:
 
 
 def outlier_text(outlier: Outlier) -> str:
-    """What does not fit: of which row of the log and which cable, by how much.
+    """Text of an outlier: row of the log, cable and size.
 
     Args:
         outlier: One of a calibration.
@@ -103,7 +103,7 @@ def chi_squared_text(found: Findings) -> str:
 
 
 def _verdict(found: Findings, width: int) -> Iterator[str]:
-    """How it ended; what is doubtful is said before anything else."""
+    """Verdict; doubts come first."""
     source = found.log or "the log"
     what = f"{len(found.values)} numbers of {found.robot.name} from {counted(len(found.rows), 'pose')} of {source}"
     when = f", {found.date}" if found.date else ""
@@ -121,7 +121,7 @@ def _verdict(found: Findings, width: int) -> Iterator[str]:
 
 
 def _rows(found: Findings, width: int) -> Iterator[str]:
-    """How many rows were used, and why the others were not."""
+    """Number of rows used, and the reasons for the others."""
     left = {reason: rows for reason, rows in found.left_out.items() if len(rows)}
     count = sum(map(len, left.values()))
     if not count:
@@ -133,7 +133,7 @@ def _rows(found: Findings, width: int) -> Iterator[str]:
 
 
 def _values(found: Findings, width: int) -> Iterator[str]:
-    """What was found, by kinds."""
+    """Values by kinds."""
     yield "Values ± standard errors:"
     numbers = found.parameters
     for name in dict.fromkeys(numbers.names):
@@ -153,7 +153,7 @@ def _values(found: Findings, width: int) -> Iterator[str]:
 
 
 def _moved(found: Findings, mine: list[int]) -> str:
-    """By how much the largest of some numbers has moved, and whose it is."""
+    """Largest change among some numbers, and its cable."""
     numbers = found.parameters
     moved = np.abs(found.values[mine] - numbers.prior[mine])
     units = {numbers.units[k] for k in mine}
@@ -234,7 +234,7 @@ def _together(directions: Sequence[Direction]) -> Iterator[str]:
 
 
 def _outliers(found: Findings, width: int) -> Iterator[str]:
-    """What does not fit, where the platform stood then."""
+    """Outliers, with the position of the platform."""
     if not found.outliers:
         yield "Outliers: none"
         return
@@ -299,7 +299,7 @@ def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors)
 
 
 def without_motion(points: Array, which: Anchors) -> Array:
-    """What takes out of small moves of anchors that which moves all of them together.
+    """Projection of small moves of anchors without their common rigid motion (S-transformation).
 
     Shifts are taken out, and turns of which no reading could tell: of the frame those about the vertical, of the
     platform all three, since its own axes are where its anchors say.
@@ -323,7 +323,7 @@ def without_motion(points: Array, which: Anchors) -> Array:
 
 
 def relative_covariance(points: Array, covariance: Array, which: Anchors) -> Array:
-    """What is left of the covariance of anchors without what moves all of them together.
+    """Covariance of anchors relative to one another, without their common rigid motion.
 
     Args:
         points: The anchors [m], shape (m, 3).

@@ -96,7 +96,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
 
 
 def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
-    """How the length off each drum follows what is known of the winch, as a + b L.
+    """Coefficients a [m] and b of the length off each drum, a + b L, by the data of the winch.
 
     Args:
         robot: The robot.

@@ -1,4 +1,4 @@
-"""What the readings hardly tell: combinations of unknowns of which little more is known than before, and pairs."""
+"""Weakly identifiable parameters: combinations with little information beyond the prior, and correlated pairs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Group(NamedTuple):
 
 
 def cannot_tell_apart(triangle: Array, parameters: Parameters, gauge: tuple[Direction, ...]) -> tuple[Direction, ...]:
-    """What the readings hardly tell, beside what they leave open.
+    """Weakly identifiable directions, beside the unobservable ones.
 
     Args:
         triangle: Triangular factor of the whitened slopes of all readings, by `folded`, (at most P, P).
@@ -106,7 +106,7 @@ def _weak_directions(
 def _words(
     vector: Array, parameters: Parameters, groups: list[Group], kinds: Indices, member: Array
 ) -> tuple[str, ...]:
-    """What a direction changes most: kinds of numbers, or their axis or the single one that has nearly all of it.
+    """Names of a direction: kinds of numbers, or the axis or single number that has nearly all of it.
 
     Args:
         vector: The direction, (P,).

@@ -1,4 +1,4 @@
-"""What a control loop gives and gets: numbers into memory of ours and out of it, checked within some ten nanoseconds.
+"""Fast copies of a control loop's numbers into and out of work arrays, checked within some ten nanoseconds.
 
 A view of memory takes an array of its own kind and size and no other, which costs less than numpy takes to copy one.
 """

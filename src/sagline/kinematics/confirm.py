@@ -48,7 +48,7 @@ class Confirmation(Result):
 
     @property
     def position_error(self) -> Array:
-        """Where the platform origin is less where it was planned [m], world axes, shape (3,) or (N, 3)."""
+        """Position of the platform origin less the planned one [m], world axes, shape (3,) or (N, 3)."""
         return locked(self.pose.position - self.plan.state.pose.position)
 
     @property
@@ -100,7 +100,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
 
 
 def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
-    """Where the platform rests on a state's lengths, with its friction; from the planned tensions where it counts."""
+    """Forward kinematics of a state's lengths, with its friction."""
     robot, winding = state.robot, None if state.contact is None else state.contact.winding
     if not differs(robot, winding):
         return forward(robot, state.unstrained_length, state.pose, wrench=state.wrench, progress=progress)

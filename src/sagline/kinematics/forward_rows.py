@@ -63,7 +63,7 @@ class ForwardSolution(Result):
 
     @property
     def pose(self) -> Pose:
-        """Where the platform rests."""
+        """Pose of the platform."""
         return self.state.pose
 
     @property
@@ -78,7 +78,7 @@ class ForwardSolution(Result):
 
     @property
     def slack(self) -> Flags:
-        """Which cables hang rather than pull, shape (m,) or (N, m): tau at most half the weight of the chord's length.
+        """Flags of slack cables, shape (m,) or (N, m): tau at most half the weight of the chord's length.
 
         Such a cable sags by a quarter of its chord or more. A weightless one is slack when it carries nothing.
         """

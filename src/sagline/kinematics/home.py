@@ -125,7 +125,7 @@ def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Arr
 
 
 def _cell_reading(robot: Robot, cable: int, tension: float) -> float:
-    """What a load cell reads of a tension."""
+    """Reading of a load cell at a tension."""
     if robot.winches is None:
         return tension
     return float(tension * robot.winches.load_cell_gain[cable] + robot.winches.load_cell_bias[cable])

@@ -121,7 +121,7 @@ class Plan(Result, Saved):
 
     @property
     def exit_point(self) -> Array:
-        """Where the cables leave the frame, world axes [m], shape (m, 3) or (N, m, 3)."""
+        """Exit points of the cables at the frame, world axes [m], shape (m, 3) or (N, m, 3)."""
         return self.state.exit_point
 
     @property
@@ -147,7 +147,7 @@ class Plan(Result, Saved):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What stands, but is to be taken with care: poses out of the robot's plane, at the border, out of validity."""
+        """Warnings: poses out of the robot's plane, at the border of feasibility, out of a model's validity."""
         return (*self._turned_away(), *self._out_of_plane(), *self._at_the_border(), *self._below_validity())
 
     def _turned_away(self) -> tuple[str, ...]:

@@ -95,7 +95,7 @@ def from_orientations(
 
 
 def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Array:
-    """Where the platform hangs a little below the middle of the frame ends, as far as it can move.
+    """Positions a little below the middle of the frame ends, as far as the platform can move.
 
     Not in the middle itself, because the two ends of a single cable must not coincide.
 
@@ -149,7 +149,7 @@ def start_quaternions(robot: Robot) -> Array:
 
 
 def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indices:
-    """How many cables of each sample are outside their robot's tension limits.
+    """Number of cables of each sample outside their robot's tension limits.
 
     Args:
         robot: The robot, or one a sample.

@@ -1,4 +1,4 @@
-"""Which way drums turn, and poses from lengths over guides and with friction."""
+"""Winding directions of drums, and forward kinematics with guides and friction."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]])
 
 
 def _routing_change(robot: Robots, model: CableModel, found: ForwardRows, winding: Array | None) -> Array:
-    """What guides and friction add to the lengths behind the pulleys [m], (N, m); NaN where a cable is too slack."""
+    """Change of the lengths behind the pulleys by guides and friction [m], (N, m); NaN for a too slack cable."""
     shape = (len(found.poses),)
     plain = found.solution(robot, model, np.zeros(6), shape).state
     real = with_routing(plain, winding)

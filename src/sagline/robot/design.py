@@ -26,7 +26,7 @@ _POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # a triangle in the 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
-    """What a first robot is made from.
+    """Data of a first robot.
 
     Attributes:
         name: What the robot is called.

@@ -177,7 +177,7 @@ def drums_of(robot: Robot) -> Drums:
 
 
 def not_given(names: Sequence[str]) -> tuple[str, str]:
-    """What a message says of data that are missing.
+    """Item and value of a message on missing data.
 
     Args:
         names: Of one or more, "winches: drum_radius" for instance, those of one kind in a row.
@@ -212,7 +212,7 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 
 
 def _layer_starts(winches: Winch, table: Array) -> Array:
-    """Where the layers begin: all the cable less what lies below, less the slant of the run to the pulley there."""
+    """Lengths at which layers begin: all the cable less that of the layers below and the slant of the run."""
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
     whole = np.zeros(len(table)) if known is None else known  # without cable_length, turns count from length_zero
@@ -268,7 +268,7 @@ def drum_tension(state: Equilibrium) -> Array:
 
 
 def warmth(robot: Robot, temperature: Any) -> Array | float:
-    """By what factor cables are longer than where lengths hold.
+    """Factor of thermal elongation of the cables.
 
     Args:
         robot: The robot.

@@ -1,4 +1,4 @@
-"""What lies behind the free spans of cables that run over pulleys, or have dead cable behind their frame anchors."""
+"""Equilibrium of a robot: pose of its platform, state of its cables, and contact with pulleys."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from sagline.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact(Result):
-    """Where cables leave their pulleys, and what of them is behind; fields of shape (m,) or (N, m).
+    """Cables on pulleys and dead cable behind them; fields of shape (m,) or (N, m).
 
     Attributes:
         wrap_angle: Psi, the angle over which a cable lies on its pulley [rad].
@@ -49,7 +49,7 @@ class Contact(Result):
     winding: Array | None = None
 
     def part(self, index: Index) -> Contact:
-        """That of a part of a batch.
+        """Contact of a part of a batch.
 
         Args:
             index: As of an array.
@@ -107,14 +107,14 @@ class Equilibrium(Result):
 
     @property
     def pull(self) -> Array:
-        """What the weight of the cables adds to the vertical force at their ends, T_z - tau sin phi [N]."""
+        """Sag force of the cables: vertical force at their ends by their weight, T_z - tau sin phi [N]."""
         cables = self.cables
         sine = cables.rise / cables.chord if self.contact is None else self.contact.chord_sine
         return locked(cables.vertical_force - self.chord_tension * sine)
 
     @property
     def exit_point(self) -> Array:
-        """Where the cables leave the frame, world axes [m], shape (m, 3) or (N, m, 3): pulleys, or frame anchors."""
+        """Exit points of the cables on pulleys, or frame anchors, world axes [m], shape (m, 3) or (N, m, 3)."""
         if self.contact is None:
             return locked(np.array(np.broadcast_to(anchors_of(self.robot).frame, (*self.cables.shape, 3))))
         return locked(points_on_pulleys(self.robot, self.pose, self.contact.wrap_angle))

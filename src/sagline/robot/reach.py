@@ -85,7 +85,7 @@ def in_words(turn: Array) -> str:
 
 
 def out_of_plane(robot: Robot, pose: Pose) -> Array:
-    """How far the cables of a planar robot, if they lie in one plane, are out of it.
+    """Distance of the cables of a planar robot, if they lie in one plane, from it.
 
     Args:
         robot: The robot.

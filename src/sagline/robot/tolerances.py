@@ -1,4 +1,4 @@
-"""How far the numbers of a robot may be off: which of them may have a tolerance, in which unit and shape."""
+"""Tolerances of a robot's numbers, their names, units and shapes; provenance of calibrated numbers."""
 
 from __future__ import annotations
 

@@ -176,7 +176,7 @@ class Winch:
         )
 
     def _long(self) -> str:
-        """What has surely been given as one value a cable, for a message: what differs among them.
+        """Names for a message of the fields that differ among the cables.
 
         All fields have one shape, and do not know any more which of them had it first.
         """
