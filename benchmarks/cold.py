@@ -21,7 +21,7 @@ import sys, threading, time
 import sagline as sl
 from sagline.cli.readings import Readings
 import numpy as np
-from sagline.viewer.hull import Asked, hull_of
+from sagline.viewer.hull import WorkspaceQuery, region_hull
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Reading, Viewer
 
@@ -35,8 +35,8 @@ def watch():
     print(time.time() - begun, flush=True)
     while not readings.ready(Reading.WORKSPACE):
         time.sleep(0.05)
-    asked = Asked(viewer.view.snapshot.robot, np.array([0.0, 0.0, 0.0, 1.0]), sl.Catenary(), sl.WrenchBox())
-    hull_of(asked, True, lambda *_: None)
+    asked = WorkspaceQuery(viewer.view.snapshot.robot, np.array([0.0, 0.0, 0.0, 1.0]), sl.Catenary(), sl.WrenchBox())
+    region_hull(asked, True, lambda *_: None)
     print(time.time() - begun, flush=True)
     while not all(map(readings.ready, Reading)):
         time.sleep(0.05)

@@ -15,7 +15,7 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, print_table
-from sagline.viewer.hull import Asked, hull_of, region_in
+from sagline.viewer.hull import WorkspaceQuery, region_hull, region_in
 from sagline.viewer.server import started, stop
 from sagline.viewer.viewer import Viewer
 from tests.viewer.client import Client, await_that
@@ -77,7 +77,7 @@ def regions() -> Iterator[Row]:
     """After a slider moved, until a client has heard of the region in full."""
     for name in ROBOTS:
         robot = sl.load_robot(name)
-        cells = region_in(Asked(robot, LEVEL, sl.Catenary(), sl.WrenchBox()), rough=False).cells
+        cells = region_in(WorkspaceQuery(robot, LEVEL, sl.Catenary(), sl.WrenchBox()), rough=False).cells
         with shown(robot) as (_, client, mass):
             times = []
             for k in range(MOVES):
@@ -91,12 +91,12 @@ def regions() -> Iterator[Row]:
 def work() -> Iterator[Row]:
     """What it takes of a processor, with the rough one that comes first."""
     robot = sl.load_robot("cogiro")
-    asked = Asked(robot, LEVEL, sl.Catenary(), sl.WrenchBox())
+    asked = WorkspaceQuery(robot, LEVEL, sl.Catenary(), sl.WrenchBox())
     taken = []
     for _ in range(MOVES):
         start = time.thread_time()
         for rough in (True, False):
-            hull_of(asked, rough, lambda *_: None)
+            region_hull(asked, rough, lambda *_: None)
         taken.append(time.thread_time() - start)
     yield Row("the same of cogiro, of a processor", "", f"{min(taken):.2f} s")
 

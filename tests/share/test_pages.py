@@ -94,7 +94,7 @@ def test_a_run_plays(
         drawn = np.array(asking(page, DRAWN))
         robot = plan.state.one_robot
         state = plan.state[k]
-        expected = lines.hanging(lines.chords(robot, state.pose), state.cables, 1.0)
+        expected = lines.catenaries(lines.chords(robot, state.pose), state.cables, 1.0)
         sag = float(np.max(state.cables.sag))
         np.testing.assert_allclose(drawn, expected, rtol=0.0, atol=2.0 * POSITION + TENSION * sag)
         before = pixels(page)

@@ -18,8 +18,8 @@ from viser._messages import ViewerCameraMessage
 import sagline as sl
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.playback import Run
+from sagline.viewer.robot_scene import PLATFORM
 from sagline.viewer.server import started, stop
-from sagline.viewer.stage import PLATFORM
 from sagline.viewer.viewer import Viewer
 from tests.calibration.made_up import made_up
 from tests.chromium import NEEDED, PATIENCE, launched
@@ -213,11 +213,11 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         page.get_by_text("parabolic").wait_for()
         least_contrast(page)
         page.keyboard.press("Escape")
-        viewer.page.stage.gizmo.position = np.array([7.4, 5.4, 1.5])
+        viewer.page.scene.gizmo.position = np.array([7.4, 5.4, 1.5])
         viewer.refresh()
         page.get_by_text("Not feasible", exact=True).wait_for()
         least_contrast(page)
-        viewer.page.stage.gizmo.position = np.array([np.nan, 0.0, 0.0])
+        viewer.page.scene.gizmo.position = np.array([np.nan, 0.0, 0.0])
         viewer.refresh()
         page.get_by_text("Not possible", exact=True).first.wait_for()  # the modes say so too
         least_contrast(page)

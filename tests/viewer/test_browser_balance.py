@@ -128,7 +128,7 @@ def test_a_pose_that_cannot_be_held_leads_to_one_that_can(browser: Browser, name
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     with opened(browser, robot, width=screen[0]) as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
-        viewer.page.stage.gizmo.position = 0.5 * (low + high) + np.array([0.42, 0.2, 0.3]) * (high - low)
+        viewer.page.scene.gizmo.position = 0.5 * (low + high) + np.array([0.42, 0.2, 0.3]) * (high - low)
         viewer.refresh()
         page.get_by_text("Held nearest").wait_for()
         page.get_by_role("button", name="Go there").wait_for()

@@ -29,7 +29,7 @@ def browser() -> Iterator[Browser]:
 
 def in_full(show: RegionFeature) -> bool:
     """Whether the region that is drawn is that of what is shown, and not a rough one."""
-    return show._made is not None and not show._made.rough and show._made.key == show._key
+    return show._result is not None and not show._result.rough and show._result.key == show._key
 
 
 def slide(page: Page, label: str, way: float) -> None:
@@ -83,19 +83,19 @@ def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, sc
         page.get_by_label("Region", exact=True).click()
         page.get_by_text("Its wall by what limits").wait_for()
         await_that(page, lambda: in_full(show))
-        before, mass = show._panel._told.content, viewer.view.snapshot.robot.mass  # type: ignore[union-attr]
+        before, mass = show._hull_html.content, viewer.view.snapshot.robot.mass  # type: ignore[union-attr]
         slide(page, "Platform + load", 8.0)
         await_that(page, lambda: viewer.view is not None and viewer.view.snapshot.robot.mass > mass)
-        await_that(page, lambda: in_full(show) and show._panel._told.content != before)  # nothing was asked for again
-        viewer.page.stage.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
+        await_that(page, lambda: in_full(show) and show._hull_html.content != before)  # nothing was asked for again
+        viewer.page.scene.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
         viewer.refresh()
-        await_that(page, lambda: show._stage._wall.meshes != [])
+        await_that(page, lambda: viewer.page.server.scene.get_handle_by_name("/wall/0") is not None)
         page.get_by_text("left, cable").first.wait_for()
         page.get_by_label("Slice", exact=True).click()
         page.get_by_label("Where can I go", exact=True).click()
         page.get_by_text("Boundary", exact=True).wait_for()
         page.get_by_text("Margin [").wait_for()
-        await_that(page, lambda: len(show._stage._levels) > 0)
+        await_that(page, lambda: viewer.page.server.scene.get_handle_by_name("/slice/levels/0") is not None)
         await_that(page, lambda: np.mean(np.abs(scene(page) - empty).max(axis=2) > 8) > 0.03)  # what is drawn is seen
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []

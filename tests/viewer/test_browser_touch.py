@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 from viser._messages import ViewerCameraMessage
 
 import sagline as sl
-from sagline.viewer.camera import Eye, fitted
+from sagline.viewer.camera import Camera, fitted
 from sagline.viewer.features.cut import CutFeature
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.features.push import PushFeature
@@ -32,15 +32,15 @@ def browser() -> Iterator[Browser]:
     yield from launched(FLAGS)
 
 
-def eye_of(viewer: Viewer) -> Eye | None:
-    return next((Eye.of(client.camera) for client in viewer.page.server.get_clients().values()), None)
+def eye_of(viewer: Viewer) -> Camera | None:
+    return next((Camera.of(client.camera) for client in viewer.page.server.get_clients().values()), None)
 
 
 def on_page(page: Page, viewer: Viewer, points: np.ndarray) -> np.ndarray:
     """Where points (..., 3) are on the page [px], shape (..., 2)."""
     scene, eye = box(page, SCENE), eye_of(viewer)
     assert eye is not None
-    share = eye.seen(points)[0] / eye.pixels
+    share = eye.project(points)[0] / eye.pixels
     return np.asarray([scene["x"], scene["y"]] + share * [scene["width"], scene["height"]])
 
 
@@ -80,26 +80,26 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
     told: list[ViewerCameraMessage] = []
     with opened(browser, sl.load_robot(name), width=size[0], height=size[1], cameras=told) as (page, viewer):
         settle(page, viewer, told)
-        start = viewer.page.stage.dragged_pose()
+        start = viewer.page.scene.dragged_pose()
         eye = eye_of(viewer)
         assert eye is not None
         # pull, at the middle of the platform, where its gizmo has its handles
-        middle = start.transform(viewer.page.feature(PushFeature)._stage.body.vertices).mean(axis=0)
+        middle = start.transform(viewer.page.feature(PushFeature).body.vertices).mean(axis=0)
         x, y = on_page(page, viewer, middle)
         uncovered(page, x, y)
         page.mouse.move(x, y)
         page.keyboard.down("Control")
         page.mouse.down()
         page.mouse.move(x + 15, y - 10, steps=3)
-        await_that(page, lambda: viewer.page.feature(PushFeature).pushed is not None)
+        await_that(page, lambda: viewer.page.feature(PushFeature).response is not None)
         page.mouse.move(x + 30, y - 20, steps=3)
         away = 0.9 * np.hypot(30.0, 20.0)
         await_that(page, lambda: pulled(page, viewer) > away)
         page.mouse.up()
         page.keyboard.up("Control")
-        await_that(page, lambda: viewer.page.feature(PushFeature).pushed is None)
+        await_that(page, lambda: viewer.page.feature(PushFeature).response is None)
         np.testing.assert_array_equal(
-            viewer.page.stage.dragged_pose().position, start.position
+            viewer.page.scene.dragged_pose().position, start.position
         )  # the gizmo did not move
         now = eye_of(viewer)
         assert now is not None
@@ -112,7 +112,7 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
         x, y = free_place(places, inside["x"], inside["x"] + inside["width"], inside["y"] + inside["height"])
         uncovered(page, x, y)
         page.mouse.click(x, y)
-        await_that(page, lambda: viewer.page.feature(CutFeature)._chosen)
+        await_that(page, lambda: viewer.page.feature(CutFeature)._is_marked)
         page.get_by_role("button", name="Cut cable").click()
         await_that(page, lambda: viewer.page.player.played is not None and viewer.page.player.clock.time > 0.5)
         page.get_by_text("Simulated", exact=True).wait_for()
@@ -130,7 +130,7 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
 
 def pulled(page: Page, viewer: Viewer) -> float:
     """How long the arrow of the pull is on the page [px]."""
-    found = viewer.page.feature(PushFeature).pushed
+    found = viewer.page.feature(PushFeature).response
     if found is None:
         return 0.0
     grabbed = found.state.pose.transform(found.push.at)

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.viewer import calibration_words
+from sagline.viewer.features import calibration as feature
 from sagline.viewer.features.calibration import FIELD
 from sagline.viewer.panel import written_mass
 from sagline.viewer.solids import Ellipsoids, ball, readable
@@ -87,14 +87,14 @@ def test_one_pose_in_twenty_has_another_color() -> None:
     freedom = np.where(np.arange(count) % 2 == 0, m + 3, m)
     squares = np.sum(random.standard_normal((count, m + 3)) ** 2 * (np.arange(m + 3) < freedom[:, None]), axis=1)
     many = replace(calibrated(), residuals=residuals, chi_squared_of_pose=squares)
-    np.testing.assert_array_equal(calibration_words.freedoms(many), freedom)
-    shares = np.bincount(calibration_words.bands(many), minlength=3) / count
+    np.testing.assert_array_equal(feature.degrees_of_freedom(many), freedom)
+    shares = np.bincount(feature.bands(many), minlength=3) / count
     np.testing.assert_allclose(shares, [0.95, 0.049, 0.001], atol=0.004)
     assert shares[2] == pytest.approx(0.001, abs=7e-4)
 
 
 def test_a_pose_tells_its_residuals() -> None:
-    text = unescape(re.sub(r"<[^>]+>", " ", calibration_words.pose(calibrated(), 17))).replace("\u00a0", " ")
+    text = unescape(re.sub(r"<[^>]+>", " ", feature.pose_residuals(calibrated(), 17))).replace("\u00a0", " ")
     assert text.split(":")[0].split() == ["Row", "17"]
     cells = re.findall(r"(−?[\d.]+) (µm|mm|N) +(−?[\d.]+) σ", text)
     assert len(cells) == 16
@@ -105,11 +105,11 @@ def test_a_pose_tells_its_residuals() -> None:
         assert float(residual.replace("−", "-")) * size == pytest.approx(value, rel=0.06)
         assert float(times.replace("−", "-")) == pytest.approx(value / deviation, abs=0.0501)
     assert "position" not in text
-    assert "position" in calibration_words.pose(calibrated(), 16)
+    assert "position" in feature.pose_residuals(calibrated(), 16)
 
 
 def test_kinds_are_told_with_their_units() -> None:
-    text = unescape(re.sub(r"<[^>]+>", " ", calibration_words.kinds(calibrated()))).replace("\u00a0", " ")
+    text = unescape(re.sub(r"<[^>]+>", " ", feature.parameters_text(calibrated()))).replace("\u00a0", " ")
     moved = 1e3 * np.sqrt(np.mean((calibrated().values[:24] - calibrated().parameters.prior[:24]) ** 2))
     error = 1e3 * np.sqrt(np.mean(calibrated().standard_error[:24] ** 2))
     row = re.search(r"frame anchors +([\d.]+) mm +([\d.]+) mm +50 mm", text)
@@ -120,7 +120,7 @@ def test_kinds_are_told_with_their_units() -> None:
     hardly = replace(
         calibrated(), cannot_tell_apart=(replace(calibrated().gauge[0], name="frame_anchors z", known=0.6),)
     )
-    assert "frame anchors z, 60 %" in calibration_words.kinds(hardly)
+    assert "frame anchors z, 60 %" in feature.parameters_text(hardly)
 
 
 def test_meters_and_radians_of_one_kind_are_told_apart() -> None:
@@ -129,14 +129,14 @@ def test_meters_and_radians_of_one_kind_are_told_apart() -> None:
     found = replace(
         calibrated(), parameters=numbers, values=np.array([3.0, 4.0, 0.0, 0.3, 0.0, 0.4]), covariance=np.eye(6)
     )
-    text = unescape(re.sub(r"<[^>]+>", " ", calibration_words.kinds(found))).replace("\u00a0", " ")
+    text = unescape(re.sub(r"<[^>]+>", " ", feature.parameters_text(found))).replace("\u00a0", " ")
     told = re.findall(r"measuring frame +([\d.]+) (\w+) +1 (\w+) ", text)
     assert told == [("2.9", "m", "m"), ("0.29", "rad", "rad")]  # sqrt(25/3)
 
 
 @pytest.mark.parametrize("status", list(sl.CalibrationStatus))
 def test_the_verdict_is_that_of_the_calibration(status: sl.CalibrationStatus) -> None:
-    text = calibration_words.verdict(replace(calibrated(), status=status))
+    text = feature.verdict_text(replace(calibrated(), status=status))
     assert (" good" in text) == (status is sl.CalibrationStatus.FOUND)
     for reason, rows in calibrated().left_out.items():
         assert re.search(rf"\b{len(rows)} row{'s'[: len(rows) != 1]} [\w ]+: {re.escape(reason.text)}", text)
@@ -145,7 +145,7 @@ def test_the_verdict_is_that_of_the_calibration(status: sl.CalibrationStatus) ->
 
 @extended
 def test_errors_are_drawn_as_large_as_is_told(page: Shown, client: Client) -> None:
-    def radii(where: str) -> np.ndarray:
+    def semi_axes(where: str) -> np.ndarray:
         return np.sort(page.node(f"{where}/errors").batched_scales.max(axis=1))
 
     own = [
@@ -154,14 +154,14 @@ def test_errors_are_drawn_as_large_as_is_told(page: Shown, client: Client) -> No
     ]
     for factor in (10.0, 40.0):
         choose(page, client, "Drawn ×", factor)
-        np.testing.assert_allclose(radii(""), factor * np.sort(own[:8]), rtol=1e-5)
-        np.testing.assert_allclose(radii("/platform"), factor * np.sort(own[8:]), rtol=1e-5)
+        np.testing.assert_allclose(semi_axes(""), factor * np.sort(own[:8]), rtol=1e-5)
+        np.testing.assert_allclose(semi_axes("/platform"), factor * np.sort(own[8:]), rtol=1e-5)
         assert f"{factor:g} times" in page.text
     moves = np.asarray(page.node("/moves").points)
     away = 40.0 * (calibrated().before.frame_anchors - calibrated().robot.frame_anchors)
     np.testing.assert_allclose(moves[:, 0] - moves[:, 1], away, atol=1e-5)
     choose(page, client, "Relative to one another", True)
-    assert radii("").max() < 0.3 * 40.0 * max(own[:8])  # the shift and the turn are the most of it
+    assert semi_axes("").max() < 0.3 * 40.0 * max(own[:8])  # the shift and the turn are the most of it
     moves = np.asarray(page.node("/moves").points)
     left = (moves[:, 1] - moves[:, 0]) / 40.0
     away = calibrated().robot.frame_anchors - calibrated().before.frame_anchors
@@ -201,7 +201,7 @@ def test_a_row_that_is_chosen_is_gone_to(page: Shown, client: Client) -> None:
 @extended
 def test_a_pose_that_is_clicked_is_chosen(page: Shown, client: Client) -> None:
     np.testing.assert_allclose(page.node("/log").batched_positions, calibrated().poses.position, rtol=1e-6)
-    np.testing.assert_array_equal(page.node("/log").batched_colors, calibration_words.colors(calibrated()))
+    np.testing.assert_array_equal(page.node("/log").batched_colors, feature.COLORS[feature.bands(calibrated())])
     assert [page.node(f"/log/{row}").text for row in (4, 17)] == ["row 4, cable 3", "row 17, cable 6"]
     client.say(
         type="SceneNodeClickMessage", name="/log", instance_index=5, ray_origin=[0.0, 0.0, 0.0],

@@ -29,8 +29,8 @@ def server() -> Iterator[Server]:
 def channel(server: Server) -> Channel:
     """A channel whose tasks are done at once, by the thread that hears."""
     one = Channel(server.gui, lambda task: task())
-    server.on_client_connect(one.welcome)
-    server.on_client_disconnect(one.part)
+    server.on_client_connect(one.connect)
+    server.on_client_disconnect(one.disconnect)
     return one
 
 
@@ -52,8 +52,8 @@ def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: Server, 
 
 
 def test_who_comes_later_is_told_the_last_word(server: Server, channel: Channel) -> None:
-    channel.tell("news", {"a": 1})
-    channel.tell("news", {"a": 2})
+    channel.send("news", {"a": 1})
+    channel.send("news", {"a": 2})
     with Client(server.get_port()) as client:
         contents = [
             m.get("props", m.get("updates", {})).get("content", "")
@@ -72,7 +72,7 @@ def test_a_value_is_text_in_an_attribute() -> None:
 
 
 def test_an_answer_reaches_who_asked_and_nobody_else(server: Server, channel: Channel) -> None:
-    channel.on("ask", lambda value, client: channel.answer(client, "asked", value))
+    channel.on("ask", lambda value, client: channel.send_to(client, "asked", value))
     with Client(server.get_port()) as one, Client(server.get_port()) as other:
         for k in range(20):  # in turn, faster than pages are drawn
             say(server, one, json.dumps({"topic": "ask", "value": f"one {k}", "count": k}))
@@ -85,7 +85,7 @@ def test_an_answer_reaches_who_asked_and_nobody_else(server: Server, channel: Ch
             else:
                 raise AssertionError("not told")
     await_that(lambda: not server.get_clients())
-    channel.answer(0, "asked", "gone")  # nobody is there
+    channel.send_to(0, "asked", "gone")  # nobody is there
 
 
 def content_of(message: dict[str, Any]) -> str:

@@ -11,7 +11,7 @@ from viser import CameraHandle
 
 import sagline as sl
 from sagline.viewer import swing
-from sagline.viewer.camera import Eye
+from sagline.viewer.camera import Camera
 from sagline.viewer.features import cut
 from sagline.viewer.features.cut import Before, CutFeature
 from sagline.viewer.playback import Moment, Playback
@@ -33,10 +33,10 @@ def page() -> Iterator[Shown]:
 
 def seen_at(page: Shown, camera: CameraHandle, cable: int) -> list[float]:
     """Where a client sees a cable with the others farthest away."""
-    eye = Eye.of(camera)
+    eye = Camera.of(camera)
     assert eye is not None
     assert page.viewer.view is not None
-    places = eye.seen(page.viewer.view.snapshot.courses(1.0))[0]
+    places = eye.project(page.viewer.view.snapshot.courses(1.0))[0]
     others = np.delete(places, cable, axis=0).reshape(-1, 2)
     away = np.linalg.norm(places[cable, :, None] - others, axis=2).min(axis=1)
     assert away.max() > 5.0
@@ -88,7 +88,9 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         whole = played()
         assert isinstance(whole, Playback)
         state = sl.inverse(ROBOT, POSE, tension=sl.MinimumNorm()).state
-        by_itself = sl.simulate(state, duration=swing.LASTS, events=sl.Break(cable=2, time=0.0), damping=swing.LOSSES)
+        by_itself = sl.simulate(
+            state, duration=swing.DURATION, events=sl.Break(cable=2, time=0.0), damping=swing.LOSSES
+        )
         np.testing.assert_allclose(whole.simulation.tensions, by_itself.tensions, rtol=1e-9)
         peak = cut.peak_of(by_itself, 2)
         others = np.delete(by_itself.largest_tension, 2)  # type: ignore[arg-type]
@@ -113,7 +115,7 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
         given, first, second = Playback(made.simulation()), made.simulation(50), made.simulation(60)
         viewer = Viewer(server, given.robot, given)
         cuts, player = viewer.page.feature(CutFeature), viewer.page.player
-        cuts._asked, before = 1, Before(given.home, player.kept())
+        cuts._asked, before = 1, Before(given.home, player.save())
         cuts._play(1, first, 3, before)
         cuts._play(1, second, 3, before)
         assert isinstance(player.played, Playback)
@@ -133,12 +135,12 @@ def test_cut_by_cut_all_is_put_back() -> None:
         cuts, player = viewer.page.feature(CutFeature), viewer.page.player
         for number in (1, 2):
             cuts._asked = number
-            cuts._play(number, made.simulation(50), 3, Before(given.home, player.kept()))
+            cuts._play(number, made.simulation(50), 3, Before(given.home, player.save()))
         first = cuts._before[-1].kept.played
-        cuts.calm()
+        cuts.undo()
         assert player.played is first
         assert handle(server, "Calm").visible
-        cuts.calm()
+        cuts.undo()
         assert player.played is given
         assert not handle(server, "Calm").visible
     finally:
@@ -179,14 +181,14 @@ def test_what_was_played_is_put_back_where_its_clock_stood() -> None:
     player = Player(run, lambda played: None)
     player.scrub_to(0.7)
     player.toggle()
-    kept = player.kept()
+    kept = player.save()
     player.play(Playback(made.simulation(50)), at_once=True)
     player.advance(0.5)
-    player.put_back(kept)
+    player.restore(kept)
     assert player.played is run
     assert (player.clock.time, player.clock.playing, player.following) == (0.7, True, True)
     player.leave()
-    kept = player.kept()
+    kept = player.save()
     player.play(Playback(made.simulation(50)), at_once=True)
-    player.put_back(kept)
+    player.restore(kept)
     assert (player.clock.time, player.clock.playing, player.following) == (0.7, False, False)

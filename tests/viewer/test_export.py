@@ -17,7 +17,7 @@ def exported(robot: sl.Robot, pose: sl.Pose) -> Any:
     """The scene of a GLB file, read again by trimesh."""
     import trimesh  # a quarter of a second; the exporter imports it too
 
-    from sagline.viewer.export import scene_as_glb
+    from sagline.viewer.features.export import scene_as_glb
 
     glb = scene_as_glb(taken_at(robot, pose, Settings(mass=50.0), None), TensionScale.of(robot))
     scene = trimesh.load(BytesIO(glb), file_type="glb")

@@ -11,7 +11,7 @@ from PIL import Image
 
 import sagline as sl
 from sagline.viewer.features.export import ExportFeature, moments
-from sagline.viewer.studio import Shot
+from sagline.viewer.offscreen import Shot
 from sagline.viewer.viewer import Viewer
 from tests.refusal import refused
 from tests.tiers import extended
@@ -36,7 +36,9 @@ def pixel() -> bytes:
 
 
 def taking(page: Shown) -> bool:
-    return any(visitor.taking.locked() for visitor in tuple(page.viewer.page.feature(ExportFeature)._visitors.values()))
+    return any(
+        visitor.taking.locked() for visitor in tuple(page.viewer.page.feature(ExportFeature)._exporters.values())
+    )
 
 
 def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
@@ -91,7 +93,7 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
                     tell(film, client, "film", "cancel")
                     await_that(
                         lambda: any(
-                            v.cancelled.is_set() for v in film.viewer.page.feature(ExportFeature)._visitors.values()
+                            v.cancelled.is_set() for v in film.viewer.page.feature(ExportFeature)._exporters.values()
                         )
                     )
                 rendered(client, message, pixel())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.features.proof import cable_forces, force_polygon_figure, pulls_of, residual
+from sagline.viewer.features.proof import cable_forces, force_polygon_figure, forces_on_platform, residual
 from sagline.viewer.missing import missing_of
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import force_unit
@@ -44,7 +44,7 @@ def test_forces_are_those_of_the_ends_of_the_cables_as_they_hang(robot: sl.Robot
 
 def test_they_close_with_weight_and_load() -> None:
     state = held(HEAVY)
-    pulls = pulls_of(state)
+    pulls = forces_on_platform(state)
     assert [each.name for each in pulls][-2:] == ["weight", "load"]
     assert sorted(each.name for each in pulls[:-2]) == [str(k) for k in range(8)]
     force, moment = residual(state, pulls)
@@ -56,7 +56,7 @@ def test_they_close_with_weight_and_load() -> None:
     center = state.pose.transform(HEAVY.center_of_mass)
     for each in pulls[:-2]:
         assert each.moment == pytest.approx(np.cross(each.at - center, each.force))
-    away = pulls_of(state)[:-1]  # without the load they do not
+    away = forces_on_platform(state)[:-1]  # without the load they do not
     assert residual(state, away) == pytest.approx((np.linalg.norm(LOAD[:3]), np.linalg.norm(LOAD[3:])), rel=1e-6)
 
 
@@ -71,7 +71,7 @@ def arrows(html: str) -> list[np.ndarray]:
 
 def test_arrows_are_drawn_head_to_tail_as_long_as_the_forces() -> None:
     state = held(HEAVY)
-    pulls = pulls_of(state)
+    pulls = forces_on_platform(state)
     html = force_polygon_figure(state)
     views = arrows(html)
     assert len(views) == 2
@@ -125,7 +125,7 @@ def test_the_largest_force_has_three_digits_at_least(name: str) -> None:
     state = sl.inverse(robot, home_pose(robot)).state
     rows = re.findall(ROW, force_polygon_figure(state))
     forces = np.array([[float(cell) for cell in re.findall(r"<td>([^<]*)</td>", cells)][:3] for _, cells in rows])
-    expected = np.array([each.force for each in sorted(pulls_of(state), key=lambda each: each.name)])
+    expected = np.array([each.force for each in sorted(forces_on_platform(state), key=lambda each: each.name)])
     expected /= force_unit(robot).newtons
     np.testing.assert_allclose(forces, expected, rtol=0.0, atol=6e-4 * np.abs(expected).max())
 
@@ -135,7 +135,7 @@ def test_the_gap_is_the_missing_force() -> None:
     snapshot = taken_at(robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), Settings(mass=robot.mass), None)
     missing = missing_of(snapshot)
     assert missing is not None
-    pulls = pulls_of(missing.state, missing.wrench)
+    pulls = forces_on_platform(missing.state, missing.wrench)
     assert [each.name for each in pulls][-2:] == ["weight", "missing"]
     others = pulled(missing.state).sum(axis=0) - np.array([0.0, 0.0, robot.mass * robot.gravity])
     np.testing.assert_allclose(pulls[-1].force, -others, atol=1e-6 * missing.state.chord_tension.max())
@@ -154,7 +154,7 @@ def test_a_platform_that_cannot_turn_has_no_moments() -> None:
     html = force_polygon_figure(plan.state)
     assert "M<sub>" not in html
     assert "N m" not in html
-    assert residual(plan.state, pulls_of(plan.state))[0] < 1e-6
+    assert residual(plan.state, forces_on_platform(plan.state))[0] < 1e-6
     flat = held_planar()
     assert len(arrows(force_polygon_figure(flat))) == 1
 
@@ -194,7 +194,7 @@ def test_arrows_in_the_scene_come_and_go(page: Shown) -> None:
         assert view is not None
         assert isinstance(view.snapshot.robot, sl.Robot)
         state = view.snapshot.plan.state  # type: ignore[union-attr]
-        forces = np.array([each.force for each in pulls_of(state)])
+        forces = np.array([each.force for each in forces_on_platform(state)])
         scale = np.linalg.norm(points[:, 1] - points[:, 0]) / np.linalg.norm(forces)
         np.testing.assert_allclose(points[:, 1] - points[:, 0], scale * forces, atol=1e-5)
         center = view.snapshot.pose.transform(view.snapshot.robot.center_of_mass)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.viewer.feature import View
-from sagline.viewer.features.keyboard import MOST, TURN, nudged, place_of, spoken
+from sagline.viewer.features.keyboard import MOST, TURN, nudged, place_of, screen_reader_text
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import Viewer, home_pose
@@ -101,7 +101,7 @@ def test_turns_are_about_the_axes_of_the_world() -> None:
 def said(pose: sl.Pose) -> Any:
     set_to = Settings(ROBOT.mass)
     snapshot = taken_at(ROBOT, pose, set_to, None)
-    return spoken(View(snapshot, set_to, TensionScale.of(ROBOT), False))
+    return screen_reader_text(View(snapshot, set_to, TensionScale.of(ROBOT), False))
 
 
 def test_the_verdict_is_a_sentence() -> None:

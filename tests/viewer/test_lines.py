@@ -13,7 +13,7 @@ POSE = sl.Pose.from_euler([1.0, -0.7, 2.1], 0.1, -0.05, 0.08)
 @pytest.mark.parametrize("sag_scale", [0.0, 1.0, 7.0])
 def test_cables_are_drawn_from_anchor_to_anchor(sag_scale: float) -> None:
     plan = sl.inverse(ROBOT, POSE)
-    drawn = lines.hanging(lines.chords(ROBOT, POSE), plan.state.cables, sag_scale)
+    drawn = lines.catenaries(lines.chords(ROBOT, POSE), plan.state.cables, sag_scale)
     ends = POSE.position + (POSE.rotation.as_matrix() @ ROBOT.platform_anchors.T).T
     assert np.abs(drawn[:, 0] - ROBOT.frame_anchors).max() < 1e-12
     assert np.abs(drawn[:, -1] - ends).max() < 1e-9
@@ -23,7 +23,7 @@ def test_drawn_sag_is_the_sag_times_its_scale() -> None:
     plan = sl.inverse(ROBOT, POSE)
     ends = lines.chords(ROBOT, POSE)
     for sag_scale in (1.0, 5.0):
-        drawn = lines.hanging(ends, plan.state.cables, sag_scale)
+        drawn = lines.catenaries(ends, plan.state.cables, sag_scale)
         run = ends[:, 1] - ends[:, 0]
         share = ((drawn - ends[:, :1])[..., :2] @ run[:, :2, None])[..., 0] / (run[:, :2] ** 2).sum(1)[:, None]
         drop = ends[:, 0, 2:] + share * run[:, 2:] - drawn[..., 2]
@@ -33,7 +33,7 @@ def test_drawn_sag_is_the_sag_times_its_scale() -> None:
 
 def test_cable_length_along_the_line_is_the_stretched_length() -> None:
     state = sl.inverse(ROBOT, POSE).state.cables
-    drawn = lines.hanging(lines.chords(ROBOT, POSE), state, 1.0)
+    drawn = lines.catenaries(lines.chords(ROBOT, POSE), state, 1.0)
     along = np.linalg.norm(np.diff(drawn, axis=1), axis=2).sum(axis=1)
     strain = 0.5 * (state.frame_end_tension + state.platform_end_tension) / ROBOT.cables.axial_stiffness
     assert along == pytest.approx(state.unstrained_length * (1.0 + strain), rel=1e-5)
@@ -47,7 +47,7 @@ def test_vertical_cable_is_drawn_upright() -> None:
     state = sl.Catenary().from_tension(
         robot.cables, np.hypot(*(ends[:, 1] - ends[:, 0])[:, :2].T), (ends[:, 1] - ends[:, 0])[:, 2], 100.0
     )
-    drawn = lines.hanging(ends, state, 20.0)[0]
+    drawn = lines.catenaries(ends, state, 20.0)[0]
     assert np.ptp(drawn[:, :2], axis=0) == pytest.approx([0.0, 0.0], abs=1e-12)
     assert np.all(np.diff(drawn[:, 2]) < 0.0)
 
@@ -81,7 +81,7 @@ def test_cables_run_from_anchor_over_pulley_to_platform() -> None:
     on_pulley = np.linalg.norm(np.diff(wraps, axis=1), axis=2).sum(axis=1)
     chord_of_arc = 2.0 * (lines.WRAP_POINTS - 1) * np.sin(plan.wrap_angle / (2.0 * (lines.WRAP_POINTS - 1)))
     np.testing.assert_allclose(on_pulley, WOUND.pulley_radius * chord_of_arc, atol=1e-12)
-    free = lines.hanging(lines.chords(OVER_PULLEYS, POSE, wraps[:, -1]), plan.state.cables, 1.0)
+    free = lines.catenaries(lines.chords(OVER_PULLEYS, POSE, wraps[:, -1]), plan.state.cables, 1.0)
     np.testing.assert_allclose(free[:, -1], POSE.transform(ROBOT.platform_anchors), atol=1e-9)
     strain = 0.5 * (plan.state.cables.frame_end_tension + plan.state.cables.platform_end_tension) / 44e3
     along = np.linalg.norm(np.diff(free, axis=1), axis=2).sum(axis=1)

@@ -106,7 +106,7 @@ def randomly_set(page: Shown, client: Client, random: np.random.Generator) -> No
             steps = int(random.integers(0, round((slider.max - slider.min) / slider.step)))
             client.set(slider, slider.min + steps * slider.step)
     for label in ("Cable model", "Tensions"):
-        options = [each for each in handle(page, label).options if "remembers" not in each]
+        options = [each for each in handle(page, label).options if "depends_on_history" not in each]
         client.set(handle(page, label), options[int(random.integers(len(options)))])
     client.set(handle(page, "Straight cables beside"), bool(random.random() < 0.5))
     turn = random.uniform(-0.1, 0.1, 4)
@@ -168,7 +168,7 @@ def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> No
 
         def set_and_ask() -> None:
             mass.value = 120.0
-            one.viewer.page.channel._heard["copy"](["both", "link"], number)
+            one.viewer.page.channel._handlers["copy"](["both", "link"], number)
 
         one.viewer.page.later(set_and_ask)  # before what is set is shown
         assert "&platform-load=120" in here.answered("copy", "both")["text"]

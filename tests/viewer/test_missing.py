@@ -15,7 +15,7 @@ from sagline.core.arrays import locked
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.feature import Reading
 from sagline.viewer.features.missing import explanation, missing_label
-from sagline.viewer.missing import NearestHeld, missing_of, nearest_held
+from sagline.viewer.missing import NearestFeasible, missing_of, nearest_feasible
 from sagline.viewer.server import Server
 from sagline.viewer.snapshot import Settings, Snapshot, taken_at
 from sagline.viewer.tension_scale import force_unit
@@ -121,7 +121,7 @@ def test_where_no_force_alone_would_do_a_moment_is_told() -> None:
     assert least_force(missing.state, missing.wrench * (1.0 + 1e-7), 50)[0] < 1e-3 * np.linalg.norm(missing.force)
     force, moment = unbalanced(missing.state)
     assert max(force, moment) < 1e-6 * missing.state.chord_tension.max()
-    text = re.sub(r"<[^>]+>", " ", unescape(explanation(snapshot, missing, None, looking=False)))
+    text = re.sub(r"<[^>]+>", " ", unescape(explanation(snapshot, missing, None, searching=False)))
     told = re.search(r"and moment\s+([\d.,]+)\sN", text)
     assert told is not None
     assert float(told[1].replace(",", "")) == pytest.approx(np.linalg.norm(missing.moment), rel=1e-3)
@@ -131,7 +131,7 @@ def test_where_no_force_alone_would_do_a_moment_is_told() -> None:
 def test_nothing_nearer_is_held(name: str, place: list[float]) -> None:
     robot, generator = sl.load_robot(name), np.random.default_rng(8)
     pose = sl.Pose(place, np.eye(3))
-    nearest = nearest_held(robot, pose, sl.Catenary(), None)
+    nearest = nearest_feasible(robot, pose, sl.Catenary(), None)
     assert nearest is not None
     assert not nearest.turned
     assert sl.inverse(robot, nearest.pose).feasible
@@ -148,7 +148,7 @@ def test_a_platform_that_is_turned_too_far_is_turned_back() -> None:
     robot = sl.load_robot("ipanema-1")
     pose = sl.Pose.from_euler(home_pose(robot).position, 0.0, np.radians(80.0), np.radians(40.0))
     assert not at(robot, pose).feasible
-    nearest = nearest_held(robot, pose, sl.Catenary(), None)
+    nearest = nearest_feasible(robot, pose, sl.Catenary(), None)
     assert nearest is not None
     assert nearest.turned
     assert nearest.distance < 1e-3
@@ -164,8 +164,8 @@ def test_a_load_counts() -> None:
     assert missing is not None
     weight = robot.mass * robot.gravity
     assert -missing.force[2] > 1e5 - 60.0 * weight  # cables from above hardly pull down
-    assert nearest_held(robot, pose, sl.Catenary(), load) is None
-    assert "nowhere" in explanation(snapshot, missing, None, looking=False)
+    assert nearest_feasible(robot, pose, sl.Catenary(), load) is None
+    assert "nowhere" in explanation(snapshot, missing, None, searching=False)
 
 
 def test_a_planar_robot_is_explained_in_its_plane() -> None:
@@ -174,7 +174,7 @@ def test_a_planar_robot_is_explained_in_its_plane() -> None:
     assert missing is not None
     assert missing.force[1] == 0.0
     assert missing.force[2] > 0.0
-    nearest = nearest_held(PLANAR, pose, sl.Catenary(), None)
+    nearest = nearest_feasible(PLANAR, pose, sl.Catenary(), None)
     assert nearest is not None
     assert nearest.pose.position[1] == 0.0
     assert nearest.pose.position[2] < 3.0
@@ -184,18 +184,18 @@ def test_other_reasons_are_explained_too() -> None:
     robot = sl.load_robot("article-suspended")
     far = sl.Pose([5.0, 3.0, 2.2], np.eye(3))
     settings = Settings(mass=50.0, tension=sl.ClosedForm())
-    html = explanation(taken_at(robot, far, settings, None), None, None, looking=False)
+    html = explanation(taken_at(robot, far, settings, None), None, None, searching=False)
     assert chosen_by("sharing", "AnalyticCenter") in html
     anchor = sl.Pose(robot.frame_anchors[0] - robot.platform_anchors[0], np.eye(3))
     lost = at(robot, anchor)
     assert lost.plan is None
-    nearest = nearest_held(robot, anchor, sl.Catenary(), None)
-    assert isinstance(nearest, NearestHeld)
-    assert "Go there" in explanation(lost, missing_of(lost), nearest, looking=False)
+    nearest = nearest_feasible(robot, anchor, sl.Catenary(), None)
+    assert isinstance(nearest, NearestFeasible)
+    assert "Go there" in explanation(lost, missing_of(lost), nearest, searching=False)
     upside = sl.Pose([1.0, 0.5, 6.0], np.eye(3))  # cables level
     singular = at(robot, upside)
     if singular.status is sl.PoseStatus.SINGULAR:
-        assert "cable resists" in explanation(singular, None, None, looking=True)
+        assert "cable resists" in explanation(singular, None, None, searching=True)
 
 
 def test_nobody_says_that_there_is_nowhere_to_go_before_it_was_looked_for() -> None:
@@ -227,7 +227,8 @@ def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
         assert any("Missing force" in text for text in texts)
         say(page, client, "", "go-there")
         await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.feasible)
-        pose = nearest_held(page.viewer.view.snapshot.robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), sl.Catenary(), None)  # type: ignore[union-attr]
+        robot = page.viewer.page.robot
+        pose = nearest_feasible(robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), sl.Catenary(), None)
         assert pose is not None
         assert page.position == pytest.approx(pose.pose.position, abs=1e-9)
         before = page.position

@@ -1,4 +1,4 @@
-"""Modes that move in the page, work aside, and a simulation that is played as a run is."""
+"""Modes that move in the page, work task, and a simulation that is played as a run is."""
 
 import re
 import threading
@@ -11,8 +11,8 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError, vibration
-from sagline.viewer import lines, playback, readout, swing
-from sagline.viewer.feature import Aside
+from sagline.viewer import lines, readout, swing
+from sagline.viewer.feature import BackgroundTask
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.playback import Playback
 from sagline.viewer.snapshot import Settings, taken_at
@@ -163,11 +163,11 @@ def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
     start, end = played.sight(0.0), played.sight(9.0)
     state = made.state_at()
     ends = lines.chords(ROBOT, state.pose)
-    np.testing.assert_allclose(start.courses(1.0), lines.hanging(ends, state.cables, 1.0), atol=1e-9)
+    np.testing.assert_allclose(start.courses(1.0), lines.catenaries(ends, state.cables, 1.0), atol=1e-9)
     assert end.index == 199
     assert np.isnan(end.tension[3])
     np.testing.assert_array_equal(end.courses(1.0)[3], np.broadcast_to(ROBOT.frame_anchors[3], (41, 3)))
-    assert "<td>–</td>" in playback.numbers(end, TensionScale.of(ROBOT))
+    assert "<td>–</td>" in end.numbers(TensionScale.of(ROBOT))
     assert played.duration == 2.0
     wanted, actual = played.traces(50, 1.0)
     assert np.isnan(wanted).all()
@@ -176,7 +176,7 @@ def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
 
 def test_of_work_aside_the_latest_alone_counts() -> None:
     tasks: list[Callable[[], None]] = []
-    aside, done = Aside(tasks.append), list[int]()
+    task, done = BackgroundTask(tasks.append), list[int]()
     gate = threading.Event()
 
     def slow() -> int:
@@ -186,23 +186,23 @@ def test_of_work_aside_the_latest_alone_counts() -> None:
     def refuse() -> int:
         raise InvalidValueError("state", "none", "some", "Try.")
 
-    aside.ask(slow, done.append, print)
-    aside.ask(lambda: 2, done.append, print)
-    aside.ask(lambda: 3, done.append, print)
-    assert aside.busy
-    assert aside.waited == 0.0
+    task.start(slow, done.append, print)
+    task.start(lambda: 2, done.append, print)
+    task.start(lambda: 3, done.append, print)
+    assert task.busy
+    assert task.waited == 0.0
     gate.set()
     for _ in range(2):
         await_that(lambda: bool(tasks))
         tasks.pop()()
     assert done == [3]
-    await_that(lambda: not aside.busy)
+    await_that(lambda: not task.busy)
     told: list[str] = []
-    aside.ask(refuse, done.append, told.append)
+    task.start(refuse, done.append, told.append)
     await_that(lambda: bool(tasks))
     tasks.pop()()
     assert told == [str(InvalidValueError("state", "none", "some", "Try."))]
-    aside.ask(lambda: 1 // 0, done.append, told.append)
+    task.start(lambda: 1 // 0, done.append, told.append)
     await_that(lambda: bool(tasks))
     with pytest.raises(ZeroDivisionError):  # a mistake is none of the user's
         tasks.pop()()

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 import sagline as sl
 from sagline import structure_matrix
 from sagline.viewer.features import push
-from sagline.viewer.push import Push, pushed, radii
+from sagline.viewer.push import Push, push_response, semi_axes
 from sagline.viewer.viewer import home_pose
 from tests.refusal import refused
 from tests.tiers import wide
@@ -45,12 +45,12 @@ def end_forces(state: sl.Equilibrium) -> np.ndarray:
 def test_where_it_goes_all_forces_balance_and_the_lengths_are_held(name: str) -> None:
     state = rest(name)
     robot, push = state.one_robot, push_of(state)
-    found = pushed(state, push, anew=False)
-    assert found.pushed is not None
-    np.testing.assert_allclose(found.pushed.unstrained_length, state.unstrained_length, rtol=1e-9)
-    center = found.pushed.pose.transform(robot.center_of_mass)
-    ends = found.pushed.pose.transform(robot.platform_anchors)
-    pulls = end_forces(found.pushed)
+    found = push_response(state, push, redistribution=False)
+    assert found.loaded is not None
+    np.testing.assert_allclose(found.loaded.unstrained_length, state.unstrained_length, rtol=1e-9)
+    center = found.loaded.pose.transform(robot.center_of_mass)
+    ends = found.loaded.pose.transform(robot.platform_anchors)
+    pulls = end_forces(found.loaded)
     weight = np.array([0.0, 0.0, -robot.mass * robot.gravity])
     size = np.abs(pulls).max()
     np.testing.assert_allclose(pulls.sum(axis=0) + weight + push.force, 0.0, atol=1e-6 * size)
@@ -58,14 +58,14 @@ def test_where_it_goes_all_forces_balance_and_the_lengths_are_held(name: str) ->
     lever = state.pose.matrix @ (push.at - robot.center_of_mass)
     moment = np.cross(ends - center, pulls).sum(axis=0) + np.cross(lever, push.force)
     np.testing.assert_allclose(moment, 0.0, atol=1e-6 * size * np.abs(ends - center).max())
-    assert np.linalg.norm(found.moved) > 0.0
+    assert np.linalg.norm(found.displacement) > 0.0
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_how_it_gives_way_is_what_differences_of_forward_say(name: str) -> None:
     state = rest(name)
     robot, at = state.one_robot, push_of(state).at
-    found = pushed(state, push_of(state), anew=False)
+    found = push_response(state, push_of(state), redistribution=False)
     small = 1e-4 * float(np.median(state.limited_tension))
     columns = []
     for axis in np.eye(3):
@@ -78,7 +78,7 @@ def test_how_it_gives_way_is_what_differences_of_forward_say(name: str) -> None:
         columns.append((places[0] - places[1]) / (2.0 * small))
     by_differences = np.column_stack(columns)
     np.testing.assert_allclose(found.compliance, by_differences, atol=1e-4 * np.abs(by_differences).max())
-    lengths, directions = radii(found.compliance)
+    lengths, directions = semi_axes(found.compliance)
     assert np.all(np.diff(lengths) >= 0.0)
     # the ellipsoid is where forces of 1 N in all directions take the place
     some = np.random.default_rng(3).normal(size=(50, 3))
@@ -91,7 +91,7 @@ def test_how_it_gives_way_is_what_differences_of_forward_say(name: str) -> None:
 def test_the_reserve_with_held_lengths_ends_where_forward_finds_a_limit(name: str) -> None:
     state = rest(name)
     robot, push = state.one_robot, push_of(state)
-    held = pushed(state, push, anew=False).held
+    held = push_response(state, push, redistribution=False).reserve
     assert held.cable is not None
     assert 0.0 < held.force < np.inf
 
@@ -113,7 +113,7 @@ def test_the_reserve_with_held_lengths_ends_where_forward_finds_a_limit(name: st
 def test_the_reserve_of_shared_tensions_is_that_of_a_linear_program(name: str) -> None:
     state = rest(name, sl.Elastic())  # weightless: then tensions balance a load linearly
     robot, push = state.one_robot, push_of(state)
-    shared = pushed(state, push).shared
+    shared = push_response(state, push).redistributed
     assert shared is not None
     along = push.force / np.linalg.norm(push.force)
     lever = state.pose.matrix @ (push.at - robot.center_of_mass)
@@ -141,40 +141,40 @@ def test_a_cable_at_its_limit_leaves_no_reserve_against_it() -> None:
     assert state.limited_tension[at_limit] == pytest.approx(robot.tension_min[at_limit], rel=1e-9)
     towards = robot.frame_anchors[at_limit] - state.pose.transform(robot.platform_anchors[at_limit])
     force = 5.0 * towards / np.linalg.norm(towards)
-    found = pushed(state, Push(force, robot.platform_anchors[at_limit]), anew=False)
-    assert found.held.force < 1e-3  # N
-    assert (found.held.cable, found.held.upper) == (at_limit, False)
-    away = pushed(state, Push(-force, robot.platform_anchors[at_limit]), anew=False)
-    assert away.held.cable != at_limit or away.held.force > 0.0
+    found = push_response(state, Push(force, robot.platform_anchors[at_limit]), redistribution=False)
+    assert found.reserve.force < 1e-3  # N
+    assert (found.reserve.cable, found.reserve.upper) == (at_limit, False)
+    away = push_response(state, Push(-force, robot.platform_anchors[at_limit]), redistribution=False)
+    assert away.reserve.cable != at_limit or away.reserve.force > 0.0
 
 
 def test_it_is_drawn_as_many_times_as_it_moves_and_told_so() -> None:
     state = rest("cogiro")
-    found = pushed(state, push_of(state))
-    assert found.pushed is not None
-    once, often = found.drawn(1.0), found.drawn(20.0)
+    found = push_response(state, push_of(state))
+    assert found.loaded is not None
+    once, often = found.scaled_pose(1.0), found.scaled_pose(20.0)
     assert once is not None
     assert often is not None
-    np.testing.assert_allclose(once.matrix, found.pushed.pose.matrix, atol=1e-12)
-    np.testing.assert_allclose(once.position, found.pushed.pose.position, atol=1e-12)
+    np.testing.assert_allclose(once.matrix, found.loaded.pose.matrix, atol=1e-12)
+    np.testing.assert_allclose(once.position, found.loaded.pose.position, atol=1e-12)
     place = state.pose.transform(found.push.at)
-    np.testing.assert_allclose(often.transform(found.push.at) - place, 20.0 * found.moved, atol=1e-12)
+    np.testing.assert_allclose(often.transform(found.push.at) - place, 20.0 * found.displacement, atol=1e-12)
     told = push.response_text(found, 100.0)
-    assert f"{1e3 * np.linalg.norm(found.moved):.3g}\N{NO-BREAK SPACE}mm" in told
-    assert f"cable {found.held.cable}" in told
-    assert found.shared is not None
-    assert f"{found.shared.force - found.force:.1f} N more" in told
+    assert f"{1e3 * np.linalg.norm(found.displacement):.3g}\N{NO-BREAK SPACE}mm" in told
+    assert f"cable {found.reserve.cable}" in told
+    assert found.redistributed is not None
+    assert f"{found.redistributed.force - found.force:.1f} N more" in told
 
 
 def test_straight_cables_answer_no_force() -> None:
     with refused("push: cable model", "straight", "one that stretches", kind=sl.InvalidValueError):
-        pushed(rest("cogiro", sl.Straight()), push_of(rest("cogiro")))
+        push_response(rest("cogiro", sl.Straight()), push_of(rest("cogiro")))
 
 
 def test_what_nothing_holds_is_told() -> None:
     state = rest("cogiro")
-    found = replace(pushed(state, push_of(state)), compliance=np.full((3, 3), np.nan), pushed=None)
+    found = replace(push_response(state, push_of(state)), compliance=np.full((3, 3), np.nan), loaded=None)
     told = push.response_text(found, None)
     assert "no rest" in told
     assert "nothing holds" in told
-    assert found.drawn(1.0) is None
+    assert found.scaled_pose(1.0) is None

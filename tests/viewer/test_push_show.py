@@ -10,10 +10,10 @@ from viser import CameraHandle
 
 import sagline as sl
 from sagline.viewer import solids
-from sagline.viewer.camera import Eye
+from sagline.viewer.camera import Camera
 from sagline.viewer.channel import NAME
 from sagline.viewer.features.push import FAR, PushFeature
-from sagline.viewer.push import Push, Pushed, pushed
+from sagline.viewer.push import Push, PushResponse, push_response
 from sagline.viewer.viewer import Viewer
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
@@ -39,16 +39,16 @@ def look(client: Client, page: Shown) -> CameraHandle:
     client.say(type="ViewerCameraMessage", up_direction=[0, 0, 1], **camera, **lens)
 
     def stands() -> bool:
-        eye = Eye.of(seen)
+        eye = Camera.of(seen)
         return eye is not None and eye.place[1] == -9.5
 
     await_that(stands)
     return seen
 
 
-def push_of(page: Shown) -> Pushed | None:
+def push_of(page: Shown) -> PushResponse | None:
     """What is pushed."""
-    return page.viewer.page.feature(PushFeature).pushed
+    return page.viewer.page.feature(PushFeature).response
 
 
 def tell(client: Client, page: Shown, topic: str, value: Any) -> None:
@@ -77,9 +77,9 @@ def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
         assert handle(page, "Force [N]").value == pytest.approx(np.linalg.norm(wanted), rel=1e-12)
         np.testing.assert_allclose(page.node("/push").points[0, 0], grabbed, atol=1e-5)
         np.testing.assert_allclose(page.node("/push").points[0, 1], grabbed + wanted / STIFFNESS, atol=1e-5)
-        assert found.pushed is not None
+        assert found.loaded is not None
         assert page.node("/pushed").visible
-        np.testing.assert_allclose(page.node("/pushed").position, found.pushed.pose.position, atol=1e-6)
+        np.testing.assert_allclose(page.node("/pushed").position, found.loaded.pose.position, atol=1e-6)
         assert page.node("/push_tip").text.startswith(f"{np.linalg.norm(wanted):.1f} N: moves")
         assert np.array_equal(page.position, POSE.position)  # the gizmo is none of a hand's
         pull(client, page, "end", 0.55, 0.42)
@@ -118,7 +118,7 @@ def test_what_is_behind_the_eye_is_not_held(page: Shown) -> None:
     part = POSE.transform(BODY.vertices[BODY.faces[0]].mean(axis=0))
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks along y
     for away, held in ((5.0, False), (-5.0, True)):
-        eye = Eye(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
+        eye = Camera(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
         await_that(lambda: page.viewer.page.state is not None)
         show._grab(eye, (0.5, 0.5), -1)  # nobody, whose leaving would let it go
         assert (show._hold is not None) == held
@@ -142,8 +142,8 @@ def test_a_force_can_be_typed(page: Shown) -> None:
         assert found is not None
         told = page.text
         assert "25.0 N" in told
-        again = pushed(found.state, found.push)
-        np.testing.assert_array_equal(again.moved, found.moved)
+        again = push_response(found.state, found.push)
+        np.testing.assert_array_equal(again.displacement, found.displacement)
         client.set(handle(page, "Along x, y, z"), [0.0, 0.0, 0.0])
         await_that(lambda: "Not possible" in page.text and push_of(page) is None)
         client.set(handle(page, "Along x, y, z"), [0.0, 0.0, -1.0])

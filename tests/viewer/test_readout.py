@@ -8,8 +8,8 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import readout
+from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
 from sagline.viewer.snapshot import Settings, taken_at
-from sagline.viewer.stage import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.timeline import COLORS
 from sagline.viewer.viewer import home_pose

@@ -13,10 +13,9 @@ from sagline.control import Event, EventKind, State
 from sagline.files.mcap_writer import Recorder
 from sagline.viewer.player import Timeline
 from sagline.viewer.readout import css_color
+from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, TRUTH
 from sagline.viewer.server import started, stop
-from sagline.viewer.session import Session, SessionMoment, numbers, verdict
-from sagline.viewer.session_log import Follower
-from sagline.viewer.stage import ACTUAL, INFEASIBLE, PLATFORM, TRUTH
+from sagline.viewer.session import LogFollower, Session, SessionMoment
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import Viewer
 from tests.files.executions import cycles_of, events_of, execution, plan_of
@@ -43,7 +42,7 @@ def truth(tmp_path: Path) -> Path:
 
 
 def session_of(log: Path, truth: Path | None = None) -> Session:
-    session = Follower(log, truth).more()
+    session = LogFollower(log, truth).more()
     assert session is not None
     return session
 
@@ -62,7 +61,7 @@ def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth
     assert late.truth is not None
     assert np.array_equal(late.rest.position, done.position[120])
     assert np.allclose(late.truth.position - late.pose.position, [0.0, 0.0, -3e-3], rtol=0.0, atol=1e-9)
-    drawn = late.drawn_truth(10.0)
+    drawn = late.scaled_position(late.truth, 10.0)
     assert drawn is not None
     assert np.allclose(drawn - late.pose.position, [0.0, 0.0, -3e-2], rtol=0.0, atol=1e-8)
     assert early.truth is None  # the twin's log begins later
@@ -74,22 +73,22 @@ def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth
 def test_the_panel_tells_state_errors_and_what_happened(log: Path, truth: Path) -> None:
     session, done = session_of(log, truth), execution()
     moment, scale = session.sight(1.2), TensionScale.of(ROBOT)
-    said = text_of(verdict(moment))
+    said = text_of(moment.verdict())
     assert said.startswith("MOVING Time 1.20 s")
     assert "planned 3 mm" in said
     assert events_of()[1].text in said
-    assert events_of()[1].text not in text_of(verdict(session.sight(0.4)))
-    row = text_of(numbers(moment, scale))
+    assert events_of()[1].text not in text_of(session.sight(0.4).verdict())
+    row = text_of(moment.numbers(scale))
     off = done.tension[120] - done.planned_tension[120]
     assert f"5 {done.tension[120, 5]:.1f} {off[5]:.1f}" in row
-    assert css_color(scale.colors(moment.tension)[5]) in numbers(moment, scale)
+    assert css_color(scale.colors(moment.tension)[5]) in moment.numbers(scale)
 
 
 def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
     session = session_of(log)
     evil = Event(1000.0, 0, EventKind.NOTE, "x", State.MOVING, "<script>alert(1)</script>")
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    text = verdict(Session(**parts | {"events": (evil,)}).sight(1.0))
+    text = Session(**parts | {"events": (evil,)}).sight(1.0).verdict()
     assert "<script>" not in text
     assert "&lt;script&gt;" in text
 
@@ -117,7 +116,7 @@ def handle(server: viser.ViserServer, name: str) -> Any:
 @extended
 def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path, truth: Path) -> None:
     file = tmp_path / "growing.mcap"
-    plan, follower = plan_of(), Follower(file, truth)
+    plan, follower = plan_of(), LogFollower(file, truth)
     recorder = Recorder(file, ROBOT, epoch=0)
     recorder.begins(plan)
     cycles = list(cycles_of(plan))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline.viewer.slices import APART, FINER, INSIDE_OPACITY, OUTSIDE_OPACITY, MarginScale, picture_of
-from sagline.viewer.wording import ForceUnit
+from sagline.viewer.tension_scale import ForceUnit
 from sagline.workspaces.region import Plane, slice_of
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
 

@@ -62,7 +62,7 @@ def test_approximate_model_rests_where_forward_finds_it() -> None:
     found = sl.forward(ROBOT, lengths, start=HERE)
     assert snapshot.error == pytest.approx(found.pose.position - HERE.position, abs=1e-9)
     assert 1e-4 < np.linalg.norm(found.pose.position - HERE.position) < 1e-2
-    drawn = snapshot.drawn_rest(100.0)
+    drawn = snapshot.scaled_position(snapshot.rest, 100.0)
     assert drawn is not None
     assert drawn - HERE.position == pytest.approx(100.0 * (found.pose.position - HERE.position), abs=1e-7)
 

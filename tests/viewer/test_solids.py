@@ -75,7 +75,7 @@ def test_a_pulley_stands_where_its_cable_enters_and_as_large_as_it_is() -> None:
 def test_pulleys_turn_to_the_platform() -> None:
     robot = sl.load_robot("ipanema-2-pulleys")
     pose = sl.Pose.from_euler([0.5, -0.3, 2.0], 0.1, 0.0, 0.2)
-    turned = Rotation.from_quat(np.roll(solids.turns(robot, pose), -1, axis=1)).apply([1.0, 0.0, 0.0])
+    turned = Rotation.from_quat(np.roll(solids.pulley_rotations(robot, pose), -1, axis=1)).apply([1.0, 0.0, 0.0])
     reach = pose.transform(robot.platform_anchors) - robot.frame_anchors
     reach[:, 2] = 0.0
     assert turned == pytest.approx(reach / np.linalg.norm(reach, axis=1, keepdims=True), abs=1e-12)

@@ -13,7 +13,7 @@ import sagline as sl
 from sagline import SaglineError
 from sagline.viewer.feature import Reading
 from sagline.viewer.features.region import RegionFeature, planes_of
-from sagline.viewer.hull import Asked, Hull, hull_of
+from sagline.viewer.hull import Hull, WorkspaceQuery, region_hull
 from sagline.viewer.server import Server
 from sagline.viewer.tension_scale import cable_color
 from sagline.viewer.viewer import Viewer
@@ -27,7 +27,7 @@ POSE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
 LOADS = sl.WrenchBox(force=50.0)
 
 
-def ball(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
+def ball(asked: WorkspaceQuery, rough: bool, told: Callable[[int, int], None]) -> Hull:
     """A tetrahedron, at once; two of its corners are cable 1's."""
     told(1, 2)
     corners = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 0.0, 2.0]])
@@ -49,7 +49,7 @@ MAKER = Maker()
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sagline.viewer.features.region.hull_of", lambda *arguments: MAKER.hull(*arguments))
+        patch.setattr("sagline.viewer.features.region.region_hull", lambda *arguments: MAKER.hull(*arguments))
         yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
 
 
@@ -149,13 +149,13 @@ def test_the_hull_comes_when_it_is_asked_for_and_is_colored_as_told(page: Shown,
     await_that(lambda: page.node("/hull/0").color == tuple(show._scale.colors(np.array(0.0)).tolist()))
     choose(page, client, slice=True)
     assert {mesh.side for mesh in meshes(page, "hull")} == {"back"}
-    drawn = show._drawn
+    drawn = show._hull_key
     client.drag([2.0, 0.5, 2.0])
     await_that(lambda: page.position[0] == 2.0)
-    assert show._drawn == drawn  # where the platform is changes nothing
+    assert show._hull_key == drawn  # where the platform is changes nothing
     half = 0.05
     client.drag([2.0, 0.5, 2.0], [np.cos(half), 0.0, 0.0, np.sin(half)])
-    await_that(lambda: show._drawn not in (drawn, None))  # how it is turned does
+    await_that(lambda: show._hull_key not in (drawn, None))  # how it is turned does
     choose(page, client, hull=False, by="limiting cable")
     assert meshes(page, "hull") == []
 
@@ -166,7 +166,7 @@ def test_a_hull_follows_a_slider_and_the_one_before_stays_until_it_is_there(
 ) -> None:
     going, ended = threading.Event(), list[str]()
 
-    def slow(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
+    def slow(asked: WorkspaceQuery, rough: bool, told: Callable[[int, int], None]) -> Hull:
         if asked.robot.mass == 60.0 and not rough:
             assert going.wait(PATIENCE)
             try:
@@ -216,7 +216,7 @@ def test_a_wall_lights_up_near_the_platform_and_says_what_is_left(page: Shown, c
 def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(MAKER, "hull", hull_of)
+    monkeypatch.setattr(MAKER, "hull", region_hull)
     robot = sl.load_robot("cogiro")
     with contextmanager(shown)(lambda server: Viewer(server, robot)) as page:
         mass = handle(page, "Platform + load [kg]")
@@ -239,7 +239,7 @@ def test_a_hull_that_takes_long_shows_how_far_it_is(
 ) -> None:
     going = threading.Event()
 
-    def slow(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
+    def slow(asked: WorkspaceQuery, rough: bool, told: Callable[[int, int], None]) -> Hull:
         told(1, 4)
         assert going.wait(PATIENCE)
         return ball(asked, rough, told)

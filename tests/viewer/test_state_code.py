@@ -15,11 +15,10 @@ from sagline.core.arrays import Array
 from sagline.viewer.feature import View
 from sagline.viewer.panel import mass_range
 from sagline.viewer.playback import Playback, Run
-from sagline.viewer.snapshot import METHODS, MODELS, Settings, Snapshot, taken_at
+from sagline.viewer.snapshot import METHODS, MODELS, Settings, Snapshot, depends_on_history, taken_at
 from sagline.viewer.state_code import Source, code_of
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import Viewer
-from sagline.viewer.wording import remembers
 from tests.tiers import extended, wide
 from tests.viewer.client import PATIENCE, Client, await_that
 from tests.viewer.shown import Shown, handle, shown, with_mass
@@ -89,7 +88,7 @@ def a_case(seed: int) -> None:
     source, previous = Source.of_robot(name, robot.mass if loaded else None), None
     set_to = settings(robot, random)
     changed = set_to.applied(robot)
-    for _ in range(3 if remembers(set_to.tension) else 1):
+    for _ in range(3 if depends_on_history(set_to.tension) else 1):
         try:
             snapshot = taken_at(changed, a_pose(robot, random), set_to, previous, wrench=wrench)
         except sl.InvalidValueError:  # this robot cannot be shared so: the page says it, and shows nothing

@@ -61,8 +61,8 @@ def test_it_says_how_much_larger_than_with_a_joule_it_is_drawn() -> None:
             * (robot.mass * swing.motion[:3] @ swing.motion[:3] + swing.motion[3:] @ inertia @ swing.motion[3:])
         )
         assert kinetic == pytest.approx(swing.factor**2, rel=1e-9)
-        assert f"{swing.factor:.2g} times as" in swing.told
-        assert f"{2.0 * swing.mode.frequency:.3g} times slower" in swing.told
+        assert f"{swing.factor:.2g} times as" in swing.text
+        assert f"{2.0 * swing.mode.frequency:.3g} times slower" in swing.text
 
 
 def test_modes_are_asked_for_by_their_names() -> None:

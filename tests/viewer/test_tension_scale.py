@@ -11,7 +11,7 @@ SCALE = TensionScale(10.0, 1000.0)
 
 
 def test_places_are_logarithmic_and_stay_at_the_ends() -> None:
-    shares = SCALE.share(np.array([1.0, 10.0, 100.0, 1000.0, 1e6]))
+    shares = SCALE.fraction(np.array([1.0, 10.0, 100.0, 1000.0, 1e6]))
     assert shares == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
 
 

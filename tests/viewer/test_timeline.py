@@ -15,13 +15,22 @@ from sagline.viewer.page import Page
 from sagline.viewer.playback import Playback, Run
 from sagline.viewer.player import Beside, Player
 from sagline.viewer.server import started, stop
-from sagline.viewer.session import Session
-from sagline.viewer.session_log import Follower
+from sagline.viewer.session import LogFollower, Session
 from sagline.viewer.state_code import Source
+from sagline.viewer.tension_scale import ForceUnit
 from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
-from sagline.viewer.timeline import MOST_SPANS, Chart, Limit, Mark, Track, columns, outside, spans_of, told
+from sagline.viewer.timeline import (
+    MOST_SPANS,
+    Chart,
+    Limit,
+    Mark,
+    Track,
+    columns,
+    limit_violations,
+    spans_of,
+    timeline_message,
+)
 from sagline.viewer.viewer import Viewer
-from sagline.viewer.wording import ForceUnit
 from tests.effort import least_seconds
 from tests.files.executions import events_of, execution
 from tests.tiers import extended, wide
@@ -44,7 +53,7 @@ def page() -> Iterator[Shown]:
 def log(tmp_path_factory: pytest.TempPathFactory) -> Session:
     file = tmp_path_factory.mktemp("log") / "run.mcap"
     execution().save(file)
-    session = Follower(file).more()
+    session = LogFollower(file).more()
     assert session is not None
     return session
 
@@ -117,23 +126,23 @@ def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
 
 def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
     track = Run.of(PLAN).track()
-    (part,) = told([("run", track)], 0, 8.0)["tracks"]
+    (part,) = timeline_message([("run", track)], 0, 8.0)["tracks"]
     low = np.array(part["low"], dtype=float)  # None as NaN
     np.testing.assert_allclose(low.T, PLAN.state.limited_tension, rtol=0.0, atol=0.5001e-2)
     assert part["high"] is None  # a column a sample
     assert np.array_equal(part["times"], np.round(PLAN.path.time, 9))  # type: ignore[union-attr]
     assert [limit[:2] for limit in part["limits"]] == [[25.0, "lowest allowed"], [2000.0, "highest allowed"]]
-    lengths = told([("run", track)], 1, 8.0)["tracks"][0]
+    lengths = timeline_message([("run", track)], 1, 8.0)["tracks"][0]
     np.testing.assert_allclose(
         np.array(lengths["low"], dtype=float).T, PLAN.unstrained_length, rtol=0.0, atol=0.5001e-5
     )
-    json.dumps(told([("run", track)], 0, 8.0), allow_nan=False)
+    json.dumps(timeline_message([("run", track)], 0, 8.0), allow_nan=False)
 
 
 def test_limits_are_drawn_where_they_are_near_and_told_where_not() -> None:
     time, limits = np.linspace(0.0, 1.0, 11), (Limit(25.0, "lowest", upper=False), Limit(2000.0, "highest", upper=True))
     chart = Chart("Tension", "N", 1, ("0",), lambda rows: 30.0 + 20.0 * time[rows, None], limits)
-    page = told([("a", Track(time, (chart,)))], 0, 1.0)
+    page = timeline_message([("a", Track(time, (chart,)))], 0, 1.0)
     assert page["range"] == pytest.approx([25.0 - 1.0, 50.0 + 1.0])
     assert page["tracks"][0]["limits"] == [[25.0, "lowest", False]]
     assert page["tracks"][0]["far"] == "highest 2000 N"
@@ -153,7 +162,7 @@ def test_what_is_looked_at_closer_is_all_there_and_finer(seed: int) -> None:
     assert np.count_nonzero(inside[rows]) == np.count_nonzero(inside)
     if rows.start > 0:
         assert time[rows.start] < start  # the line comes from there, and that sample lasts until the next
-    (part,) = told([("a", track)], 0, float(time[-1]), (start, end))["tracks"]
+    (part,) = timeline_message([("a", track)], 0, float(time[-1]), (start, end))["tracks"]
     known = values[rows]
     assert np.min(part["low"], axis=1) == pytest.approx(known.min(axis=0), abs=1e-6)
     assert np.max(part["high"] or part["low"], axis=1) == pytest.approx(known.max(axis=0), abs=1e-6)
@@ -166,10 +175,10 @@ def test_of_two_tracks_both_have_one_axis_and_the_chart_that_was_chosen() -> Non
     def track(titles: str, size: float) -> Track:
         return Track(time, tuple(Chart(each, "N", 1, ("0",), lambda rows: size * time[rows, None]) for each in titles))
 
-    page = told([("a", track("AB", 1.0)), ("b", track("CA", 7.0))], 0, 1.0)
+    page = timeline_message([("a", track("AB", 1.0)), ("b", track("CA", 7.0))], 0, 1.0)
     assert [part["title"] for part in page["tracks"]] == ["A", "A"]
     assert page["range"] == pytest.approx([-0.35, 7.35])
-    page = told([("a", track("AB", 1.0)), ("b", track("CA", 7.0))], 1, 1.0)
+    page = timeline_message([("a", track("AB", 1.0)), ("b", track("CA", 7.0))], 1, 1.0)
     assert [part["title"] for part in page["tracks"]] == ["B", "A"]  # no B: what is in its place
 
 
@@ -190,7 +199,7 @@ def test_tensions_beyond_their_limits_are_spans_with_their_worst() -> None:
     robot = ROBOT.replace(tension_min=20.0, tension_max=500.0)
     tension = np.full((6, 8), 100.0)
     tension[1:3, 4], tension[2, 5], tension[4, 0] = [12.0, 14.0], 700.0, np.nan
-    (span,) = outside(robot, np.arange(6.0), tension, UNIT)
+    (span,) = limit_violations(robot, np.arange(6.0), tension, UNIT)
     assert (span.start, span.end) == (1.0, 3.0)
     told = re.findall(r"cable (\d) (below|above) ([\d.]+) N: ([\d.]+) N[\w ]+winch", span.why)
     assert told == [("4", "below", "20.0", "12.0"), ("5", "above", "500.0", "700.0")]
@@ -301,11 +310,11 @@ def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> Non
 
         def window() -> Any:
             show.tick()
-            return json.loads(channel._told["timeline"].content.split(":", 2)[2])["window"]
+            return json.loads(channel._sent["timeline"].content.split(":", 2)[2])["window"]
 
-        channel._heard["window"]([1.0, 3.0], 0)
+        channel._handlers["window"]([1.0, 3.0], 0)
         player.scrub_to(2.5)
-        channel._heard["play"](True, 0)
+        channel._handlers["play"](True, 0)
         assert window() == [1.0, 3.0]
         player.advance(1.0)
         assert window() == [3.5, 5.5]  # it turned the page
@@ -379,5 +388,5 @@ def test_a_long_run_is_told_at_once() -> None:
     values = np.random.default_rng(1).normal(size=(600_000, 8))
     marks = tuple(Mark(float(k), "x", bad=False) for k in range(1000))
     track = Track(time, (Chart("Tension", "N", 1, tuple("01234567"), values.__getitem__),), (), marks)
-    assert least_seconds(lambda: told([("run", track)], 0, 600.0), 0.5) < 0.5
-    assert len(json.dumps(told([("run", track)], 0, 600.0))) < 400_000
+    assert least_seconds(lambda: timeline_message([("run", track)], 0, 600.0), 0.5) < 0.5
+    assert len(json.dumps(timeline_message([("run", track)], 0, 600.0))) < 400_000

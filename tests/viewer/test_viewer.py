@@ -15,11 +15,10 @@ from websockets.exceptions import ConnectionClosed
 
 import sagline as sl
 from sagline.viewer.feature import Reading
+from sagline.viewer.robot_scene import RobotScene
 from sagline.viewer.server import started, stop
-from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.stage import Stage
+from sagline.viewer.snapshot import Snapshot, method_name
 from sagline.viewer.viewer import Viewer
-from sagline.viewer.wording import method_name
 from tests.effort import best_rate
 from tests.refusal import refused
 from tests.tiers import extended, wide
@@ -55,7 +54,7 @@ def test_the_gizmo_goes_where_it_is_put() -> None:
     server = started(port=0)
     try:
         pose = sl.Pose.from_euler([1.0, 0.5, 2.0], 0.3, -0.2, 0.1)
-        stage = Stage(server.scene, ROBOT, pose)
+        stage = RobotScene(server.scene, ROBOT, pose)
         x, y, z, w = pose.quaternion
         assert stage.gizmo.wxyz == pytest.approx([w, x, y, z], abs=1e-15)
         np.testing.assert_allclose(stage.dragged_pose().matrix, pose.matrix, atol=1e-14)

@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sagline.viewer.hull import Hull, left, lit
-from sagline.viewer.tension_scale import cable_color
-from sagline.viewer.wording import ForceUnit
+from sagline.viewer.hull import Hull, margin_text, near_patches
+from sagline.viewer.tension_scale import ForceUnit, cable_color
 
 SIDE = 41  # corners along each edge of a wall
 
@@ -31,14 +30,14 @@ def area(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 
 def test_nothing_is_lit_from_afar() -> None:
-    assert lit(wall(), np.array([-0.1, 0.0, 0.0]), 1.0) == []
-    assert lit(wall(on_box=True), np.array([0.9, 0.0, 0.0]), 1.0) == []  # where the box ends there is no wall
+    assert near_patches(wall(), np.array([-0.1, 0.0, 0.0]), 1.0) == []
+    assert near_patches(wall(on_box=True), np.array([0.9, 0.0, 0.0]), 1.0) == []  # where the box ends there is no wall
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.3, -0.5])
 def test_what_is_near_is_lit_the_nearer_the_more(distance: float) -> None:
     place = np.array([1.0 - distance, 0.5, 0.0])
-    found = lit(wall(), place, 1.0)
+    found = near_patches(wall(), place, 1.0)
     assert {patch.color for patch in found} == {cable_color(2), cable_color(5)}
     whole = sum(area(patch.vertices, patch.faces) for patch in found)
     assert whole == pytest.approx(2.0 * np.pi * (1.0 - distance**2), rel=0.03)  # all within 1 m, on both sides
@@ -57,8 +56,8 @@ def test_what_is_near_is_lit_the_nearer_the_more(distance: float) -> None:
 
 def test_what_is_left_is_said() -> None:
     newtons, kilonewtons = ForceUnit("N", 1.0, ".1f"), ForceUnit("kN", 1e3, ".2f")
-    assert left(82.34, 3, newtons) == "82.3 N left, cable 3"
-    assert re.findall(r"[\d.]+|kN|too", left(-1520.0, 0, kilonewtons)) == ["1.52", "kN", "too", "0"]
-    assert left(12.0, -1, newtons) == "12.0 N left"
-    assert re.match("nothing limits", left(np.inf, -1, newtons))
-    assert re.match("nothing holds", left(-np.inf, -1, newtons))
+    assert margin_text(82.34, 3, newtons) == "82.3 N left, cable 3"
+    assert re.findall(r"[\d.]+|kN|too", margin_text(-1520.0, 0, kilonewtons)) == ["1.52", "kN", "too", "0"]
+    assert margin_text(12.0, -1, newtons) == "12.0 N left"
+    assert re.match("nothing limits", margin_text(np.inf, -1, newtons))
+    assert re.match("nothing holds", margin_text(-np.inf, -1, newtons))

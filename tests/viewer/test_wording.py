@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.snapshot import METHODS, MODELS, Settings, taken_at
-from sagline.viewer.wording import ForceUnit, model_name, number, remembers
+from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_history, model_name, taken_at
+from sagline.viewer.tension_scale import ForceUnit, number
 
 
 @pytest.mark.parametrize("value", [-0.04, -1e-300, -0.0, 0.0, 0.049])
@@ -33,7 +33,7 @@ def test_the_choices_are_named_as_the_readings_name_them() -> None:
 
 
 def test_by_default_nothing_is_remembered() -> None:
-    assert not remembers(Settings(mass=1.0).tension)
-    assert not remembers(next(iter(METHODS.values())))
-    (name,) = (name for name, method in METHODS.items() if remembers(method))
+    assert not depends_on_history(Settings(mass=1.0).tension)
+    assert not depends_on_history(next(iter(METHODS.values())))
+    (name,) = (name for name, method in METHODS.items() if depends_on_history(method))
     assert name.startswith("Closest (")

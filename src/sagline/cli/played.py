@@ -26,10 +26,10 @@ def played_in(robot: Robot, file: Path) -> Played:
         FileError: If it cannot be read, or is another robot's.
     """
     from sagline.viewer.playback import Playback, Run
-    from sagline.viewer.session_log import Follower
+    from sagline.viewer.session import LogFollower
 
     if file.suffix.lower() == LOG:
-        session = Follower(file).more()
+        session = LogFollower(file).more()
         if session is None:
             raise no_cycle(file)
         check_robot(file, "log", session.robot, robot)

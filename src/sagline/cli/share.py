@@ -99,10 +99,10 @@ def _found(source: Path) -> Robot | Course:
 def _log(source: Path) -> Course:
     try:
         from sagline.share.course import of_session
-        from sagline.viewer.session_log import Follower
+        from sagline.viewer.session import LogFollower
     except ModuleNotFoundError as error:
         raise FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None
-    session = Follower(source).more()
+    session = LogFollower(source).more()
     if session is None:
         raise FileError(source, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
     return of_session(session)

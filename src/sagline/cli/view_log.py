@@ -17,8 +17,7 @@ from sagline.files.robot_file import load_robot
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
-    from sagline.viewer.session import Session
-    from sagline.viewer.session_log import Follower
+    from sagline.viewer.session import LogFollower, Session
     from sagline.viewer.viewer import Viewer
 
 LOOK: Final = 0.5  # s, between two looks at a file that grows
@@ -51,10 +50,10 @@ def view_log(
         SaglineError: If a file cannot be read, or nothing can listen there.
     """
     check_viewer()
-    from sagline.viewer.session_log import Follower
+    from sagline.viewer.session import LogFollower
     from sagline.viewer.state_code import Source
 
-    follower = Follower(file, truth)
+    follower = LogFollower(file, truth)
     with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
         _wait([log for log in (file, truth) if live and log is not None])
         session = _first(follower, live)
@@ -86,7 +85,7 @@ def _wait(logs: list[Path]) -> None:
         time.sleep(LOOK)
 
 
-def _first(follower: Follower, live: bool) -> Session:
+def _first(follower: LogFollower, live: bool) -> Session:
     """What is there at first; of a log that grows, as soon as there is a cycle."""
     while (session := follower.more()) is None:
         if not live:
@@ -96,7 +95,7 @@ def _first(follower: Follower, live: bool) -> Session:
 
 
 @contextmanager
-def _grown(follower: Follower, viewer: Viewer) -> Iterator[None]:
+def _grown(follower: LogFollower, viewer: Viewer) -> Iterator[None]:
     """While inside, what comes into the log comes onto the page."""
     over = threading.Event()
 

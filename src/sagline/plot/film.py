@@ -83,7 +83,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
         artist.set_clip_on(False)  # the axes are square, the picture is wider
     _frame(ax, swing)
     ax.set_title(f"{robot.name}, mode {mode.number}: {mode.frequency:.3f} Hz {mode.kind}", fontsize=LABEL, y=0.97)
-    figure.text(0.5, 0.02, f"{energy_shares(mode)}; {swing.told}", fontsize=TICK, ha="center")
+    figure.text(0.5, 0.02, f"{energy_shares(mode)}; {swing.text}", fontsize=TICK, ha="center")
     drawn = []
     for k in range(PICTURES):
         phase = 2.0 * np.pi * k / PICTURES

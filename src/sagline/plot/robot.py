@@ -64,7 +64,7 @@ def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
     """Points of the cables in the world as a feasible plan of the pose has them [m], shape (m, points, 3)."""
     contact = plan.state.contact
     wraps = lines.wraps(robot, pose, None if contact is None else contact.wrap_angle)
-    free = lines.hanging(lines.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
+    free = lines.catenaries(lines.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
     return np.concatenate((wraps, free), axis=1)
 
 

@@ -16,8 +16,7 @@ from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.packing import Channel, encode_channels
 from sagline.viewer import lines, solids
-from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.wording import ForceUnit
+from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
 DIGITS: Final = 12  # of the numbers a page calculates with
 FINEST: Final = 1e-5  # of the robot's size, to which its solids are drawn
@@ -83,7 +82,7 @@ def colors(robot: Robot) -> dict[str, Any]:
         "low": scale.low,
         "high": scale.high,
         "steps": scale.colors(steps).tolist(),
-        "ticks": [[float(scale.share(np.array(tick))), f"{tick / unit.newtons:,g}"] for tick in ticks],
+        "ticks": [[float(scale.fraction(np.array(tick))), f"{tick / unit.newtons:,g}"] for tick in ticks],
         "unit": unit.name,
         "newtons": unit.newtons,
         "digits": 1 if unit.newtons == 1.0 else 2,
@@ -117,7 +116,7 @@ def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
     courses = lines.straight(ends)
     if known.all():
         cables = Catenary().from_tension(robot.cables, np.hypot(*run[:, :2].T), run[:, 2], tension, robot.gravity)
-        courses = lines.hanging(ends, cables, 1.0)
+        courses = lines.catenaries(ends, cables, 1.0)
     low, high = bounds(robot)
     frame = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
     body = solids.platform(robot)

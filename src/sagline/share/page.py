@@ -19,7 +19,7 @@ from sagline.robot.robot import Robot
 from sagline.share.course import Course
 from sagline.share.machine import colors, model_data, numbers, robot_drawing, solids_data
 from sagline.share.packing import Channel, encode_channels
-from sagline.viewer.wording import number
+from sagline.viewer.tension_scale import number
 
 SCRIPTS: Final = (  # in the order in which they need each other
     "catenary.js", "sharing.js", "robot.js", "states.js", "theme.js",

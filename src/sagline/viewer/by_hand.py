@@ -31,7 +31,7 @@ BEYOND: Final = 0.5  # how far a field without an end goes on, of the size of wh
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DotField:
-    """What is drawn of the feasible tensions.
+    """Drawing of the feasible tensions.
 
     Attributes:
         polygon: All of them.
@@ -62,7 +62,7 @@ class DotField:
 
     @property
     def redundant(self) -> int:
-        """How many redundant cables there are, 1 or 2."""
+        """Number of redundant cables, 1 or 2."""
         return int(self.corners.shape[1])
 
     @property
@@ -82,7 +82,7 @@ class DotField:
         return float(np.min(room / np.maximum(self.high - self.low, 1e-9)))
 
     def place(self, at: Array) -> tuple[float, float]:
-        """Where coordinates (r,) are in the drawing [px], from its left upper corner on."""
+        """Place of coordinates (r,) in the drawing [px], from its left upper corner on."""
         away = self.scale * (at - self.middle)
         return 0.5 * WIDTH + float(away[0]), 0.5 * self.height - float(away[1] if self.redundant > 1 else 0.0)
 
@@ -122,7 +122,7 @@ def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
 def _clipped(
     corners: Array, sides: tuple[Side | None, ...], low: Array, high: Array
 ) -> tuple[Array, tuple[Side | None, ...]]:
-    """What of a field is within a box; sides that the box makes are no limits."""
+    """Part of a field within a box; sides of the box are no limits."""
     if corners.shape[1] == 1:
         return np.clip(corners, low, high), sides
     for axis, sign, end in ((0, 1.0, high[0]), (0, -1.0, -low[0]), (1, 1.0, high[1]), (1, -1.0, -low[1])):

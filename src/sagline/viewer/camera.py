@@ -1,4 +1,4 @@
-"""Cameras of clients: views that show all, and what is seen at a place."""
+"""Cameras of clients: framing of the robot, and picking in the picture."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from sagline.core.arrays import Array
 from sagline.viewer.solids import Solid
 
 
-class Eye(NamedTuple):
-    """A camera.
+class Camera(NamedTuple):
+    """Position, axes and lens of a camera.
 
     Attributes:
-        place: Where it is [m], shape (3,).
+        place: Position [m], shape (3,).
         axes: Right, down and forward, one a column, shape (3, 3).
         reach: Half of the picture's width and height at a distance of 1, shape (2,).
         pixels: Width and height of the picture [px], shape (2,).
@@ -30,13 +30,13 @@ class Eye(NamedTuple):
     pixels: Array
 
     @classmethod
-    def of(cls, camera: Any) -> Eye | None:
-        """The camera of a client as viser knows it; None as long as it has not told a sensible one."""
+    def of(cls, camera: Any) -> Camera | None:
+        """The camera of a client; None until it has sent a sensible one."""
         try:
             turn, place = np.asarray(camera.wxyz, dtype=np.float64), np.asarray(camera.position, dtype=np.float64)
             pixels = np.array([camera.image_width, camera.image_height], dtype=np.float64)
             high = float(np.tan(0.5 * camera.fov))
-        except (AssertionError, TypeError, ValueError):  # viser asserts that a camera has been told
+        except (AssertionError, TypeError, ValueError):  # viser asserts that a camera has been sent
             return None
         sound = turn.shape == (4,) and place.shape == (3,) and pixels.min() > 0.0 and high > 0.0
         if not (sound and np.isfinite([*turn, *place, *pixels, high]).all() and np.linalg.norm(turn) > 0.0):
@@ -45,20 +45,26 @@ class Eye(NamedTuple):
         return cls(place, axes, high * np.array([pixels[0] / pixels[1], 1.0]), pixels)
 
     def ray(self, at: tuple[float, float]) -> Array:
-        """Direction in which a point of the picture lies, at a depth of 1, shape (3,)."""
+        """Direction to a point of the picture, at a depth of 1, shape (3,)."""
         across, down = self.reach * (2.0 * np.asarray(at) - 1.0)
         return np.asarray(self.axes @ np.array([across, down, 1.0]))
 
-    def seen(self, points: Array) -> tuple[Array, Array]:
-        """Where points (..., 3) are in the picture [px], shape (..., 2), and how deep [m]; behind the eye is < 0."""
+    def project(self, points: Array) -> tuple[Array, Array]:
+        """Places of points (..., 3) in the picture [px], shape (..., 2), and depths [m], negative behind the camera."""
         across, down, deep = np.moveaxis((points - self.place) @ self.axes, -1, 0)
         ahead = np.where(deep == 0.0, np.nan, deep)
         flat = np.stack((across / ahead, down / ahead), axis=-1) / self.reach
         return np.asarray(0.5 * (flat + 1.0) * self.pixels), deep
 
 
-def met(solid: Solid, start: Array, direction: Array) -> float | None:
-    """How many times a direction a ray goes until it meets a surface; None where it misses.
+def camera_of(server: viser.ViserServer, client: int) -> Camera | None:
+    """The camera of a client by its number; None where there is none."""
+    found = server.get_clients().get(client)
+    return None if found is None else Camera.of(found.camera)
+
+
+def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
+    """Distance along a ray to a surface, in lengths of its direction; None where it misses.
 
     Source:
         Moeller & Trumbore, J. Graphics Tools 2, 1997.
@@ -76,10 +82,10 @@ def met(solid: Solid, start: Array, direction: Array) -> float | None:
     return float(far[hit].min()) if hit.any() else None
 
 
-def chosen_line(eye: Eye, at: tuple[float, float], lines: Array, within: float) -> int | None:
-    """Which line is nearest to a point of the picture, if one is near; of several at it the one in front."""
-    places, deep = eye.seen(lines)
-    pixel = np.asarray(at) * eye.pixels
+def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: float) -> int | None:
+    """Line within a distance [px] of a point of the picture, the front one of several; None for none."""
+    places, deep = camera.project(lines)
+    pixel = np.asarray(at) * camera.pixels
     start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
     length = np.maximum(np.einsum("mpi,mpi->mp", run, run), 1e-12)
     share = np.clip(-np.einsum("mpi,mpi->mp", start, run) / length, 0.0, 1.0)
@@ -94,8 +100,8 @@ def chosen_line(eye: Eye, at: tuple[float, float], lines: Array, within: float) 
     return int(np.argmin(np.where(as_near, depth, np.inf)))
 
 
-def place_of(value: Any) -> tuple[float, float] | None:
-    """The point of a picture that a page has told, from 0, 0 at the left upper corner to 1, 1; None for nonsense."""
+def screen_point(value: Any) -> tuple[float, float] | None:
+    """Point of a picture in a message, (0, 0) at the upper left, (1, 1) at the lower right; None for nonsense."""
     try:
         x, y = (float(each) for each in value)
     except (TypeError, ValueError, OverflowError):
@@ -106,7 +112,7 @@ def place_of(value: Any) -> tuple[float, float] | None:
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera
 FIELD = 0.7  # rad, of view, upright: a longer lens than viser's bends less
 BORDER = 1.06  # of the box, to stay off the edges
-_USUAL = 1.3  # width over height until a client has told its own
+_USUAL = 1.3  # width over height until a client has sent its own
 _MOVED = 1e-3  # of the box: a camera farther from where it was put has been moved by hand
 _UP: Final = np.array([0.0, 0.0, 1.0])
 
@@ -130,12 +136,12 @@ def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tupl
 
 
 def _nearest(place: Array, depth: Array, slope: float) -> float:
-    """How far a camera has to stand for points to lie just within both edges: |x - X| = slope (t + z)."""
+    """Distance of a camera at which points lie just within both edges: |x - X| = slope (t + z)."""
     return 0.5 * float(np.max(place / slope - depth) + np.max(-place / slope - depth))
 
 
 def _centered(place: Array, distance: Array) -> float:
-    """Where the camera has to look for points to reach as far to one edge as to the other."""
+    """Place that a camera looks at for points to be centered between both edges."""
 
     def off(middle: float) -> float:
         seen = (place - middle) / distance
@@ -156,15 +162,15 @@ class Framing:
         self.farthest = 100.0 * size + float(np.abs([low, high]).max())  # m: no camera is asked for there
         self._places: dict[int, list[Array]] = {}  # where each client's camera has been put
         self._wanted: dict[int, Array] = {}  # what each client that is not known yet looks from and at
-        self._led: set[int] = set()  # clients that look from where they were asked to, and are let be
+        self._directed: set[int] = set()  # clients that look from where they were asked to, and are let be
         self._lock = threading.Lock()  # clients' cameras are heard in a pool of threads
         camera = server.initial_camera
         self._first, camera.look_at = fitted(low, high, _USUAL)
         camera.position = self._first
         camera.up, camera.fov = _UP, FIELD
         camera.near, camera.far = 0.002 * size, 20.0 * size
-        server.on_client_connect(self._meet)
-        server.on_client_disconnect(self._part)
+        server.on_client_connect(self._connect)
+        server.on_client_disconnect(self._disconnect)
 
     def look(self, client: int, camera: Array) -> None:
         """Have a client look from a place at another, as if its camera had been moved by hand."""
@@ -175,7 +181,7 @@ class Framing:
             self._follow(known.camera)
 
     def moved(self, client: int) -> Array | None:
-        """What a client looks from and at [m], shape (6,), if its camera has been moved; None if it has not."""
+        """Position and target of the camera of a client [m], shape (6,), if it was moved; else None."""
         known = self._server.get_clients().get(client)
         if known is None:
             return None
@@ -188,15 +194,15 @@ class Framing:
         still = len(places) == 1 or np.linalg.norm(places - camera[:3], axis=1).min() < self._near
         return None if still or not np.all(np.abs(camera) <= self.farthest) else camera
 
-    def _meet(self, client: viser.ClientHandle) -> None:
+    def _connect(self, client: viser.ClientHandle) -> None:
         client.camera.on_update(self._follow)
         self._follow(client.camera)
 
-    def _part(self, client: viser.ClientHandle) -> None:
+    def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:
             self._places.pop(client.client_id, None)
             self._wanted.pop(client.client_id, None)
-            self._led.discard(client.client_id)
+            self._directed.discard(client.client_id)
 
     def _follow(self, camera: viser.CameraHandle) -> None:
         """Fit the box anew when the picture has other proportions, unless someone looks from elsewhere."""
@@ -215,11 +221,11 @@ class Framing:
         wanted = self._wanted.pop(camera.client.client_id, None)
         if wanted is not None:
             places.append(self._first)  # from now on it is where nobody has put it
-            self._led.add(camera.client.client_id)
+            self._directed.add(camera.client.client_id)
             with camera.client.atomic():
                 camera.position, camera.look_at = wanted[:3], wanted[3:]
             return
-        if camera.client.client_id in self._led:
+        if camera.client.client_id in self._directed:
             return  # whatever a page that has not heard yet still tells of its camera
         known = np.array([self._first, *places])
         if places and not np.linalg.norm(known - place, axis=1).min() < self._near:

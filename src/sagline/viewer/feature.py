@@ -13,14 +13,14 @@ from typing import Final, TypeVar
 
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
-from sagline.viewer.drawn import Drawn
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.player import Played
 from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
 
 class Reading(Enum):
-    """What can come after the cables: what it takes may still be compiled."""
+    """Readings whose kernels may still be compiled when the cables are drawn."""
 
     MARGIN = "capacity margin"
     POLYGON = "polygon of feasible tensions"
@@ -35,7 +35,7 @@ class Reading(Enum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """What is shown, and how it is drawn.
+    """State of the page, and how it is drawn.
 
     Attributes:
         snapshot: The robot.
@@ -47,7 +47,7 @@ class View:
         playing: Whether its time goes on.
     """
 
-    snapshot: Snapshot | Drawn
+    snapshot: Snapshot | InMotion
     settings: Settings
     scale: TensionScale
     ghost: bool
@@ -64,7 +64,7 @@ class Feature:
 
     @property
     def moving(self) -> bool:
-        """Whether pictures follow each other by themselves."""
+        """Whether the drawing moves."""
         return False
 
     @property
@@ -88,51 +88,51 @@ class Feature:
 
 T = TypeVar("T")
 
-PATIENCE = 2.0  # s: what takes longer is told how long it has taken
+PATIENCE = 2.0  # s: the time of a longer calculation is written
 NICENESS: Final = 10  # a drag comes first where both want a processor: it is then drawn up to twice as often
 
 
-class Aside:
-    """One piece of work at a time, in a thread of its own."""
+class BackgroundTask:
+    """One calculation at a time in a thread of its own; a new one takes the place of the one before."""
 
-    def __init__(self, soon: Callable[[Callable[[], None]], None]) -> None:
-        """Begin with none; `soon` takes what the serving thread is to do, from any thread."""
-        self._soon = soon
-        self._asked = 0
+    def __init__(self, later: Callable[[Callable[[], None]], None]) -> None:
+        """Prepare; `later` has the serving thread call a function, from any thread."""
+        self._later = later
+        self._number = 0  # of the calculation asked for last
         self._began: float | None = None
         self._next: Callable[[], None] | None = None
 
     @property
     def busy(self) -> bool:
-        """Whether something is being worked out."""
+        """Whether a calculation is running."""
         return self._began is not None
 
     @property
     def waited(self) -> float:
-        """For how long it has been [s]; 0 as long as nobody minds."""
+        """Time that it has been running [s]; 0 up to `PATIENCE`."""
         elapsed = 0.0 if self._began is None else time.monotonic() - self._began
         return elapsed if elapsed > PATIENCE else 0.0
 
-    def ask(self, task: Callable[[], T], done: Callable[[T], None], failed: Callable[[str], None]) -> None:
-        """Have something worked out in place of what was asked before; from the serving thread."""
-        self._asked += 1
-        mine = self._asked
+    def start(self, task: Callable[[], T], done: Callable[[T], None], failed: Callable[[str], None]) -> None:
+        """Run a task, and in the serving thread `done` with its result or `failed` with its message."""
+        self._number += 1
+        number = self._number
 
-        def end(tell: Callable[[], None]) -> None:
+        def end(report: Callable[[], None]) -> None:
             self._began = None
-            if mine == self._asked:
-                tell()
+            if number == self._number:
+                report()
             if self._next is not None:
-                start, self._next = self._next, None
-                start()
+                begin_next, self._next = self._next, None
+                begin_next()
 
         def work() -> None:
-            _give_way()
+            _lower_priority()
             try:
                 result = task()
             except SaglineError as error:
                 message = str(error)
-                self._soon(lambda: end(lambda: failed(message)))
+                self._later(lambda: end(lambda: failed(message)))
                 return
             except BaseException as error:
                 mistake = error
@@ -140,21 +140,21 @@ class Aside:
                 def fail() -> None:
                     raise mistake
 
-                self._soon(fail)
+                self._later(fail)
                 return
-            self._soon(lambda: end(lambda: done(result)))
+            self._later(lambda: end(lambda: done(result)))
 
-        def start() -> None:
+        def begin() -> None:
             self._began = time.monotonic()
             threading.Thread(target=work, daemon=True).start()
 
         if self._began is None:
-            start()
+            begin()
         else:
-            self._next = start
+            self._next = begin
 
 
-def _give_way() -> None:
+def _lower_priority() -> None:
     """Let this thread have a processor where no other wants it."""
     if sys.platform == "linux":  # elsewhere this would be the whole process
         os.nice(NICENESS)

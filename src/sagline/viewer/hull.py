@@ -6,10 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-import viser
 from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
@@ -17,10 +16,10 @@ from sagline.core.arrays import Array, Flags, Indices
 from sagline.core.numbers import counted, n
 from sagline.robot.robot import Robot
 from sagline.tension.methods import MinimumNorm
-from sagline.viewer.readout import css_color
+from sagline.viewer.nodes import Nodes
+from sagline.viewer.readout import color_key
 from sagline.viewer.slices import MarginScale
-from sagline.viewer.tension_scale import cable_color
-from sagline.viewer.wording import ForceUnit
+from sagline.viewer.tension_scale import ForceUnit, cable_color
 from sagline.workspaces.boundary import Outline, outline
 from sagline.workspaces.criteria import LeastMargin
 from sagline.workspaces.levels import Levels
@@ -54,46 +53,36 @@ class Patch(NamedTuple):
         return cls(vertices[used], index.reshape(-1, 3), color)
 
 
-class Patches:
-    """Patches that are drawn, in place of those before."""
-
-    def __init__(self, scene: viser.SceneApi, name: str) -> None:
-        """Begin with none, under a name in the scene."""
-        self._scene, self._name = scene, name
-        self.meshes: list[Any] = []
-
-    def show(self, patches: list[Patch], side: Any = "double") -> None:
-        """Draw these and no others, while the server is `atomic`, so that corners and faces change together."""
-        while len(self.meshes) > len(patches):
-            self.meshes.pop().remove()
-        for k, patch in enumerate(patches):
-            corners, faces = patch.vertices.astype(np.float32), patch.faces.astype(np.uint32)
-            if k < len(self.meshes):
-                mesh = self.meshes[k]
-                mesh.vertices, mesh.faces, mesh.side = corners, faces, side
-                mesh.color, mesh.opacity = patch.color, patch.opacity
-                continue
-            self.meshes.append(
-                self._scene.add_mesh_simple(
-                    f"{self._name}/{k}", corners, faces, color=patch.color, opacity=patch.opacity, side=side,
-                    cast_shadow=False, receive_shadow=False,
-                )
-            )  # fmt: skip
+def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "double") -> None:
+    """Draw patches below a name in place of those before; in `atomic`, so that corners and faces change together."""
+    for k, patch in enumerate(patches):
+        nodes.draw(
+            f"{name}/{k}",
+            nodes.scene.add_mesh_simple,
+            vertices=patch.vertices.astype(np.float32),
+            faces=patch.faces.astype(np.uint32),
+            color=patch.color,
+            opacity=patch.opacity,
+            side=side,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+    nodes.keep_first(name, len(patches))
 
 
 CELLS: Final = 30  # along each edge of a cube; another box has as many cells, which are cubes too
 MOST_CELLS: Final = 64  # along the longest edge
 ROUGH: Final = 2  # times as long are cells in the hull that comes first
 SMALL: Final = 0.25  # of its box: a region that fills less is looked at once more, with cells as much smaller
-LEAST: Final = 0.005  # of the wall: what limits less is not told
+LEAST: Final = 0.005  # of the wall: what limits less is not written
 
 
-class Asked(NamedTuple):
-    """What a workspace is of.
+class WorkspaceQuery(NamedTuple):
+    """Robot, orientation, cable model and loads of a workspace.
 
     Attributes:
-        robot: As the settings have changed it.
-        quaternion: Of the platform, shape (4,).
+        robot: The robot, as the settings have changed it.
+        quaternion: Orientation of the platform, shape (4,).
         model: Cable model.
         wrenches: Loads to be borne.
     """
@@ -105,18 +94,18 @@ class Asked(NamedTuple):
 
     @property
     def orientations(self) -> Orientations:
-        """The one of the platform."""
+        """The orientation of the platform."""
         return Orientations(Rotation.from_quat(self.quaternion))
 
     def levels(self) -> Levels:
-        """What says where it ends."""
+        """Levels whose sign change is the boundary."""
         margin = (LeastMargin(),)
         return Levels(self.robot, self.wrenches, self.orientations, margin, self.model, MinimumNorm(), None, None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hull:
-    """A hull that has been worked out.
+    """Boundary of a region.
 
     Attributes:
         vertices: Corners [m], shape (V, 3).
@@ -124,7 +113,7 @@ class Hull:
         margin: At the vertices [N], shape (V,).
         owner: The cable that limits at each face, -1 where none does, shape (F,).
         on_box: Which faces are those of the robot's box, shape (F,).
-        told: What it is, in words, as HTML.
+        text: HTML that describes it.
         by_cable: The faces by their owners.
         longest: The longest edge of a face [m]; 0 without any.
     """
@@ -134,25 +123,21 @@ class Hull:
     margin: Array
     owner: Indices
     on_box: Flags
-    told: str
+    text: str
     by_cable: list[Patch]
     longest: float
 
     @classmethod
-    def of(cls, vertices: Array, faces: Indices, margin: Array, cable: Indices, on_box: Flags, told: str) -> Hull:
-        """A hull of which it is known which cable limits at each vertex."""
-        owner = np.where(on_box, -1, _most(cable[faces]))
+    def of(cls, vertices: Array, faces: Indices, margin: Array, cable: Indices, on_box: Flags, text: str) -> Hull:
+        """A hull from the cable that limits at each vertex."""
+        owner = np.where(on_box, -1, _majority(cable[faces]))
         patches = [Patch.of(vertices, faces[owner == k], cable_color(k)) for k in np.unique(owner).tolist()]
         corners = vertices[faces]
         longest = float(np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(initial=0.0))
-        return cls(vertices, faces, margin, owner, on_box, told, patches, longest)
+        return cls(vertices, faces, margin, owner, on_box, text, patches, longest)
 
     def by_margin(self, scale: MarginScale) -> list[Patch]:
-        """The faces by the margin there, on a scale.
-
-        Returns:
-            A patch for each color that there is.
-        """
+        """The faces by the margin there, a patch for each color of a scale."""
         margin = self.margin[self.faces].mean(axis=1)
         bands = scale.bands(margin)
         shades = scale.colors(margin)
@@ -162,27 +147,31 @@ class Hull:
         ]
 
 
-def region_in(asked: Asked, rough: bool) -> Region:
-    """Where is looked, with as many cells as a cube of `CELLS` along each edge has; rough: an eighth of them."""
-    box = region_of(asked.robot, None, CELLS)
+def region_in(query: WorkspaceQuery, rough: bool) -> Region:
+    """The region to search, with as many cells as a cube of `CELLS` along each edge; rough: an eighth of them."""
+    box = region_of(query.robot, None, CELLS)
     cells = max(_cells_of(box.high - box.low)) if box.flat is None else MOST_CELLS
-    return region_of(asked.robot, None, cells // ROUGH if rough else cells)
+    return region_of(query.robot, None, cells // ROUGH if rough else cells)
 
 
-def hull_of(asked: Asked, rough: bool, told: Callable[[int, int], None]) -> Hull:
-    """The hull of a robot's region at one orientation.
+def region_hull(query: WorkspaceQuery, rough: bool, progress: Callable[[int, int], None]) -> Hull:
+    """The hull of a region at one orientation; `progress` is given the poses done and about how many there will be."""
+    region, levels = region_in(query, rough), query.levels()
+    total = 2 * int(np.prod(np.array(region.cells) + 1))  # vertices take as long as nodes
+    done = 0
 
-    Returns:
-        The hull.
-    """
-    region, levels = region_in(asked, rough), asked.levels()
-    levels.on_block = _Told(told, region)
+    def count(poses: int) -> None:
+        nonlocal done
+        done += poses
+        progress(done, max(total, done))
+
+    levels.on_block = count
     found = outline(levels, region)
     closer = None if rough else _around(found, region)
     if closer is not None:
         found = outline(levels, closer)
-    words = _told(found, asked, region) if len(found.surface.faces) else _empty(found, asked, region, rough)
-    return Hull.of(found.surface.vertices, found.surface.faces, found.margin, found.cable, found.on_box, words)
+    text = _hull_text(found, query, region) if len(found.surface.faces) else _empty_text(found, query, region, rough)
+    return Hull.of(found.surface.vertices, found.surface.faces, found.margin, found.cable, found.on_box, text)
 
 
 def _around(found: Outline, region: Region) -> Region | None:
@@ -197,74 +186,59 @@ def _around(found: Outline, region: Region) -> Region | None:
     return region._replace(low=low, high=high, cells=_cells_of(high - low))
 
 
-class _Told:
-    """Tells of poses as they are done; how many there will be is known only about."""
-
-    def __init__(self, told: Callable[[int, int], None], region: Region) -> None:
-        self._done, self._told = 0, told
-        self._whole = 2 * int(np.prod(np.array(region.cells) + 1))  # vertices take as long as nodes
-
-    def __call__(self, count: int) -> None:
-        self._done += count
-        self._told(self._done, max(self._whole, self._done))
-
-
 def _cells_of(size: Array) -> tuple[int, int, int]:
-    """How many cells along the edges of a box [m], all about cubes."""
+    """Numbers of cells along the edges of a box [m], about cubes."""
     along = CELLS * size / np.prod(size) ** (1.0 / 3.0)
     x, y, z = np.clip(np.rint(along), 1, MOST_CELLS).astype(int).tolist()
     return x, y, z
 
 
-def _told(found: Outline, asked: Asked, region: Region) -> str:
+def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
     """HTML: how large it is, what limits it most, and where it goes on."""
     parts = f" in {counted(found.parts, 'part')}" if found.parts > 1 else ""
-    text = f"<b>Region</b> {n(found.volume, '.3g', region.unit)}{parts}, {escape(str(asked.wrenches))}"
-    marks = [
-        f'<span class="key"><span class="swatch" style="background:{css_color(np.array(cable_color(k)))}"></span>'
-        f" {f'cable {k}' if k >= 0 else 'no cable'}, {n(100.0 * share, '.0f')} %</span>"
+    text = f"<b>Region</b> {n(found.volume, '.3g', region.unit)}{parts}, {escape(str(query.wrenches))}"
+    key = color_key(
+        (cable_color(k), f"{f'cable {k}' if k >= 0 else 'no cable'}, {n(100.0 * share, '.0f')} %")
         for k, share in found.shares.items()
         if share >= LEAST
-    ]
-    if marks:
-        text += f"<br><b>Its wall by what limits</b> &nbsp;{''.join(marks)}"
+    )
+    if key:
+        text += f"<br><b>Its wall by what limits</b> &nbsp;{key}"
     if found.open_faces:
         text += f"<br>It goes on beyond the robot's box at {escape(', '.join(found.open_faces))}."
     return text
 
 
-def _empty(found: Outline, asked: Asked, region: Region, rough: bool) -> str:
+def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bool) -> str:
     """HTML: that there is none, and what comes nearest to one; at a rough look, that there is none yet."""
     if rough:
         return "<b>Region</b> none is seen at a rough look"
-    reason = nearest_to(asked.levels(), found.grid, region.box.low, region.box.high).reason
-    return f"<b>Region</b> empty, {escape(str(asked.wrenches))}<br>{escape(reason)}"
+    reason = nearest_to(query.levels(), found.grid, region.box.low, region.box.high).reason
+    return f"<b>Region</b> empty, {escape(str(query.wrenches))}<br>{escape(reason)}"
 
 
-def _most(cables: Indices) -> Indices:
-    """Of each face the cable that most of its corners have; of three different ones the first."""
+def _majority(cables: Indices) -> Indices:
+    """The cable of most corners of each face; of three different ones the first."""
     return np.where(cables[:, 1] == cables[:, 2], cables[:, 1], cables[:, 0])
 
 
-BESIDE: Final = 0.01  # of the reach: so far from the wall its light is drawn, or the wall would hide it here and there
-REACH: Final = 0.16  # of the robot's size: from here on a wall is lit
+BESIDE: Final = 0.01  # of the reach: distance of patches from their wall, which would hide them here and there
+REACH: Final = 0.16  # of the robot's size: patches of a wall nearer than this are drawn
 _RINGS: Final = (0.0, 0.4, 0.7, 1.0)  # of the reach
-_LIGHT: Final = (0.6, 0.35, 0.15)  # opacity in each ring, of which two lie behind each other
+_OPACITIES: Final = (0.6, 0.35, 0.15)  # opacity in each ring, of which two lie behind each other
 
 
-def lit(hull: Hull, position: Array, reach: float) -> list[Patch]:
-    """What of a wall is lit: the nearer, the more.
+def near_patches(hull: Hull, position: Array, reach: float) -> list[Patch]:
+    """Patches of a wall within a distance, more opaque the nearer, in the colors of the cables that limit there.
 
-    Returns:
-        Patches in the colors of the cables that limit there; none where the wall is farther away. The faces of the
-        robot's box are no wall.
+    The faces of the robot's box are no wall.
     """
     near = np.linalg.norm(hull.vertices - position, axis=1) < reach + hull.longest
-    own = np.flatnonzero(near[hull.faces].any(axis=1) & ~hull.on_box)
-    corners, owner = _quartered(hull.vertices[hull.faces[own]]), np.repeat(hull.owner[own], 4)
+    faces_near = np.flatnonzero(near[hull.faces].any(axis=1) & ~hull.on_box)
+    corners, owner = _quartered(hull.vertices[hull.faces[faces_near]]), np.repeat(hull.owner[faces_near], 4)
     away = np.linalg.norm(corners.mean(axis=1) - position, axis=1) / reach
     patches = []
-    for (least, most), opacity in zip(pairwise(_RINGS), _LIGHT, strict=True):
+    for (least, most), opacity in zip(pairwise(_RINGS), _OPACITIES, strict=True):
         ring = (away >= least) & (away < most)
         for cable in np.unique(owner[ring]).tolist():
             chosen = _on_both_sides(corners[ring & (owner == cable)], BESIDE * reach)
@@ -273,8 +247,8 @@ def lit(hull: Hull, position: Array, reach: float) -> list[Patch]:
     return patches
 
 
-def left(margin: float, cable: int, unit: ForceUnit) -> str:
-    """How much is left at the platform, and which cable limits it, in words."""
+def margin_text(margin: float, cable: int, unit: ForceUnit) -> str:
+    """Margin at the platform and the cable that limits it."""
     by = f", cable {cable}" if cable >= 0 else ""
     if not np.isfinite(margin):
         return "nothing limits it" if margin > 0.0 else "nothing holds it"

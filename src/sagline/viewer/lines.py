@@ -18,7 +18,7 @@ _UPRIGHT = 1e-6  # of a run's length, that its rise may be less
 
 
 def points_per_cable(robot: Robot) -> int:
-    """How many points a cable is drawn with, from its frame anchor to its platform end."""
+    """Number of points of a cable, from its frame anchor to its platform end."""
     return POINTS + WRAP_POINTS * bool(pulleys_of(robot).radius.any())
 
 
@@ -81,7 +81,7 @@ def straight(ends: Array) -> Array:
     return np.asarray(ends[:, :1] * (1.0 - share) + ends[:, 1:] * share)
 
 
-def hanging(ends: Array, cables: CableState, sag_scale: float) -> Array:
+def catenaries(ends: Array, cables: CableState, sag_scale: float) -> Array:
     """Points along the cables as they hang (m, POINTS, 3), their sag below the chord drawn some times as large."""
     run = ends[:, 1] - ends[:, 0]
     span = np.hypot(run[:, 0], run[:, 1])

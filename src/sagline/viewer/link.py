@@ -51,11 +51,11 @@ def name_of(robot: Robot) -> str:
     return f"{robot.name}:{crc32(fixed.encode()):08x}"
 
 
-def check_robot(told: str, robot: Robot) -> None:
+def check_robot(text: str, robot: Robot) -> None:
     """Refuse a link of another robot."""
-    name, own = told.rpartition(":")[0], name_of(robot)
-    if told != own:
-        what = "another robot of this name" if name == robot.name else repr(name[:60] or told[:60])
+    name, own = text.rpartition(":")[0], name_of(robot)
+    if text != own:
+        what = "another robot of this name" if name == robot.name else repr(name[:60] or text[:60])
         raise InvalidValueError("the link", f"of {what}", robot.name, "Open it with the robot that it is of.")
 
 
@@ -72,7 +72,7 @@ def listed(values: Array) -> str:
 
 
 def numbers_of(text: str, item: str, unit: str, count: int, largest: float) -> Array:
-    """So many numbers between commas."""
+    """A number of numbers between commas."""
     parts = text.split(",", maxsplit=count)
     if len(parts) != count:
         raise InvalidValueError(item, repr(text[:60]), f"{count} numbers", STEP)
@@ -91,7 +91,7 @@ class LinkedControls:
     """All controls of a page, those to come included."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Take what stands there now for usual: a link tells what is other."""
+        """Take the present values for the usual ones: a link contains those that differ."""
         self._gui = gui
         self._usual = {name: handle.value for name, handle in self._handles().items()}
 
@@ -105,23 +105,23 @@ class LinkedControls:
                 handles[f"{name}-{others + 1}" if others else name] = handle  # force, force-2 and so on
         return handles
 
-    def told(self) -> dict[str, str]:
-        """What is other than usual, by the names of the controls."""
+    def changes(self) -> dict[str, str]:
+        """Values that differ from the usual ones, by the names of the controls."""
         found = {}
         for name, handle in self._handles().items():
             if name not in self._usual or handle.value != self._usual[name]:
                 found[name] = _text(handle)
         return found
 
-    def read(self, told: dict[str, str]) -> Callable[[], None]:
-        """What sets the controls as a link tells, and all others to what is usual."""
+    def read(self, texts: dict[str, str]) -> Callable[[], None]:
+        """Function that sets the controls to the values of a link, and all others to the usual ones."""
         handles = self._handles()
-        unknown = next((name for name in told if name not in handles), None)
+        unknown = next((name for name in texts if name not in handles), None)
         if unknown is not None:
             raise InvalidValueError(
                 "the link", f"with {unknown[:LONGEST]!r}", "controls of this page", STEP_OF_CONTROLS
             )
-        values = {name: _value(handles[name], name, text) for name, text in told.items()}
+        values = {name: _value(handles[name], name, text) for name, text in texts.items()}
 
         def put() -> None:
             for name, handle in handles.items():
@@ -201,14 +201,14 @@ MASS, SHARING, HAND = "platform-load", "tensions", "by-hand"  # names of control
 
 
 class Linking:
-    """Makes links and follows them; all of it belongs to the thread that serves."""
+    """Makes links to a view, and follows them."""
 
     def __init__(self, page: Page, controls: LinkedControls) -> None:
         """Begin; `controls` are those of the page."""
         self._page, self._robot, self._controls = page, page.robot, controls
         self._framing, self._player, self._loaded = page.framing, page.player, page.source.mass is not None
 
-    def told(self, view: View, client: int) -> str:
+    def link_to(self, view: View, client: int) -> str:
         """A link to a view, through the camera of a client."""
         parts = {"robot": name_of(self._robot)}
         if view.played is not None:
@@ -220,7 +220,7 @@ class Linking:
         camera = self._framing.moved(client)
         if camera is not None:
             parts["camera"] = listed(camera)
-        controls = self._controls.told()
+        controls = self._controls.changes()
         if MASS in controls or self._loaded:
             controls[MASS] = repr(view.settings.mass).removesuffix(".0")
         if isinstance(view.settings.tension, ByHand):
@@ -229,7 +229,7 @@ class Linking:
         return link_text({**parts, **controls})
 
     def follow(self, text: str, client: int) -> None:
-        """Bring the page, and the camera of a client, to what a link tells."""
+        """Bring the page, and the camera of a client, to the state of a link."""
         parts = parts_of(text)
         check_robot(parts.pop("robot"), self._robot)
         place = self._place(parts)
@@ -252,7 +252,7 @@ class Linking:
         self._page.refresh()
 
     def _place(self, parts: dict[str, str]) -> Callable[[], None]:
-        """Where to go to, or to which time."""
+        """Function that goes to the pose or the time of a link."""
         time, pose = parts.pop("time", None), parts.pop("pose", None)
         if (time is None) == (pose is None):
             raise InvalidValueError("the link", "with both or none", "a pose or a time", STEP)

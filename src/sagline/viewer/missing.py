@@ -19,7 +19,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix
 from sagline.tension.methods import MinimumNorm
-from sagline.viewer.hull import CELLS, Asked
+from sagline.viewer.hull import CELLS, WorkspaceQuery
 from sagline.viewer.snapshot import Snapshot
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region, region_of
@@ -32,7 +32,7 @@ _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
 
 class AtLimit(NamedTuple):
-    """A cable that stands at a limit.
+    """A cable at a limit.
 
     Attributes:
         cable: Its number.
@@ -44,18 +44,18 @@ class AtLimit(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As it is written at the cable."""
+        """Label at the cable."""
         return f"{self.cable} at its {'lower' if self.lower else 'upper'} limit"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Missing:
-    """A wrench that would do, the force alone wherever one does.
+    """Smallest wrench with which a pose is feasible, a force alone where one suffices.
 
     Attributes:
         wrench: About the center of mass, world axes [N, N m], shape (6,).
-        state: The robot as it would be held then, its blocking cables at their limits.
-        limits: The cables that stand against the load.
+        state: The equilibrium with it, the blocking cables at their limits.
+        limits: The cables at limits.
     """
 
     wrench: Array
@@ -69,12 +69,12 @@ class Missing:
 
     @property
     def moment(self) -> Array:
-        """Its moment [N m], shape (3,); zero where a force alone does."""
+        """Its moment [N m], shape (3,); zero where a force alone suffices."""
         return self.wrench[3:]
 
 
 def missing_of(snapshot: Snapshot) -> Missing | None:
-    """What is missing at a pose that is not feasible; None where that is not the reason, or nothing was found."""
+    """Missing wrench of an infeasible pose; None where another reason holds, or none was found."""
     plan = snapshot.plan
     if plan is None or snapshot.status not in _EXPLAINED:
         return None
@@ -94,7 +94,7 @@ def missing_of(snapshot: Snapshot) -> Missing | None:
 
 
 def _step(plan: Plan) -> Array:
-    """The least force that would do [N, N m], shape (6,); where none would, the least wrench."""
+    """Smallest force that suffices [N, N m], shape (6,); where none does, the smallest wrench."""
     if plan.relief is not None and np.isfinite(plan.relief).all():
         return np.concatenate((plan.relief, np.zeros(3)))
     robot = plan.state.one_robot
@@ -111,10 +111,7 @@ def _step(plan: Plan) -> Array:
 
 
 def _limits(plan: Plan, held: Plan) -> tuple[AtLimit, ...]:
-    """At which limits the cables stand that stand against the load.
-
-    Where a force alone would do, these are the blocking ones of the plan; else those at a limit with the least wrench.
-    """
+    """Cables at limits: the blocking ones of the plan where a force suffices, else those with the smallest wrench."""
     robot, tension = plan.state.one_robot, held.state.limited_tension
     to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
     which = plan.blocking
@@ -126,19 +123,19 @@ def _limits(plan: Plan, held: Plan) -> tuple[AtLimit, ...]:
 NODES: Final = 15  # of the first grid, along each axis
 AROUND: Final = 2  # points of a finer one to each side
 STARTS: Final = 4
-ROUNDS: Final = 40
+ITERATIONS: Final = 40
 FINEST: Final = 1e-6  # of the region's size
-AT_ONCE: Final = 250  # positions: a few milliseconds, after which others have their turn
+BLOCK: Final = 250  # positions: a few milliseconds, after which other threads run
 INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # of the region's size: the border itself is no place to stay
 
 
-class NearestHeld(NamedTuple):
-    """A pose that is held.
+class NearestFeasible(NamedTuple):
+    """The nearest feasible pose.
 
     Attributes:
         pose: The pose.
-        distance: To it [m].
-        turned: Whether the platform has to be turned too.
+        distance: Distance to it [m].
+        turned: Whether the orientation differs too.
     """
 
     pose: Pose
@@ -146,33 +143,29 @@ class NearestHeld(NamedTuple):
     turned: bool
 
 
-def nearest_held(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestHeld | None:
-    """Look for it.
-
-    Returns:
-        The pose; None where none was found within the robot's region.
-    """
+def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestFeasible | None:
+    """The nearest feasible pose within the robot's region, turned as a pose or level; None where none was found."""
     for turned in (False, True):
-        looked_at = Pose(pose.position, np.eye(3)) if turned else pose
-        if turned and np.allclose(looked_at.matrix, pose.matrix):
+        start = Pose(pose.position, np.eye(3)) if turned else pose
+        if turned and np.allclose(start.matrix, pose.matrix):
             break
         try:
-            search = _Search(robot, looked_at, model, wrench)
+            search = _Search(robot, start, model, wrench)
             found = search.nearest(pose.position)
         except SaglineError:  # a pattern that does not turn so
             continue
         if found is not None:
-            there = Pose.from_quaternion(found, looked_at.quaternion)
-            return NearestHeld(there, float(np.linalg.norm(found - pose.position)), turned)
+            there = Pose.from_quaternion(found, start.quaternion)
+            return NearestFeasible(there, float(np.linalg.norm(found - pose.position)), turned)
     return None
 
 
 class _Search:
-    """At one orientation."""
+    """Search at one orientation."""
 
     def __init__(self, robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> None:
         self._robot, self._model, self._wrench, self._quaternion = robot, model, wrench, pose.quaternion
-        self._levels: Levels = Asked(robot, pose.quaternion, model, WrenchBox(center=wrench)).levels()
+        self._levels: Levels = WorkspaceQuery(robot, pose.quaternion, model, WrenchBox(center=wrench)).levels()
         self._region: Region = region_of(robot, None, CELLS)
         free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5
         if self._region.flat is not None:
@@ -181,28 +174,28 @@ class _Search:
         self._size = float(np.max(self._region.high - self._region.low))
 
     def nearest(self, start: Array) -> Array | None:
-        """The nearest position where it is held [m], (3,)."""
+        """The nearest feasible position [m], shape (3,)."""
         low, high = self._region.low, self._region.high
         axes = [np.linspace(low[axis], high[axis], NODES) for axis in self._free]
         nodes = np.tile(start, (NODES ** len(axes), 1))
         nodes[:, self._free] = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
-        inside = nodes[self._held(nodes)]
+        inside = nodes[self._feasible(nodes)]
         if not len(inside):
             return None
         order = np.argsort(np.linalg.norm(inside - start, axis=1))[:STARTS]
         step = (high - low)[self._free] / (NODES - 1)
         best = min((self._refined(start, node, step) for node in inside[order]), key=lambda at: _distance(at, start))
-        return self._moved_in(start, best)
+        return self._inside(start, best)
 
     def _refined(self, start: Array, best: Array, step: Array) -> Array:
-        """Nearer and nearer, by finer and finer grids around the nearest so far."""
+        """The nearest feasible position near one, by finer and finer grids around it."""
         ways = np.linspace(-1.0, 1.0, 2 * AROUND + 1)
         offsets = np.stack(np.meshgrid(*[ways] * len(step), indexing="ij"), axis=-1).reshape(-1, len(step))
-        for _ in range(ROUNDS):
+        for _ in range(ITERATIONS):
             places = np.tile(best, (len(offsets), 1))
             places[:, self._free] += offsets * step
             nearer = places[np.linalg.norm(places - start, axis=1) < _distance(best, start)]
-            held = nearer[self._held(nearer)]
+            held = nearer[self._feasible(nearer)]
             if len(held):
                 best = held[np.argmin(np.linalg.norm(held - start, axis=1))]
             else:
@@ -211,8 +204,8 @@ class _Search:
                     break
         return best
 
-    def _moved_in(self, start: Array, best: Array) -> Array | None:
-        """A little beyond the border, where the platform is held as `inverse` sees it."""
+    def _inside(self, start: Array, best: Array) -> Array | None:
+        """A position a little inside the boundary, feasible for `inverse`."""
         way = best - start
         way = way / max(float(np.linalg.norm(way)), 1e-12)
         for share in INWARD:
@@ -221,7 +214,7 @@ class _Search:
                 return place
         return None
 
-    def _held(self, places: Array) -> Flags:
+    def _feasible(self, places: Array) -> Flags:
         parts = [self._levels.details(part).margin >= 0.0 for part in _parts(places)]
         return np.concatenate(parts) if parts else np.zeros(0, dtype=np.bool_)
 
@@ -230,7 +223,7 @@ class _Search:
 
 
 def _parts(places: Array) -> list[Array]:
-    return [places[k : k + AT_ONCE] for k in range(0, len(places), AT_ONCE)]
+    return [places[k : k + BLOCK] for k in range(0, len(places), BLOCK)]
 
 
 def _distance(one: Array, other: Array) -> float:

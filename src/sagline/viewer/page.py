@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import viser
@@ -22,8 +22,8 @@ from sagline.viewer.channel import Channel
 from sagline.viewer.feature import Feature, Reading, View
 from sagline.viewer.panel import Panel
 from sagline.viewer.player import Beside, Played, Player
+from sagline.viewer.robot_scene import RobotScene
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.stage import Stage
 from sagline.viewer.state_code import Source
 from sagline.viewer.tension_scale import TensionScale
 
@@ -39,7 +39,7 @@ class Page:
         ready: Whether a reading can be had without waiting.
         channel: Messages to and from browsers.
         panel: Controls and readings; a feature adds a tab to `panel.readings`.
-        stage: The robot in the scene.
+        scene: The robot in the scene.
         player: What is played.
         framing: Cameras of the clients.
         scale: Colors of tensions.
@@ -74,27 +74,32 @@ class Page:
         self.tasks: deque[Callable[[], None]] = deque()  # appended to by any thread
         self.scale, self.size = TensionScale.of(robot), solids.size_of(robot)
         self.channel = Channel(server.gui, self.later)
-        server.on_client_connect(self.channel.welcome)
-        server.on_client_disconnect(self.channel.part)
+        server.on_client_connect(self.channel.connect)
+        server.on_client_disconnect(self.channel.disconnect)
         home = home_pose(robot) if played is None else played.home
         self.home = home if pose is None else pose
         self.forget: Callable[[], None] = lambda: None
         self.panel = Panel(server, robot, self.scale, self.refresh, lambda: self.later(lambda: self.forget()))
-        self.stage = Stage(server.scene, robot, self.home)
-        self.extent = self.stage.extent(self.home)
+        self.scene = RobotScene(server.scene, robot, self.home)
+        self.extent = self.scene.extent(self.home)
         self.framing = Framing(server, *self.extent)
         self.view: View | None = None
         self.features: tuple[Feature, ...] = ()
         self.player = Player(played, self._put_on, beside)
 
     def later(self, task: Callable[[], None]) -> None:
-        """Have the serving thread do something; from any thread."""
+        """Have the serving thread call a function; from any thread."""
         self.tasks.append(task)
         self.wake.set()
 
     def refresh(self) -> None:
         """Show everything once more; from any thread."""
         self.wake.set()
+
+    def refresh_on(self, *handles: Any) -> None:
+        """Refresh when one of these controls changes."""
+        for handle in handles:
+            handle.on_update(lambda _: self.refresh())
 
     @property
     def state(self) -> Equilibrium | None:
@@ -111,7 +116,7 @@ class Page:
     def go(self, pose: Pose) -> None:
         """Put the platform to a pose."""
         self.player.leave()
-        self.stage.place(pose)
+        self.scene.place(pose)
         self.refresh()
 
     def go_home(self) -> None:
@@ -124,14 +129,14 @@ class Page:
         self.go(pose)
 
     def check_near(self, pose: Pose) -> None:
-        """Refuse a pose that anybody may have asked for, where no drag leads."""
-        self.stage.check_near(pose.position)
+        """Refuse a pose out of reach."""
+        self.scene.check_near(pose.position)
         both = np.stack((self.home.position, pose.position)), np.stack((self.home.quaternion, pose.quaternion))
         check_reach(self.robot, Pose.from_quaternion(*both), "pose")
 
     def _put_on(self, played: Played | None) -> None:
         """Something else is played, or nothing."""
         if played is None:
-            self.stage.show_traces(np.empty((0, 3)), np.empty((0, 3)))
+            self.scene.show_traces(np.empty((0, 3)), np.empty((0, 3)))
         for feature in self.features:
             feature.put_on(played)

@@ -1,4 +1,4 @@
-"""The panels in the browser: on the left what can be changed, on the right what comes of it."""
+"""Panels in the browser: controls on the left, readings on the right."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.viewer import readout
 from sagline.viewer.by_hand import BY_HAND, ByHand
-from sagline.viewer.snapshot import METHODS, MODELS, Settings
+from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_history
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.wording import remembers
 
 LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # px
 _LIGHTEST, _HEAVIEST = 0.1, 4.0  # of the robot's own mass
@@ -60,7 +59,7 @@ class Panel:
         return bool(self._ghost.value)
 
     def settings(self) -> Settings:
-        """What is set."""
+        """The settings."""
         mass = _slid(self._mass)
         return Settings(
             mass=self._own_mass if mass == written_mass(self._own_mass) else mass,
@@ -86,7 +85,7 @@ class Panel:
             handle.visible = shown
         self._of_run.visible = not shown
         self._of_run.content = readout.block(f'<div class="quiet">{still}</div>')
-        self._forgetting.visible = shown and remembers(self._tension())
+        self._forgetting.visible = shown and depends_on_history(self._tension())
 
     def read_out(self, verdict: str, numbers: str) -> None:
         """Show the readings."""
@@ -127,7 +126,7 @@ class Panel:
         self._verdict.content = readout.refused(message)
 
     def watched(self, handle: Any) -> Any:
-        """A handle whose changes are told."""
+        """A control that calls `changed` on a change."""
         handle.on_update(lambda _: self._changed())
         return handle
 

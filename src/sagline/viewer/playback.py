@@ -16,17 +16,22 @@ from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.drawn import Drawn
-from sagline.viewer.readout import block, box, css_color, pose_line, sentence
+from sagline.viewer.drawn import InMotion
+from sagline.viewer.readout import block, box, cable_table, definitions, pose_line
+from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.stage import ACTUAL, WANTED
-from sagline.viewer.tension_scale import TensionScale, force_unit
-from sagline.viewer.timeline import Chart, Mark, Track, cable_names, infeasible, outside, tension_limits
-from sagline.viewer.wording import ForceUnit, number
+from sagline.viewer.tension_scale import ForceUnit, TensionScale, force_unit, number
+from sagline.viewer.timeline import Chart, Mark, Track, cable_names, infeasible_spans, limit_violations, tension_limits
+
+CABLES = {
+    "none": "massless cables",
+    "lumped": "cables with mass, as chains of nodes",
+    "modal": "cables with mass, as their linear modes",
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moment(Drawn):
+class Moment(InMotion):
     """A robot in motion.
 
     Attributes:
@@ -44,7 +49,7 @@ class Moment(Drawn):
 
     @property
     def pose(self) -> Pose:
-        """Where the platform is."""
+        """Pose of the platform."""
         return self.simulation.pose[self.index]
 
     @property
@@ -54,7 +59,7 @@ class Moment(Drawn):
 
     @property
     def past(self) -> tuple[Occurrence, ...]:
-        """What has happened."""
+        """Events so far."""
         now = float(self.simulation.time[self.index])
         return tuple(event for event in self.simulation.events if event.time <= now)
 
@@ -75,72 +80,63 @@ class Moment(Drawn):
         """Unstrained lengths off the drums [m], shape (m,)."""
         return np.asarray(self.simulation.length[self.index])
 
+    def verdict(self) -> str:
+        """HTML of the kind of simulation, the numbers of the moment, and the events so far."""
+        simulation, unit = self.simulation, force_unit(self.robot)
+        speed, energy = float(np.linalg.norm(simulation.twist[self.index, :3])), simulation.energy
+        size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
+        rows = [
+            ("Cables", CABLES.get(simulation.cable_mass, simulation.cable_mass)),
+            ("Time", f"{self.time:.3f} s"),
+            ("Speed", n(speed, ".3g", "m/s")),
+            ("Tensions", f"{unit.bare(np.nanmin(self.tension))} to {unit.written(np.nanmax(self.tension))}"),
+            ("Energy error", n(energy.error[self.index], ".2g", "J", size=size)),
+        ]
+        rows += [("Event", event_text(event, unit)) for event in self.past]
+        return box("quiet", "Simulated", definitions(rows))
+
+    def numbers(self, scale: TensionScale) -> str:
+        """HTML of the pose, and of tension and length of every cable."""
+        unit, length = force_unit(self.robot), self.simulation.length[self.index]
+        heads = ("cable", f"at the winch<br>[{unit.name}]", "length<br>[m]")
+        columns = [unit.bare(each) for each in self.tension], [number(each, ".4f") for each in length]
+        return block(pose_line(self.pose) + cable_table(heads, columns, scale.colors(self.tension)))
+
+    @property
+    def why_no_choice(self) -> str:
+        """Reason why tensions are not chosen."""
+        return "In motion nothing is chosen: tensions follow from lengths and from where the platform is."
+
+    @property
+    def feasible(self) -> bool:
+        """True: any motion is drawn as feasible."""
+        return True
+
+    @property
+    def rest(self) -> None:
+        """No second pose."""
+        return None
+
     @property
     def nodes(self) -> Array | None:
         """Positions of the cables at their nodes [m], shape (m, P, 3); None of cables without."""
         return None if self.simulation.nodes is None else np.asarray(self.simulation.nodes[self.index])
 
 
-CABLES = {
-    "none": "massless cables",
-    "lumped": "cables with mass, as chains of nodes",
-    "modal": "cables with mass, as their linear modes",
-}
-
-
-def verdict(moment: Moment) -> str:
-    """What kind of simulation it is, the numbers of the moment, and what has happened."""
-    simulation, unit = moment.simulation, force_unit(moment.robot)
-    speed = float(np.linalg.norm(simulation.twist[moment.index, :3]))
-    rows = [
-        ("Cables", CABLES.get(simulation.cable_mass, simulation.cable_mass)),
-        ("Time", f"{moment.time:.3f} s"),
-        ("Speed", n(speed, ".3g", "m/s")),
-        ("Tensions", f"{unit.bare(np.nanmin(moment.tension))} to {unit.written(np.nanmax(moment.tension))}"),
-        ("Energy error", n(simulation.energy.error[moment.index], ".2g", "J", size=_size(moment))),
-    ]
-    rows += [("Event", happened(event, unit)) for event in moment.past]
-    text = "".join(f"<dt>{name}</dt><dd>{what}</dd>" for name, what in rows)
-    return box("quiet", "Simulated", f"<dl>{text}</dl>")
-
-
-def numbers(moment: Moment, scale: TensionScale) -> str:
-    """The pose, and tension and length of every cable."""
-    unit, colors = force_unit(moment.robot), scale.colors(moment.tension)
-    length = moment.simulation.length[moment.index]
-    rows = "".join(
-        f'<tr><td><span class="swatch" style="background:{css_color(colors[i])}"></span> {i}</td>'
-        f"<td>{unit.bare(moment.tension[i])}</td><td>{number(length[i], '.4f')}</td></tr>"
-        for i in range(moment.robot.cable_count)
-    )
-    head = f"<tr><th>cable</th><th>at the winch<br>[{unit.name}]</th><th>length<br>[m]</th></tr>"
-    return block(f"{pose_line(moment.pose)}<table>{head}{rows}</table>")
-
-
-def polygon() -> str:
-    """Why there are no tensions to choose from."""
-    return sentence("In motion nothing is chosen: tensions follow from lengths and from where the platform is.")
-
-
-def happened(event: Occurrence, unit: ForceUnit) -> str:
-    """An event in words."""
+def event_text(event: Occurrence, unit: ForceUnit) -> str:
+    """Description of an event."""
     what = event.kind if event.cable is None else f"{event.kind} of cable {event.cable}"
     before, after = unit.bare(event.tension_before), unit.written(event.tension_after)
     return f"{what} at {event.time:.3f} s: {before} before, then at most {after}"
 
 
-def _size(moment: Moment) -> float:
-    energy = moment.simulation.energy
-    return float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A plan of N poses with where the platform really goes.
+    """A plan of N poses, with the poses confirmed by forward kinematics.
 
     Attributes:
         plan: The plan.
-        confirmation: Its lengths wound onto exact cables.
+        confirmation: The plan confirmed with exact cables.
         time: Time of each sample [s], shape (N,), from 0 on; one second a sample for poses without a path.
     """
 
@@ -168,7 +164,7 @@ class Run:
 
     @property
     def home(self) -> Pose:
-        """Where it begins."""
+        """The first pose."""
         return self.plan.state.pose[0]
 
     @property
@@ -191,7 +187,7 @@ class Run:
         return self.snapshot(self.index_at(time))
 
     def track(self) -> Track:
-        """The tensions that are limited and the lengths, and where there are none."""
+        """Charts of the limited tensions and the lengths, and spans of infeasible poses."""
         plan, robot, unit = self.plan, self.robot, force_unit(self.robot)
         name = "Chord tension" if robot.tension_limits_of == "chord" else "Tension at the winch"
         limits = tension_limits(robot, unit.newtons, at=robot.tension_limits_of)
@@ -201,7 +197,7 @@ class Run:
         )
         length = Chart("Unstrained length", "m", 4, cables, lambda rows: plan.unstrained_length[rows])
         paths = (("desired", WANTED), ("actual", ACTUAL))
-        return Track(self.time, (tension, length), infeasible(plan, self.time, unit), (), paths)
+        return Track(self.time, (tension, length), infeasible_spans(plan, self.time, unit), (), paths)
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
@@ -217,7 +213,7 @@ def _sample(plan: Plan, i: int) -> Plan:
     return replace(plan, state=plan.state[i], path=None, **entries)
 
 
-FAILURES: Final = ("break", "stall", "slack", "saturate")  # of what can happen
+FAILURES: Final = ("break", "stall", "slack", "saturate")  # kinds of events
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -240,7 +236,7 @@ class Playback:
 
     @property
     def home(self) -> Pose:
-        """Where it begins."""
+        """The first pose."""
         return self.simulation.pose[0]
 
     @property
@@ -264,13 +260,18 @@ class Playback:
         return np.full_like(actual, np.nan), actual
 
     def track(self) -> Track:
-        """Tensions at the frame ends, how far the platform is from where it began, and what happened."""
+        """Charts of the tensions at the frame ends and the displacement, and the events."""
         simulation, robot, unit = self.simulation, self.robot, force_unit(self.robot)
         limits = tension_limits(robot, unit.newtons, at="frame_end")
-        held = self._held()
+        tension_rows = self._tensions()
         cables = cable_names(robot)
         tension = Chart(
-            "Tension at the winch", unit.name, unit.decimals, cables, lambda rows: held[rows] / unit.newtons, limits
+            "Tension at the winch",
+            unit.name,
+            unit.decimals,
+            cables,
+            lambda rows: tension_rows[rows] / unit.newtons,
+            limits,
         )
         position = simulation.pose.position
         away = Chart(
@@ -278,18 +279,18 @@ class Playback:
         )
         began = float(simulation.time[0])
         marks = tuple(
-            Mark(event.time - began, happened(event, unit), bad=event.kind in FAILURES) for event in simulation.events
+            Mark(event.time - began, event_text(event, unit), bad=event.kind in FAILURES) for event in simulation.events
         )
-        spans = outside(robot, self.time, held, unit)
+        spans = limit_violations(robot, self.time, tension_rows, unit)
         return Track(self.time, (tension, away), spans, marks, (("actual", ACTUAL),))
 
-    def _held(self) -> Array:
-        """The tensions, of broken cables until they broke (N, m)."""
-        simulation, held = self.simulation, self.simulation.tensions.copy()
+    def _tensions(self) -> Array:
+        """Tensions (N, m), NaN after a break."""
+        simulation, tension = self.simulation, self.simulation.tensions.copy()
         for event in simulation.events:
             if event.kind == "break":
-                held[simulation.time >= event.time, event.cable] = np.nan
-        return held
+                tension[simulation.time >= event.time, event.cable] = np.nan
+        return tension
 
 
 def _sample_at(times: Array, time: float) -> int:

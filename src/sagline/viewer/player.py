@@ -9,25 +9,25 @@ from typing import NamedTuple, Protocol
 from sagline.core.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.drawn import Drawn
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.timeline import Track
 
 
 class Played(Protocol):
-    """Something that lasts, and can be looked at at any time of it."""
+    """A run, a simulation or a log."""
 
     @property
     def name(self) -> str:
-        """What it is, in a word."""
+        """Name of its kind."""
 
     @property
     def robot(self) -> Robot:
-        """Whose it is."""
+        """The robot."""
 
     @property
     def home(self) -> Pose:
-        """Where it begins."""
+        """The first pose."""
 
     @property
     def duration(self) -> float:
@@ -35,16 +35,16 @@ class Played(Protocol):
 
     @property
     def still(self) -> str:
-        """What to say in place of what would change the robot."""
+        """Text in place of the controls that would change the robot."""
 
-    def sight(self, time: float) -> Snapshot | Drawn:
-        """What there is to see at a time [s]."""
+    def sight(self, time: float) -> Snapshot | InMotion:
+        """State at a time [s]."""
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
 
     def track(self) -> Track:
-        """What the timeline shows of it."""
+        """Charts of the timeline."""
 
 
 class Beside(NamedTuple):
@@ -61,7 +61,7 @@ class Beside(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Where a playback is.
+    """Clock of a playback.
 
     Attributes:
         duration: Time of the end [s].
@@ -95,8 +95,8 @@ class Timeline:
         return Timeline(self.duration, min(max(time, 0.0), self.duration), False)
 
 
-class Kept(NamedTuple):
-    """What was played.
+class PlayerState(NamedTuple):
+    """State of a player.
 
     Attributes:
         played: What; None for nothing.
@@ -112,7 +112,7 @@ class Kept(NamedTuple):
 
 
 class Player:
-    """A run, a simulation or a log, and its clock; all of it belongs to the thread that serves.
+    """A run, a simulation or a log, and its clock.
 
     Attributes:
         played: What is played; None for nothing.
@@ -135,12 +135,12 @@ class Player:
 
     @property
     def given(self) -> bool:
-        """Whether what is played is what the page was opened with."""
+        """Whether the page was opened with what is played."""
         return self.played is self._given
 
     @property
     def beside(self) -> Beside | None:
-        """What is played beside it."""
+        """The second run."""
         return self._beside if self.played is not None and self.played is self._given else None
 
     def play(self, played: Played | None, *, at_once: bool = False) -> None:
@@ -165,11 +165,11 @@ class Player:
         self.played = played
         self.clock = Timeline(self._duration(), self.clock.time, self.clock.playing or waits)
 
-    def kept(self) -> Kept:
-        """What is played, to be put back later."""
-        return Kept(self.played, self.played is self._given, self.clock, self.following)
+    def save(self) -> PlayerState:
+        """State to return to later."""
+        return PlayerState(self.played, self.played is self._given, self.clock, self.following)
 
-    def put_back(self, kept: Kept) -> None:
+    def restore(self, kept: PlayerState) -> None:
         """Play what was kept, where its clock stood; of what was given as much as there is by now."""
         self.play(self._given if kept.given else kept.played)
         self.clock = self.clock.scrubbed(kept.clock.time)
@@ -181,8 +181,8 @@ class Player:
         """Some real time has passed [s]."""
         self.clock = self.clock.advanced(elapsed, self.speed)
 
-    def sight(self) -> Snapshot | Drawn:
-        """What there is to see now."""
+    def sight(self) -> Snapshot | InMotion:
+        """State at the present time."""
         assert self.played is not None
         return self.played.sight(self.clock.time)
 

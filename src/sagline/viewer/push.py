@@ -1,4 +1,4 @@
-"""A force at the platform, and what answers it: where the platform goes, how much more it takes, how it gives way."""
+"""Response of the platform to a force: displacement, reserve up to a limit, compliance."""
 
 from __future__ import annotations
 
@@ -18,37 +18,37 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.statics.stiffness import stiffness
 
-FORCES: Final = 24  # tried at once: each round narrows the place of a limit to a 23rd
-ROUNDS: Final = 4
+FORCES: Final = 24  # tried at once: each iteration narrows the bounds of a limit to a 23rd
+ITERATIONS: Final = 4
 SMALLEST: Final = 1e-4  # of the largest force that is tried: the first one
 BEYOND: Final = 1e3  # largest force that is tried, of the robot's own where its cables have no upper limit
 AT_LIMIT: Final = 1e-9  # of the largest tension: a tension this little beyond its limit stands at it
 
 
 class Push(NamedTuple):
-    """A force.
+    """A force on the platform.
 
     Attributes:
         force: World axes [N], shape (3,).
-        at: Where it acts, in the platform frame [m], shape (3,).
+        at: Point at which it acts, platform frame [m], shape (3,).
     """
 
     force: Array
     at: Array
 
-    def wrench(self, state: Equilibrium, times: Array | float = 1.0) -> Array:
-        """The wrench on the platform at a rest with the force some times as large, shape (..., 6)."""
+    def wrench(self, state: Equilibrium, factor: Array | float = 1.0) -> Array:
+        """Wrench on the platform at an equilibrium, the force scaled by a factor, shape (..., 6)."""
         lever = state.pose.matrix @ (self.at - state.one_robot.center_of_mass)
         own = np.concatenate((self.force, np.cross(lever, self.force)))
-        return np.asarray(state.wrench + np.multiply.outer(times, own))
+        return np.asarray(state.wrench + np.multiply.outer(factor, own))
 
 
 class Reserve(NamedTuple):
-    """How large a force may become.
+    """Largest force in a direction.
 
     Attributes:
-        force: In its direction, from nothing on [N]; infinite where no limit was found.
-        cable: Whose limit is reached first; None where nobody knows whose.
+        force: Its magnitude [N]; infinite where no limit was found.
+        cable: The cable that reaches its limit first; None where not known.
         upper: Whether that is its upper limit.
     """
 
@@ -58,88 +58,80 @@ class Reserve(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pushed:
-    """What a force does to a platform whose winches stand.
+class PushResponse:
+    """Response of a platform to a force, the unstrained lengths kept.
 
     Attributes:
         push: The force.
-        state: The rest without it.
-        pushed: The rest with it; None where none was found.
-        held: How large it may become until a tension is at its limit, the winches at a stand.
-        shared: And until no tensions within the limits hold the platform where it is; None where that is not known yet.
-        compliance: Of the place at which it acts, world axes [m/N], shape (3, 3); NaN where it is not known.
+        state: The equilibrium without it.
+        loaded: The equilibrium with it; None where none was found.
+        reserve: Largest force before a tension is at its limit, the lengths kept.
+        redistributed: Largest force before no tensions within the limits hold this pose; None where not known yet.
+        compliance: Of the point at which it acts, world axes [m/N], shape (3, 3); NaN where not known.
     """
 
     push: Push
     state: Equilibrium
-    pushed: Equilibrium | None
-    held: Reserve
-    shared: Reserve | None
+    loaded: Equilibrium | None
+    reserve: Reserve
+    redistributed: Reserve | None
     compliance: Array
 
     @property
     def force(self) -> float:
-        """How large it is [N]."""
+        """Magnitude of the force [N]."""
         return float(np.linalg.norm(self.push.force))
 
     @property
-    def moved(self) -> Array:
-        """By how much the place at which it acts moves [m], shape (3,); NaN where nobody knows."""
-        if self.pushed is None:
+    def displacement(self) -> Array:
+        """Displacement of the point at which it acts [m], shape (3,); NaN where not known."""
+        if self.loaded is None:
             return np.full(3, np.nan)
-        return np.asarray(self.pushed.pose.transform(self.push.at) - self.state.pose.transform(self.push.at))
+        return np.asarray(self.loaded.pose.transform(self.push.at) - self.state.pose.transform(self.push.at))
 
     @property
-    def turned(self) -> Array:
-        """By how much the platform turns, as a rotation vector [rad], shape (3,); NaN where nobody knows."""
-        if self.pushed is None:
+    def rotation(self) -> Array:
+        """Rotation vector of the platform [rad], shape (3,); NaN where not known."""
+        if self.loaded is None:
             return np.full(3, np.nan)
-        return np.asarray((self.pushed.pose.rotation * self.state.pose.rotation.inv()).as_rotvec())
+        return np.asarray((self.loaded.pose.rotation * self.state.pose.rotation.inv()).as_rotvec())
 
-    def drawn(self, times: float) -> Pose | None:
-        """The platform as it goes, its motion some times as large."""
-        if self.pushed is None:
+    def scaled_pose(self, factor: float) -> Pose | None:
+        """Pose with the force, its motion scaled by a factor."""
+        if self.loaded is None:
             return None
-        rest, rotation = self.state.pose, Rotation.from_rotvec(times * self.turned) * self.state.pose.rotation
-        place = rest.transform(self.push.at) + times * self.moved
+        rest, rotation = self.state.pose, Rotation.from_rotvec(factor * self.rotation) * self.state.pose.rotation
+        place = rest.transform(self.push.at) + factor * self.displacement
         return Pose(place - rotation.as_matrix() @ self.push.at, rotation)
 
 
-def pushed(state: Equilibrium, push: Push, *, anew: bool = True) -> Pushed:
-    """What answers a force.
-
-    Returns:
-        Pushed; within the model of the state's cables.
-    """
+def push_response(state: Equilibrium, push: Push, *, redistribution: bool = True) -> PushResponse:
+    """Response to a force, within the model of the state's cables."""
     if isinstance(state.cables.model, Straight):
         raise InvalidValueError("push: cable model", "straight", "one that stretches", "Choose another cable model.")
     found = forward(state.one_robot, state.unstrained_length, state.pose, state.cables.model, push.wrench(state))
     lever = push.at - state.one_robot.center_of_mass
-    arm = np.hstack((np.eye(3), -_crossing(state.pose.matrix @ lever)))
-    return Pushed(
+    arm = np.hstack((np.eye(3), -_cross_matrix(state.pose.matrix @ lever)))
+    return PushResponse(
         push,
         state,
         found.state if bool(found.solved) else None,
-        _held(state, push),
-        _shared(state, push) if anew else None,
+        _reserve(state, push),
+        _redistributed(state, push) if redistribution else None,
         locked(arm @ stiffness(state).compliance @ arm.T),
     )
 
 
-def radii(compliance: Array) -> tuple[Array, Array]:
-    """How far a place goes for 1 N in the directions in which it gives way least to most.
-
-    Returns:
-        Radii [m/N], ascending, (3,), and the directions in which it goes, one a column, (3, 3); NaN if not known.
-    """
+def semi_axes(compliance: Array) -> tuple[Array, Array]:
+    """Semi-axes of the compliance ellipsoid [m/N], ascending, (3,), and their directions, one a column, (3, 3)."""
     if not np.isfinite(compliance).all():
         return np.full(3, np.nan), np.eye(3)
     axes, values, _ = np.linalg.svd(compliance)
     return values[::-1], axes[:, ::-1]
 
 
-def _held(state: Equilibrium, push: Push) -> Reserve:
-    """Until a tension is at a limit, the lengths held."""
+def _reserve(state: Equilibrium, push: Push) -> Reserve:
+    """Largest force before a tension is at a limit, the lengths kept."""
     robot, unit = state.one_robot, Push(push.force / np.linalg.norm(push.force), push.at)
     lengths = np.tile(state.unstrained_length, (FORCES, 1))
     edge = AT_LIMIT * float(np.nanmax(state.limited_tension))
@@ -151,11 +143,11 @@ def _held(state: Equilibrium, push: Push) -> Reserve:
         margin = np.where(above, robot.tension_max - tension, tension - robot.tension_min)
         return margin, above, found.solved
 
-    def lost(forces: Array) -> Flags:
+    def is_exceeded(forces: Array) -> Flags:
         margin, _, solved = margins(forces)
         return np.asarray(~solved | (margin.min(axis=1) < -edge))
 
-    low, high = _bracket(lost, _largest(state))
+    low, high = _bracket(is_exceeded, _upper_bound(state))
     if not np.isfinite(high):
         return Reserve(np.inf)
     margin, above, solved = margins(np.full(FORCES, high))
@@ -165,33 +157,33 @@ def _held(state: Equilibrium, push: Push) -> Reserve:
     return Reserve(low, cable, bool(above[0, cable]))
 
 
-def _shared(state: Equilibrium, push: Push) -> Reserve:
-    """Until no tensions within the limits hold the platform where it is."""
+def _redistributed(state: Equilibrium, push: Push) -> Reserve:
+    """Largest force before no tensions within the limits hold the platform at its pose."""
     robot, unit = state.one_robot, Push(push.force / np.linalg.norm(push.force), push.at)
-    there = Pose.from_quaternion(np.tile(state.pose.position, (FORCES, 1)), np.tile(state.pose.quaternion, (FORCES, 1)))
+    poses = Pose.from_quaternion(np.tile(state.pose.position, (FORCES, 1)), np.tile(state.pose.quaternion, (FORCES, 1)))
 
-    def lost(forces: Array) -> Flags:
-        plan = inverse(robot, there, state.cables.model, wrench=unit.wrench(state, forces))
+    def is_exceeded(forces: Array) -> Flags:
+        plan = inverse(robot, poses, state.cables.model, wrench=unit.wrench(state, forces))
         return np.asarray(~plan.feasible)
 
-    return Reserve(_bracket(lost, _largest(state))[0])
+    return Reserve(_bracket(is_exceeded, _upper_bound(state))[0])
 
 
-def _bracket(lost: Callable[[Array], Flags], largest: float) -> tuple[float, float]:
-    """The largest of the forces before the first that is lost [N], and that one; infinite where none is lost."""
+def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[float, float]:
+    """Bounds of the first force that exceeds a limit [N]; infinite where none does."""
     low, forces = 0.0, np.geomspace(SMALLEST * largest, largest, FORCES)
     high = np.inf
-    for _ in range(ROUNDS):
-        gone = lost(forces)
-        if not gone.any():
+    for _ in range(ITERATIONS):
+        exceeded = is_exceeded(forces)
+        if not exceeded.any():
             return (low, high) if np.isfinite(high) else (np.inf, np.inf)
-        first = int(np.argmax(gone))
+        first = int(np.argmax(exceeded))
         low, high = float(forces[first - 1]) if first else low, float(forces[first])
         forces = np.linspace(low, high, FORCES + 1)[1:]
     return low, high
 
 
-def _largest(state: Equilibrium) -> float:
+def _upper_bound(state: Equilibrium) -> float:
     """A force that no cables of the robot hold [N]."""
     robot = state.one_robot
     weight = robot.mass * robot.gravity
@@ -200,7 +192,7 @@ def _largest(state: Equilibrium) -> float:
     return BEYOND * (weight + float(np.nansum(state.limited_tension)))
 
 
-def _crossing(lever: Array) -> Array:
+def _cross_matrix(lever: Array) -> Array:
     """Matrix of the cross product with a vector."""
     x, y, z = lever
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

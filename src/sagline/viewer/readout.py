@@ -1,7 +1,8 @@
-"""What the panel says, as HTML: verdict, numbers, legend. Pure text, tested as such; its colors are in page.css."""
+"""HTML of the panel: verdict, numbers, legend; its colors are in page.css."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Final
 
@@ -18,8 +19,7 @@ from sagline.tension.margin import capacity_margin
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.lines import dead_runs
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import TensionScale, force_unit
-from sagline.viewer.wording import ForceUnit, number
+from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number
 
 LATER = "compiling …"
 EXACT: Final = 1e-9  # m: nearer than that a platform rests where it is wanted; the rest is rounding
@@ -27,7 +27,7 @@ _ALONE = 1e-9  # of a robot's highest tension: a tension this near to its limit 
 
 
 def block(content: str) -> str:
-    """HTML of ours: what gives it its font and colors."""
+    """HTML with the font and the colors of page.css."""
     return f'<div class="sagline">{content}</div>'
 
 
@@ -53,12 +53,12 @@ def headline(snapshot: Snapshot) -> str:
 
 
 def refused(message: str) -> str:
-    """What a setting asked for and cannot have."""
+    """Box of a setting that is refused."""
     return box("bad", "Not possible", escape(message))
 
 
 def waiting(what: str = "The first run on a machine compiles the numerical core; later ones start at once.") -> str:
-    """What stands there until the numbers do: at the first run the numerical core is compiled before them."""
+    """Box shown until the numbers are: at the first run the numerical core is compiled before."""
     return box("quiet", "Getting ready", escape(what))
 
 
@@ -68,7 +68,7 @@ def numbers(
     """The pose, the numbers of every cable, and the platform's natural frequencies, or that they come later."""
     parts = (
         pose_line(snapshot.pose),
-        _cable_table(snapshot, scale),
+        _cable_numbers(snapshot, scale),
         _frequency_line(LATER) if frequencies_later else _listed(frequencies),
         _material_line(snapshot),
         _pulley_line(snapshot.robot),
@@ -105,11 +105,36 @@ def box(kind: str, head: str, text: str) -> str:
     )
 
 
+def definitions(rows: Iterable[tuple[str, str]], kind: str = "") -> str:
+    """HTML of a list of names and descriptions, perhaps of a class of page.css."""
+    start = f'<dl class="{kind}">' if kind else "<dl>"
+    return start + "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in rows) + "</dl>"
+
+
+def swatch(color: Array | Color) -> str:
+    """HTML of a square of a color, before a name."""
+    return f'<span class="swatch" style="background:{css_color(color)}"></span> '
+
+
+def color_key(entries: Iterable[tuple[Array | Color, str]]) -> str:
+    """HTML of a key: colors and their meanings."""
+    return "".join(f'<span class="key">{swatch(color)}{text}</span>' for color, text in entries)
+
+
+def cable_table(heads: Iterable[str], columns: Sequence[Sequence[str]], colors: Array | Colors) -> str:
+    """HTML of a table with a row a cable: number with its color, and its texts of each column."""
+    rows = "".join(
+        f"<tr><td>{swatch(colors[i])}{i}</td>{''.join(f'<td>{text}</td>' for text in texts)}</tr>"
+        for i, texts in enumerate(zip(*columns, strict=True))
+    )
+    return f"<table><tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>{rows}</table>"
+
+
 def spaced(scale: TensionScale) -> list[tuple[float, float]]:
     """The ticks and their places, without those that would run into the one before."""
     kept: list[tuple[float, float]] = []
     for tick in scale.ticks():
-        place = float(scale.share(np.array(tick)))
+        place = float(scale.fraction(np.array(tick)))
         if not kept or place - kept[-1][1] > 0.11:
             kept.append((tick, place))
     return kept
@@ -129,18 +154,18 @@ def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
     if (error := snapshot.error) is not None:
         away = float(np.linalg.norm(error))
         rows.append(("Really rests", f"{n(away, unit='m')} off" if away > EXACT else "where it is wanted"))
-    return "<dl>" + "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in rows) + "</dl>"
+    return definitions(rows)
 
 
 def _ends(robot: Robot) -> str:
-    """What the ends of the scale are: limits, where the robot has them."""
+    """Meaning of the ends of the scale: limits, where the robot has them."""
     low = "lowest allowed" if robot.tension_min.min() > 0.0 else "no lower limit"
     high = "highest allowed" if np.isfinite(robot.tension_max).all() else "no upper limit"
     return f"ends: {low}, {high}"
 
 
 def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
-    """Which tension is nearest to its limit, to which, and how near; several at their limits are told as such."""
+    """The tension nearest to its limit, the limit and the distance; or all that are at their limits."""
     margin, robot = snapshot.margin, snapshot.robot
     reach = _ALONE * float(np.nanmax(np.where(np.isfinite(robot.tension_max), robot.tension_max, margin.max())))
     at = np.flatnonzero(margin <= reach)
@@ -154,50 +179,40 @@ def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
 
 
 def pose_line(pose: Pose) -> str:
-    """Where the platform is, in words."""
+    """Position and angles."""
     position = ", ".join(number(value, ".3f") for value in pose.position)
     turned = ", ".join(f"{number(value, '.1f')}°" for value in pose.rotation.as_euler("ZYX", degrees=True))
     return f"<b>Position</b> {position} m<br><b>α, β, γ</b> {turned}"
 
 
-def _cable_table(snapshot: Snapshot, scale: TensionScale) -> str:
-    unit, wrap = force_unit(snapshot.robot), _wrap_column(snapshot)
-    heads = ("cable", f"tension<br>[{unit.name}]", f"winch<br>[{unit.name}]", "length<br>[m]", "sag<br>[mm]",
-             f"to limit<br>[{unit.name}]", *["wrap<br>[°]"] * len(wrap))  # fmt: skip
-    head = "".join(f"<th>{text}</th>" for text in heads)
-    cables = None if snapshot.plan is None else snapshot.plan.state.cables
-    count = snapshot.robot.cable_count
-    unknown = np.full(count, np.nan)
-    columns = (
-        (snapshot.tension / unit.newtons, unit.form),
-        (unknown if cables is None else cables.frame_end_tension / unit.newtons, unit.form),
-        (unknown if snapshot.plan is None else snapshot.plan.unstrained_length, ".4f"),
-        (unknown if cables is None else 1e3 * cables.sag, ".1f"),
-        (snapshot.margin / unit.newtons, unit.form),
-        *wrap,
-    )
-    colors = scale.colors(snapshot.tension)
-    rows = "".join(
-        f'<tr><td><span class="swatch" style="background:{css_color(colors[i])}"></span> {i}</td>'
-        + "".join(f"<td>{number(values[i], form)}</td>" for values, form in columns)
-        + "</tr>"
-        for i in range(count)
-    )
-    return f"<table><tr>{head}</tr>{rows}</table>"
+def _cable_numbers(snapshot: Snapshot, scale: TensionScale) -> str:
+    unit, wrap, plan = force_unit(snapshot.robot), _wrap_column(snapshot), snapshot.plan
+    cables = None if plan is None else plan.state.cables
+    unknown = np.full(snapshot.robot.cable_count, np.nan)
+    columns = {
+        f"tension<br>[{unit.name}]": (snapshot.tension / unit.newtons, unit.form),
+        f"winch<br>[{unit.name}]": (unknown if cables is None else cables.frame_end_tension / unit.newtons, unit.form),
+        "length<br>[m]": (unknown if plan is None else plan.unstrained_length, ".4f"),
+        "sag<br>[mm]": (unknown if cables is None else 1e3 * cables.sag, ".1f"),
+        f"to limit<br>[{unit.name}]": (snapshot.margin / unit.newtons, unit.form),
+        **wrap,
+    }
+    texts = [[number(value, form) for value in values] for values, form in columns.values()]
+    return cable_table(("cable", *columns), texts, scale.colors(snapshot.tension))
 
 
-def _wrap_column(snapshot: Snapshot) -> tuple[tuple[Array, str], ...]:
+def _wrap_column(snapshot: Snapshot) -> dict[str, tuple[Array, str]]:
     """Wrap angles [degree] and how they are written, of a robot with pulleys."""
     radius = pulleys_of(snapshot.robot).radius
     if not radius.any():
-        return ()
+        return {}
     contact = None if snapshot.plan is None else snapshot.plan.state.contact
     angle = np.full(radius.shape, np.nan) if contact is None else np.degrees(contact.wrap_angle)
-    return ((np.where(radius > 0.0, angle, np.nan), ".1f"),)
+    return {"wrap<br>[°]": (np.where(radius > 0.0, angle, np.nan), ".1f")}
 
 
 def _pulley_line(robot: Robot) -> str:
-    """What is behind the frame anchors, and that nobody knows the way of a dead cable that is not upright."""
+    """Pulleys and dead cables, with a remark where the path of a dead cable is not known."""
     winches = robot.winches
     if winches is None or not winches.anything_behind:
         return ""
@@ -244,6 +259,6 @@ def _span(values: Array, unit: str) -> str:
     return n(low, unit=unit) if low == high else f"{n(low, unit=unit)} to {n(high, unit=unit)}"
 
 
-def css_color(color: Array) -> str:
+def css_color(color: Array | Color) -> str:
     """A color (3,) of 0 to 255 as CSS has it."""
     return "#{:02x}{:02x}{:02x}".format(*(int(part) for part in color))

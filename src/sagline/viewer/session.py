@@ -1,10 +1,12 @@
-"""Recorded sessions of the controller as the timeline plays them."""
+"""Recorded sessions of the controller, read from logs, as the timeline plays them."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -12,16 +14,19 @@ from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.arrays import Array, Codes
 from sagline.core.numbers import n
+from sagline.files.execution_file import plan_of_log
+from sagline.files.mcap_layout import NANO
+from sagline.files.mcap_reader import Log, LogReader
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.drawn import Drawn
-from sagline.viewer.readout import block, box, css_color, pose_line, sentence
-from sagline.viewer.stage import ACTUAL, TRUTH, WANTED
-from sagline.viewer.tension_scale import TensionScale, force_unit
-from sagline.viewer.timeline import Chart, Mark, Span, Track, cable_names, outside, spans_of, tension_limits
-from sagline.viewer.wording import number
+from sagline.viewer.drawn import InMotion
+from sagline.viewer.readout import block, box, cable_table, definitions, pose_line
+from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
+from sagline.viewer.tension_scale import TensionScale, force_unit, number
+from sagline.viewer.timeline import Chart, Mark, Span, Track, cable_names, limit_violations, spans_of, tension_limits
 
 PER_METER = 1e3  # mm
+MOST_EVENTS = 8  # that are listed, the newest
 WRONG = (State.FAULT, State.EMERGENCY)
 
 
@@ -78,7 +83,7 @@ class Session:
 
     @property
     def home(self) -> Pose:
-        """Where it begins."""
+        """The first pose."""
         return self.pose_at(0)
 
     @property
@@ -87,7 +92,7 @@ class Session:
         return float(self.time[-1])
 
     def pose_at(self, index: int) -> Pose:
-        """Where the platform is to be at a cycle; beside a plan where it is estimated to be, or was before."""
+        """Planned pose of a cycle; without a plan the estimated one, or the one before."""
         if np.isfinite(self.planned[index]).all():
             return Pose.from_quaternion(self.planned[index], self.planned_quaternion[index])
         row = int(self.shown[index])
@@ -134,18 +139,18 @@ class Session:
         return Track(self.time, tuple(charts), self._wrong(), marks, tuple(paths))
 
     def _wrong(self) -> tuple[Span, ...]:
-        """Where the controller had stopped for a fault, or a tension was beyond its limits."""
+        """Spans of faults, and of tensions outside their limits."""
 
         def why(rows: slice) -> str:
             state = self.state[rows]
             return State(int(state[np.isin(state, WRONG)][0])).name
 
         faults = spans_of(self.time, np.isin(self.state, WRONG), why)
-        return tuple(sorted(faults + outside(self.robot, self.time, self.tension, force_unit(self.robot))))
+        return tuple(sorted(faults + limit_violations(self.robot, self.time, self.tension, force_unit(self.robot))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SessionMoment(Drawn):
+class SessionMoment(InMotion):
     """One cycle.
 
     Attributes:
@@ -163,7 +168,7 @@ class SessionMoment(Drawn):
 
     @property
     def pose(self) -> Pose:
-        """Where the platform is to be, or beside a plan is estimated to be."""
+        """Planned pose, or without a plan the estimated one."""
         return self.session.pose_at(self.index)
 
     @property
@@ -188,93 +193,148 @@ class SessionMoment(Drawn):
 
     @property
     def past(self) -> tuple[Event, ...]:
-        """What has happened."""
+        """Events so far."""
         now = self.session.began + self.time
         return tuple(event for event in self.session.events if event.time <= now)
 
     @property
     def feasible(self) -> bool:
-        """Whether nothing is wrong."""
+        """Whether there is no fault."""
         return self.state not in WRONG
 
     @property
     def notice(self) -> str:
-        """What is wrong."""
+        """Name of the fault."""
         return "" if self.feasible else self.state.name
 
     @property
     def rest(self) -> Pose | None:
-        """Where the platform is estimated to be, beside where it is to be."""
+        """Estimated pose."""
         return self._beside(self.session.position, self.session.quaternion)
-
-    def drawn_rest(self, error_scale: float) -> Array | None:
-        """Where that is drawn [m], shape (3,)."""
-        return self._drawn(self.rest, error_scale)
 
     @property
     def truth(self) -> Pose | None:
-        """Where the platform truly is."""
+        """True pose."""
         if self.session.true is None or self.session.true_quaternion is None:
             return None
         return self._beside(self.session.true, self.session.true_quaternion)
 
-    def drawn_truth(self, error_scale: float) -> Array | None:
-        """Where that is drawn [m], shape (3,)."""
-        return self._drawn(self.truth, error_scale)
+    def verdict(self) -> str:
+        """HTML of the state, the errors of pose and tensions, and the latest events."""
+        session, k, unit = self.session, self.index, force_unit(self.robot)
+        rows = [("Time", f"{self.time:.2f} s"), ("Cycle late", n(session.late[k], ".2g", "s"))]
+        rest, truth, planned = self.rest, self.truth, session.planned[k]
+        for name, pose, other in (
+            ("Estimated less planned", rest, planned),
+            ("True less planned", truth, planned),
+            ("True less estimated", truth, None if rest is None else rest.position),
+        ):
+            if pose is not None and other is not None and np.isfinite(other).all():
+                away = PER_METER * float(np.linalg.norm(pose.position - other))
+                rows.append((name, n(away, ".3g", "mm")))
+        if np.isfinite(self.tension).any():
+            low, high = np.nanmin(self.tension), np.nanmax(self.tension)
+            rows.append(("Tensions", f"{unit.bare(low)} to {unit.written(high)}"))
+        for event in self.past[-MOST_EVENTS:]:
+            rows.append((f"{event.time - session.began:.2f} s", f"{event.name}: {event.text}"))
+        text = definitions((name, escape(what)) for name, what in rows)
+        return box("quiet" if self.feasible else "bad", self.state.name, text)
+
+    def numbers(self, scale: TensionScale) -> str:
+        """HTML of the pose, and of tension and its error and the error of the length of every cable."""
+        session, k, unit = self.session, self.index, force_unit(self.robot)
+        heads = ("cable", f"tension<br>[{unit.name}]", "less planned<br>[N]", "set less read<br>[mm]")
+        columns = (
+            [unit.bare(each) for each in self.tension],
+            [number(each, ".1f") for each in self.tension - session.planned_tension[k]],
+            [number(each, ".2f") for each in PER_METER * (session.set_length[k] - session.length[k])],
+        )
+        return block(pose_line(self.pose) + cable_table(heads, columns, scale.colors(self.tension)))
+
+    @property
+    def why_no_choice(self) -> str:
+        """Reason why tensions are not chosen."""
+        return "What a machine did is not chosen any more: its tensions are those that its load cells read."
 
     def _beside(self, positions: Array, quaternions: Array) -> Pose | None:
         place = positions[self.index]
         return Pose.from_quaternion(place, quaternions[self.index]) if np.isfinite(place).all() else None
 
-    def _drawn(self, pose: Pose | None, error_scale: float) -> Array | None:
-        at = self.pose.position
-        return None if pose is None else np.asarray(at + error_scale * (pose.position - at))
+
+class LogFollower:
+    """Reader of a log in a file, and of the log of its twin, also while they grow."""
+
+    def __init__(self, file: os.PathLike[str] | str, truth: os.PathLike[str] | str | None = None) -> None:
+        """Name the files."""
+        self._reader = LogReader(file)
+        self._truth = None if truth is None else LogReader(truth)
+        self._parts: list[dict[str, Any]] = []
+        self._plans: dict[int, tuple[Array, Array, Array]] = {}  # times, positions and quaternions
+
+    @property
+    def log(self) -> Log:
+        """The log as far as it was read."""
+        return self._reader.log
+
+    @property
+    def robot(self) -> Robot | None:
+        """The robot of the log; None until it was read."""
+        return self._reader.log.robot
+
+    def more(self) -> Session | None:
+        """Read what is new; the whole session, None if nothing is new, or nothing is there."""
+        grown = self._reader.more()
+        if self._truth is not None and self._truth.more():
+            grown = True
+        log = self.log
+        self._parts += [self._part(block) for block in log.blocks[len(self._parts) :]]
+        return self._session(log.robot) if grown and log.robot is not None and self._parts else None
+
+    def _part(self, block: dict[str, Any]) -> dict[str, Any]:
+        """The quantities of a block of the log, with the planned poses."""
+        names = ("time", "state", "late", "position", "quaternion", "tension", "planned_tension", "set_length")
+        part = {name: block[name] for name in names}
+        part["length"] = block["length"] + block["zero"]
+        part["stamp"] = int(block["epoch"]) + np.rint(block["time"] * NANO).astype(np.int64)
+        number, rows = int(block["plan"]), len(block["time"])
+        planned = np.full((rows, 3), np.nan), np.full((rows, 4), np.nan)
+        if number >= 0:
+            planned = _interpolated(*self._planned(number), block["clock"])
+        part["planned"], part["planned_quaternion"] = planned
+        return part
+
+    def _planned(self, number: int) -> tuple[Array, Array, Array]:
+        """Times, positions and quaternions of a plan of the log."""
+        if number not in self._plans:
+            plan = plan_of_log(self.log, number)
+            pose = plan.state.pose
+            time = np.zeros(1) if plan.path is None else plan.path.time - plan.path.time[0]
+            self._plans[number] = time, np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)
+        return self._plans[number]
+
+    def _session(self, robot: Robot) -> Session:
+        whole = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
+        stamp, began = whole.pop("stamp"), float(whole["time"][0])
+        true, turned = self._true(stamp)
+        whole["time"] = np.round(whole["time"] - began, 9)  # 0.3 and not less: who asks for 0.3 s means this cycle
+        events = tuple(self.log.events)
+        return Session(robot=robot, began=began, true=true, true_quaternion=turned, events=events, **whole)
+
+    def _true(self, stamp: Any) -> tuple[Array | None, Array | None]:
+        truth = [] if self._truth is None else self._truth.log.truth
+        if not truth:
+            return None, None
+        start = truth[0].stamp
+        time = np.array([one.stamp - start for one in truth]) / NANO
+        position, quaternion = (np.array([getattr(one, name) for one in truth]) for name in ("position", "quaternion"))
+        return _interpolated(time, position, quaternion, (stamp - start) / NANO)
 
 
-MOST_EVENTS = 8  # that are told, the newest
-
-
-def verdict(moment: SessionMoment) -> str:
-    """The state, what the platform and the tensions are off, and what has happened."""
-    session, k, unit = moment.session, moment.index, force_unit(moment.robot)
-    rows = [("Time", f"{moment.time:.2f} s"), ("Cycle late", n(session.late[k], ".2g", "s"))]
-    distances = {"Estimated": moment.rest, "True": moment.truth}
-    if np.isfinite(session.planned[k]).all():
-        for name, pose in distances.items():
-            if pose is not None:
-                away = PER_METER * float(np.linalg.norm(pose.position - session.planned[k]))
-                rows.append((f"{name} less planned", n(away, ".3g", "mm")))
-    if moment.rest is not None and moment.truth is not None:
-        away = PER_METER * float(np.linalg.norm(moment.truth.position - moment.rest.position))
-        rows.append(("True less estimated", n(away, ".3g", "mm")))
-    tension = moment.tension
-    if np.isfinite(tension).any():
-        rows.append(("Tensions", f"{unit.bare(np.nanmin(tension))} to {unit.written(np.nanmax(tension))}"))
-    rows += [(f"{event.time - session.began:.2f} s", f"{event.name}: {event.text}") for event in _told(moment)]
-    text = "".join(f"<dt>{name}</dt><dd>{escape(what)}</dd>" for name, what in rows)
-    return box("quiet" if moment.feasible else "bad", moment.state.name, f"<dl>{text}</dl>")
-
-
-def numbers(moment: SessionMoment, scale: TensionScale) -> str:
-    """The pose; tension, what it is off, and what the length is off, of every cable."""
-    session, k, unit = moment.session, moment.index, force_unit(moment.robot)
-    colors = scale.colors(moment.tension)
-    off = moment.tension - session.planned_tension[k]
-    lag = PER_METER * (session.set_length[k] - session.length[k])
-    rows = "".join(
-        f'<tr><td><span class="swatch" style="background:{css_color(colors[i])}"></span> {i}</td>'
-        f"<td>{unit.bare(moment.tension[i])}</td><td>{number(off[i], '.1f')}</td><td>{number(lag[i], '.2f')}</td></tr>"
-        for i in range(moment.robot.cable_count)
-    )
-    names = ("cable", f"tension<br>[{unit.name}]", "less planned<br>[N]", "set less read<br>[mm]")
-    head = f"<tr>{''.join(f'<th>{name}</th>' for name in names)}</tr>"
-    return block(f"{pose_line(moment.pose)}<table>{head}{rows}</table>")
-
-
-def polygon() -> str:
-    """Why there are no tensions to choose from."""
-    return sentence("What a machine did is not chosen any more: its tensions are those that its load cells read.")
-
-
-def _told(moment: SessionMoment) -> tuple[Event, ...]:
-    return moment.past[-MOST_EVENTS:]
+def _interpolated(time: Array, position: Array, quaternion: Array, at: Array) -> tuple[Array, Array]:
+    """Positions in between (N, 3) and nearest quaternions (N, 4) at times; NaN outside."""
+    outside = ~((at >= time[0]) & (at <= time[-1]))
+    positions = np.stack([np.interp(at, time, axis) for axis in position.T], axis=1)
+    quaternions = quaternion[np.clip(np.searchsorted(time, at), 0, len(time) - 1)]
+    positions[outside] = np.nan
+    quaternions[outside] = np.nan
+    return positions, quaternions

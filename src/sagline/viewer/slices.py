@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, Indices
 from sagline.viewer.readout import block, css_color
-from sagline.viewer.tension_scale import Colors
-from sagline.viewer.wording import ForceUnit
+from sagline.viewer.tension_scale import Colors, ForceUnit
 from sagline.workspaces.region import Slice
 
 INSIDE: Final = 4  # bands above 0, the last without an end
@@ -57,7 +56,7 @@ class MarginScale:
         return np.asarray(_COLORS[self.bands(margin)])
 
     def key(self, unit: ForceUnit) -> str:
-        """HTML that says which color is which margin."""
+        """HTML of the key of colors."""
         edges = [bare(edge, unit) for edge in self.edges]
         between = [f"{low} to {high}" for low, high in pairwise(edges)]
         names = [f"below {edges[0]}", *between, f"above {edges[-1]}"]
@@ -79,11 +78,11 @@ INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # of 255: the robot behind it is seen
 
 
 class Mark(NamedTuple):
-    """A margin in words, on its line.
+    """Label of a line.
 
     Attributes:
-        text: It.
-        place: Where [m], shape (3,).
+        text: Text.
+        place: Place [m], shape (3,).
     """
 
     text: str
@@ -91,7 +90,7 @@ class Mark(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """What is drawn of a slice.
+    """Drawing of a slice.
 
     Attributes:
         image: Red, green, blue and opacity, the first row the lowest, shape (h, w, 4).
@@ -120,7 +119,7 @@ def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
 
 
 def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[Mark]:
-    """Where margins stand: each at that end of its line which is farthest in a direction of its own, 0 before all."""
+    """Labels of the lines: each at the end of its line that is farthest in a direction of its own, 0 first."""
     room = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
     marks: list[Mark] = []
     for k, (edge, segments) in enumerate(lines):

@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import MODELS as ALL_MODELS
-from sagline.cables.models import Catenary
+from sagline.cables.models import Catenary, Elastic, Empirical
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import CableGeometryError
 from sagline.kinematics.confirm import confirm
@@ -25,14 +25,41 @@ from sagline.tension.method import TensionMethod, shared_tension
 from sagline.tension.methods import METHODS as ALL_METHODS
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer import lines
-from sagline.viewer.tension_scale import Colors, TensionScale, force_unit
-from sagline.viewer.wording import method_name, model_name, remembers
+from sagline.viewer.by_hand import BY_HAND, ByHand
+from sagline.viewer.drawn import Drawable
+from sagline.viewer.tension_scale import force_unit
+
+MODEL_NAMES: dict[type[CableModel], str] = {  # those that say more than the name of their class
+    Catenary: "catenary (exact)",
+    Empirical: "empirical (the article's)",
+    Elastic: "elastic, weightless",
+}
+
+
+def model_name(model: CableModel) -> str:
+    """Name of a cable model."""
+    return MODEL_NAMES.get(type(model), type(model).__name__.lower())
+
+
+def method_name(method: TensionMethod) -> str:
+    """Name of a tension distribution method, with a remark where it depends on the poses before."""
+    name = BY_HAND if isinstance(method, ByHand) else type(method).__name__
+    return f"{name} (depends_on_history the way)" if depends_on_history(method) else name
+
+
+def depends_on_history(method: TensionMethod) -> bool:
+    """Whether the tensions of a pose depend on those before it."""
+    return method.alone is not method
+
 
 # the exact one first
 MODELS: Final = MappingProxyType({model_name(make()): make() for make in reversed(ALL_MODELS.values())})
 # those that remember come last: by default what is shown depends on the pose alone
 METHODS: Final = MappingProxyType(
-    {method_name(method): method for method in sorted((make() for make in ALL_METHODS.values()), key=remembers)}
+    {
+        method_name(method): method
+        for method in sorted((make() for make in ALL_METHODS.values()), key=depends_on_history)
+    }
 )
 
 
@@ -67,7 +94,7 @@ class Settings:
 
     @property
     def changes(self) -> tuple[float, float, float]:
-        """What changes the robot: mass, density and stiffness."""
+        """Changes of the robot: mass, density and stiffness."""
         return self.mass, self.density, self.stiffness
 
     def applied(self, robot: Robot) -> Robot:
@@ -81,8 +108,8 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Snapshot:
-    """A robot at one pose.
+class Snapshot(Drawable):
+    """A robot held at one pose.
 
     Attributes:
         robot: The robot, as the settings have changed it.
@@ -91,24 +118,24 @@ class Snapshot:
         rest: Where the platform would really rest on exact cables of the planned lengths; None where the plan has no
             answer or the model is exact.
         refusal: Which cable over a pulley has no chord, and why; "" where all have.
-        previous: The tensions that a way of sharing that remembers went on from [N], shape (m,); None for none.
+        previous: Tensions from which a method that depends on history continued [N], shape (m,); None for none.
     """
 
-    robot: Robot
-    pose: Pose
+    robot: Robot = field()  # without it the property of the base would be the default
+    pose: Pose = field()
     plan: Plan | None
-    rest: Pose | None
+    rest: Pose | None = field()
     refusal: str = ""
     previous: Array | None = None
 
     @property
     def feasible(self) -> bool:
-        """Whether tensions within the limits carry the platform."""
+        """Whether tensions within the limits balance the platform."""
         return self.plan is not None and bool(self.plan.feasible)
 
     @property
     def status(self) -> PoseStatus:
-        """How the calculation ended."""
+        """Status of the solution."""
         return PoseStatus.NO_CHORD if self.plan is None else PoseStatus(int(self.plan.status))
 
     @property
@@ -133,7 +160,7 @@ class Snapshot:
 
     @property
     def margin(self) -> Array:
-        """How far each limited tension is within its limits [N], shape (m,); NaN where there is no answer."""
+        """Distance of each limited tension to its nearer limit [N], shape (m,); NaN where there is none."""
         return self.tension if self.plan is None else cable_margins(self.plan.state)
 
     def nearer_limit(self, cable: int) -> str:
@@ -153,7 +180,7 @@ class Snapshot:
 
     @property
     def error(self) -> Array | None:
-        """Where the platform would really rest less where it is wanted [m], shape (3,)."""
+        """Position error of the confirmed pose [m], shape (3,)."""
         return None if self.rest is None else self.rest.position - self.pose.position
 
     def courses(self, sag_scale: float) -> Array:
@@ -164,34 +191,14 @@ class Snapshot:
         wraps, ends = self._on_pulleys()
         free = lines.straight(ends)
         if self.plan is not None and self.feasible:
-            free = lines.hanging(ends, self.plan.state.cables, sag_scale)
+            free = lines.catenaries(ends, self.plan.state.cables, sag_scale)
         return free if wraps.shape[1] == 1 else np.concatenate((wraps, free), axis=1)
-
-    def cable_segments(self, sag_scale: float) -> Array:
-        """Segments to draw the cables with (m (points - 1), 2, 3): hanging, or dashed chords where not feasible."""
-        return lines.segments(self.courses(sag_scale), dashed=not self.feasible)
-
-    def ghost_segments(self, sag_scale: float, apart: float) -> Array:
-        """Segments of the chords where a cable as drawn hangs farther from its own than that [m]; else of no length."""
-        points = lines.straight(self._on_pulleys()[1])
-        drawn = self.courses(sag_scale)[:, -lines.POINTS :]
-        return lines.segments(points, dashed=False, shown=np.linalg.norm(drawn - points, axis=2) > apart)
 
     def _on_pulleys(self) -> tuple[Array, Array]:
         """The cables on their pulleys, and both ends of the free ones."""
         contact = self.plan.state.contact if self.plan is not None and self.feasible else None
         wraps = lines.wraps(self.robot, self.pose, None if contact is None else contact.wrap_angle)
         return wraps, lines.chords(self.robot, self.pose, wraps[:, -1])
-
-    def cable_colors(self, scale: TensionScale) -> Colors:
-        """Colors of both ends of every segment as viser takes them, shape (m (points - 1), 2, 3)."""
-        ends = 2 * (lines.points_per_cable(self.robot) - 1)
-        return np.repeat(scale.linear_colors(self.tension), ends, axis=0).reshape(-1, 2, 3)
-
-    def drawn_rest(self, error_scale: float) -> Array | None:
-        """Where to draw the platform at rest: its position error some times as large."""
-        error = self.error
-        return None if error is None else self.pose.position + error_scale * error
 
 
 def taken_at(
@@ -216,6 +223,6 @@ def taken_at(
 
 def _remembered(previous: Plan | None, tension: TensionMethod) -> Array | None:
     """The tensions that a way of sharing goes on from, in its variable [N], shape (m,); None for none."""
-    if previous is None or not remembers(tension) or not previous.feasible or previous.at_border:
+    if previous is None or not depends_on_history(tension) or not previous.feasible or previous.at_border:
         return None
     return shared_tension(previous.state, tension.variable)

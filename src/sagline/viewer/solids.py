@@ -59,7 +59,7 @@ def frame(robot: Robot) -> Solid:
 
 
 def is_frame_assumed(robot: Robot) -> bool:
-    """Whether nobody has said what the frame is like."""
+    """Whether the frame is assumed."""
     return robot.frame_size is None or "frame_size" in robot.assumed
 
 
@@ -77,7 +77,7 @@ def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
 
 
 def winches(robot: Robot) -> Solid:
-    """What stands still at the frame: the drums that are known, and a mark at every anchor without a visible pulley."""
+    """Drums that are known, and a mark at every frame anchor without a visible pulley."""
     radius = _WINCH * size_of(robot)
     marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
     parts = [drum(place, radius) for place in np.unique(marked, axis=0)]
@@ -106,8 +106,8 @@ def _spokes() -> Array:
     return np.stack((_WHEEL[1][1] * out, _WHEEL[0][0] * out), axis=1)
 
 
-def turns(robot: Robot, pose: Pose) -> Array:
-    """How the pulleys have turned about the vertical, as quaternions, scalar first, shape (m, 4)."""
+def pulley_rotations(robot: Robot, pose: Pose) -> Array:
+    """Rotations of the pulleys about the vertical, quaternions, scalar first, shape (m, 4)."""
     half = 0.5 * np.arctan2(*outward(robot, pose).T[::-1])
     zero = np.zeros_like(half)
     return np.stack((np.cos(half), zero, zero, np.sin(half)), axis=1)

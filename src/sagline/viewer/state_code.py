@@ -12,16 +12,16 @@ from sagline.core.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.methods import QuadraticProgram
-from sagline.viewer.drawn import Drawn
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.feature import View
 from sagline.viewer.playback import Moment, Run
 from sagline.viewer.session import SessionMoment
 from sagline.viewer.snapshot import Settings, Snapshot
-from sagline.viewer.wording import number
+from sagline.viewer.tension_scale import number
 
 
 class Source(NamedTuple):
-    """How to come by what the page was opened with, in Python.
+    """Python expressions for what the page was opened with.
 
     Attributes:
         robot: An expression for the robot; "" where nobody said.
@@ -68,7 +68,7 @@ SHOWN: Final = "print(tension)  # [N], cable by cable"
 def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
     """Lines of Python whose last names hold what is on the screen: `robot`, `pose`, `tension`."""
     snapshot = view.snapshot
-    if isinstance(snapshot, Drawn):
+    if isinstance(snapshot, InMotion):
         lines = _of_moment(snapshot, source)
     elif isinstance(view.played, Run):
         lines = _of_run(snapshot, source, view.played.index_at(time))
@@ -89,7 +89,7 @@ def _of_run(snapshot: Snapshot, source: Source, index: int) -> list[str]:
     return lines if snapshot.rest is None else [*lines, "rest = sl.confirm(plan).pose[index]  # where it really rests"]
 
 
-def _of_moment(moment: Drawn, source: Source) -> list[str]:
+def _of_moment(moment: InMotion, source: Source) -> list[str]:
     if isinstance(moment, SessionMoment):
         return [
             f"log = {source.played}",
@@ -106,7 +106,7 @@ def _of_moment(moment: Drawn, source: Source) -> list[str]:
 
 
 def changes(settings: Settings, robot: Robot) -> list[str]:
-    """What the settings change of a robot."""
+    """Lines of the changes of a robot by the settings."""
     lines = [] if settings.mass == robot.mass else [_weighed(settings.mass)]
     factors = {"linear_density": settings.density, "axial_stiffness": settings.stiffness}
     changed = [f"    {name}=cables.{name} * {factor!r}," for name, factor in factors.items() if factor != 1.0]
@@ -148,8 +148,8 @@ def written(choice: Any) -> str:
     kind = QuadraticProgram if isinstance(choice, QuadraticProgram) else type(choice)  # by hand or not
     usual = kind()
     given = {field.name: getattr(choice, field.name) for field in fields(usual)}
-    told = [f"{name}={_plain(value)}" for name, value in given.items() if not _same(value, getattr(usual, name))]
-    return f"sl.{kind.__name__}({', '.join(told)})"
+    arguments = [f"{name}={_plain(value)}" for name, value in given.items() if not _same(value, getattr(usual, name))]
+    return f"sl.{kind.__name__}({', '.join(arguments)})"
 
 
 def _same(one: Any, other: Any) -> bool:

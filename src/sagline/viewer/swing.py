@@ -25,7 +25,7 @@ from sagline.viewer import lines, solids
 DAMPING: Final = Damping(modal_damping=0.01)
 LOSSES: Final = Damping(loss_time=1e-3)
 PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # s: ends of the parts; the first is soon there, and soon played
-LASTS: Final = PARTS[-1]
+DURATION: Final = PARTS[-1]
 NODES = 10  # of a cable with mass: four times as fast as twice as many
 
 
@@ -35,12 +35,8 @@ def vibrating(state: Equilibrium, up_to: float) -> Vibration:
 
 
 def cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Simulation]:
-    """What follows when a cable breaks, the others keeping their lengths, in parts that grow as they are simulated.
-
-    Yields:
-        The motion so far, from the moment before the break on; what has been told is told again the same.
-    """
-    given = beginning(state, None, None, LASTS)
+    """Simulation of the break of a cable, the other lengths kept; each part is longer and begins as the one before."""
+    given = beginning(state, None, None, DURATION)
     elements = NODES if cable_mass == "lumped" else 0
     losses = LOSSES
     if elements:  # waves in stiff cables are not to take smaller steps for their losses than for themselves
@@ -58,12 +54,12 @@ PERIOD = 2.0  # s of one swing as it is drawn
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Swing:
-    """A mode that moves.
+    """Motion of a mode as it is drawn.
 
     Attributes:
-        mode: Which.
-        state: The rest.
-        factor: How many times as large as with an energy of one joule it is drawn.
+        mode: The mode.
+        state: The equilibrium.
+        factor: Factor of the drawn amplitude over that of an energy of one joule.
         motion: Of the platform as drawn: displacement of the center of mass [m], rotation vector [rad], shape (6,).
         rest: Points of the cables at rest [m], shape (m, P, 3).
         moved: Their displacement as drawn, shape (m, P, 3).
@@ -94,7 +90,7 @@ class Swing:
         return cls(mode, state, scale / at_one_joule, scale * shape, np.concatenate((wraps, free), axis=1), moved)
 
     def pose(self, phase: float) -> Pose:
-        """Where the platform is at a phase [rad]; at rest at 0."""
+        """Pose at a phase [rad], the equilibrium at 0."""
         share, rest, center = np.sin(phase), self.state.pose, self.state.one_robot.center_of_mass
         rotation = Rotation.from_rotvec(share * self.motion[3:]) * rest.rotation
         place = rest.transform(center) + share * self.motion[:3] - rotation.as_matrix() @ center
@@ -109,8 +105,8 @@ class Swing:
         return np.asarray(courses + share[:, None] * gap[:, None])
 
     @property
-    def told(self) -> str:
-        """How much larger and slower than it is, in words."""
+    def text(self) -> str:
+        """Factors of size and speed of the drawing."""
         slower = PERIOD * self.mode.frequency
         speed = f"{slower:.3g} times slower" if slower >= 1.0 else f"{1.0 / slower:.3g} times faster"
         return f"drawn {self.factor:.2g} times as large as a vibration of {ENERGY:g} J is, {speed}"
@@ -127,5 +123,5 @@ def _at_rest(state: Equilibrium) -> tuple[Array, Array]:
     robot = state.one_robot
     wraps = lines.wraps(robot, state.pose, None if state.contact is None else state.contact.wrap_angle)
     if wraps.shape[1] == 1:
-        return wraps[:, :0], lines.hanging(lines.chords(robot, state.pose), state.cables, 1.0)
-    return wraps, lines.hanging(lines.chords(robot, state.pose, wraps[:, -1]), state.cables, 1.0)
+        return wraps[:, :0], lines.catenaries(lines.chords(robot, state.pose), state.cables, 1.0)
+    return wraps, lines.catenaries(lines.chords(robot, state.pose, wraps[:, -1]), state.cables, 1.0)

@@ -1,17 +1,16 @@
-"""Colors of cables and of tensions."""
+"""Colors of cables and tensions, and the unit of forces."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite, log, log10
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sagline.core.arrays import Array
 from sagline.robot.robot import Robot
-from sagline.viewer.wording import ForceUnit
 
 Color = tuple[int, int, int]  # red, green and blue, 0 to 255
 
@@ -62,15 +61,15 @@ class TensionScale:
         low = bottom if bottom > 0.0 else high / _SPREAD
         return cls(low, high) if low < high else cls(0.5 * low, 2.0 * high)
 
-    def share(self, tension: Array) -> Array:
-        """Where tensions lie on the scale, 0 to 1; beyond its ends they stay there."""
+    def fraction(self, tension: Array) -> Array:
+        """Fractions of the scale at which tensions lie, 0 to 1, clipped beyond its ends."""
         inside = np.clip(tension, self.low, self.high)
         return np.asarray((np.log(inside) - log(self.low)) / (log(self.high) - log(self.low)))
 
     def colors(self, tension: Array) -> Colors:
         """Color of each tension, shape (..., 3); gray for NaN."""
         known = np.isfinite(tension)
-        place = self.share(np.where(known, tension, self.low)) * (len(_STEPS) - 1)
+        place = self.fraction(np.where(known, tension, self.low)) * (len(_STEPS) - 1)
         first = np.minimum(place.astype(np.intp), len(_STEPS) - 2)
         rest = (place - first)[..., None]
         mixed = (1.0 - rest) * _STEPS[first] + rest * _STEPS[first + 1]
@@ -81,14 +80,58 @@ class TensionScale:
         return linear(self.colors(tension))
 
     def ticks(self) -> tuple[float, ...]:
-        """Round tensions to write beside the scale: 1, 2 and 5 times powers of ten within it."""
+        """Round tensions within the scale: 1, 2 and 5 times powers of ten."""
         decades = range(int(log10(self.low)) - 1, int(log10(self.high)) + 2)
         found = tuple(step * 10.0**decade for decade in decades for step in (1, 2, 5))
         return tuple(tick for tick in found if self.low <= tick <= self.high)
 
 
+_NONE = "–"
+KILO_FROM = 1e5  # N: forces from here on are written in kilonewtons
+
+
+class ForceUnit(NamedTuple):
+    """Unit in which the forces of a robot are written.
+
+    Attributes:
+        name: "N" or "kN".
+        newtons: One of the unit [N].
+        form: Format specification, with the decimals.
+    """
+
+    name: str
+    newtons: float
+    form: str
+
+    @property
+    def decimals(self) -> int:
+        """Number of decimals."""
+        return int(self.form[1])
+
+    @classmethod
+    def up_to(cls, highest: float) -> ForceUnit:
+        """The unit for forces up to a highest one [N]."""
+        return cls("N", 1.0, ".1f") if highest < KILO_FROM else cls("kN", 1e3, ".2f")
+
+    def bare(self, force: float) -> str:
+        """A force [N] without the unit."""
+        return number(force / self.newtons, self.form)
+
+    def written(self, force: float) -> str:
+        """A force [N] with the unit."""
+        return f"{self.bare(force)} {self.name}"
+
+
+def number(value: float, form: str) -> str:
+    """A number, or a dash for one that is not finite; what rounds to zero has no sign."""
+    if not isfinite(value):
+        return _NONE
+    text = f"{value:{form}}"
+    return text if float(text.replace(",", "")) != 0.0 else text.removeprefix("-")
+
+
 def force_unit(robot: Robot) -> ForceUnit:
-    """How the forces of a robot are written: by its highest tension, so that nothing changes its unit in a drag."""
+    """Unit of the forces of a robot, by its highest tension: it does not change while the platform is dragged."""
     return ForceUnit.up_to(TensionScale.of(robot).high)
 
 

@@ -14,7 +14,7 @@ from sagline.core.arrays import Array
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
-from sagline.viewer.wording import ForceUnit
+from sagline.viewer.tension_scale import ForceUnit
 
 # Cables by number, here and nowhere else: no color of the platform, of its path, of a tension or of a verdict.
 # Each holds 3 : 1 on the panels of both themes.
@@ -23,11 +23,11 @@ _ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 
 
 class Limit(NamedTuple):
-    """A limit of what is drawn.
+    """A limit of a chart.
 
     Attributes:
-        value: Where it is, in the unit of the chart.
-        name: What it is.
+        value: Value, in the unit of the chart.
+        name: Name.
         upper: Whether values are to stay below it.
     """
 
@@ -37,12 +37,12 @@ class Limit(NamedTuple):
 
 
 class Span(NamedTuple):
-    """A time in which something is wrong.
+    """A time of an infeasible pose, a violated limit or a fault.
 
     Attributes:
-        start: When it begins [s].
-        end: When it ends [s].
-        why: What is wrong, in words.
+        start: Start [s].
+        end: End [s].
+        why: Reason.
     """
 
     start: float
@@ -51,11 +51,11 @@ class Span(NamedTuple):
 
 
 class Mark(NamedTuple):
-    """Something that happened.
+    """An event.
 
     Attributes:
-        time: When [s].
-        text: What, in words.
+        time: Time [s].
+        text: Description.
         bad: Whether it is a fault or a failure.
     """
 
@@ -69,12 +69,12 @@ class Chart:
     """A quantity of each cable, or along each axis, over time.
 
     Attributes:
-        title: What it is.
-        unit: Its unit.
-        decimals: How many of them are told.
-        names: Of the lines: numbers of cables, or axes.
-        values: Finds those of some samples when they are asked for, shape (n, k); NaN where there is none.
-        limits: Of the values.
+        title: Title.
+        unit: Unit.
+        decimals: Number of decimals.
+        names: Names of the lines: numbers of cables, or axes.
+        values: Function that returns the values of some samples, shape (n, k); NaN where there is none.
+        limits: Limits of the values.
     """
 
     title: str
@@ -92,14 +92,14 @@ class Chart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Something played, as the timeline shows it.
+    """Charts, spans and marks of something that is played.
 
     Attributes:
-        time: Of the samples [s], from 0 on, shape (N,).
-        charts: What there is over time; tensions first.
-        spans: Where something is wrong, in order.
-        marks: What happened, in order.
-        paths: Names and colors of the ways and platforms that are drawn in the scene.
+        time: Times of the samples [s], from 0 on, shape (N,).
+        charts: Charts, tensions first.
+        spans: Spans, in order.
+        marks: Marks, in order.
+        paths: Names and colors of the paths that are drawn in the scene.
     """
 
     time: Array
@@ -114,7 +114,7 @@ class Track:
         return slice(max(int(first) - 1, 0), int(stop) + 1)
 
     def step_from(self, time: float, steps: int) -> float:
-        """The time of the sample so many after the one at or before a time [s]."""
+        """Time of the sample so many after the one at or before a time [s]."""
         now = int(np.searchsorted(self.time, time, side="right")) - 1
         return float(self.time[min(max(now + steps, 0), self.time.size - 1)])
 
@@ -125,7 +125,7 @@ def cable_names(robot: Robot) -> tuple[str, ...]:
 
 
 def tension_limits(robot: Robot, newtons: float, *, at: str) -> tuple[Limit, ...]:
-    """The limits that all cables keep; where they differ, the first that one may reach."""
+    """The tension limits; where they differ between cables, the tightest."""
     low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
     lower = (Limit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
@@ -137,7 +137,7 @@ MOST_SPANS: Final = 400  # spans on a timeline: those nearer than its length ove
 
 
 def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:
-    """The runs of samples that are wrong, as times; a sample lasts until the next."""
+    """Runs of consecutive flagged samples; a sample lasts until the next."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], wrong, [False])).astype(np.int8))).reshape(-1, 2)
     if not edges.size:
         return ()
@@ -151,8 +151,8 @@ def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str])
     )
 
 
-def infeasible(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ...]:
-    """Where a plan of N poses has no answer."""
+def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ...]:
+    """Spans of a plan of N poses in which it is not feasible."""
 
     def why(rows: slice) -> str:
         lost = ~plan.feasible[rows]
@@ -172,8 +172,8 @@ def infeasible(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ...]:
     return spans_of(time, ~plan.feasible, why)
 
 
-def outside(robot: Robot, time: Array, tension: Array, unit: ForceUnit) -> tuple[Span, ...]:
-    """Where a tension at the winch, shape (N, m) [N], is not within its limits."""
+def limit_violations(robot: Robot, time: Array, tension: Array, unit: ForceUnit) -> tuple[Span, ...]:
+    """Spans in which a tension at the winch, shape (N, m) [N], is not within its limits."""
     below = np.asarray(tension < robot.tension_min)  # NaN is neither
     above = np.asarray(tension > robot.tension_max)
 
@@ -199,7 +199,7 @@ def _cables(which: NDArray[np.intp]) -> str:
 
 MOST_COLUMNS: Final = 1500  # columns
 MOST_MARKS: Final = 300
-_NEAR: Final = 0.6  # of the values' spread: a limit within this of them is drawn, one farther away is told
+_NEAR: Final = 0.6  # of the values' spread: a limit within this of them is drawn, one farther away is written
 _BORDER: Final = 0.05  # of the spread, above and below
 
 
@@ -218,17 +218,17 @@ class Columns(NamedTuple):
 
 
 def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:
-    """As few columns as that of samples (N,) with values (N, k), of as many samples each, or one less."""
+    """Columns of equally many samples (N,) with values (N, k), at most so many."""
     if time.size <= most:
         return Columns(time, values, values)
     starts = (np.arange(most) * time.size) // most
     return Columns(time[starts], _extremes(np.fmin, values, starts), _extremes(np.fmax, values, starts))
 
 
-def told(
+def timeline_message(
     tracks: Sequence[tuple[str, Track]], chart: int, duration: float, window: tuple[float, float] | None = None
 ) -> dict[str, Any]:
-    """Tracks with their names, as the page takes them."""
+    """Message to browser/timeline.js: tracks with their names."""
     start, end = (0.0, duration) if window is None else window
     charts = [_matching(track, tracks[0][1].charts[chart], chart) for _, track in tracks]
     parts = [_columns(track, shown, start, end) for (_, track), shown in zip(tracks, charts, strict=True)]
@@ -240,7 +240,7 @@ def told(
         "chart": chart,
         "range": [low, high],
         "tracks": [
-            _told(name, track, shown, part, near, first=k == 0)
+            _track_message(name, track, shown, part, near, first=k == 0)
             for k, ((name, track), shown, part) in enumerate(zip(tracks, charts, parts, strict=True))
         ],
     }
@@ -252,12 +252,12 @@ def _columns(track: Track, chart: Chart, start: float, end: float) -> Columns:
 
 
 def _matching(track: Track, wanted: Chart, chart: int) -> Chart:
-    """The chart of a track that another one's is to be seen beside: of that title, or else in that place."""
+    """The chart of a track to show beside another: of that title, or else of that number."""
     same = [each for each in track.charts if each.title == wanted.title]
     return same[0] if same else track.charts[chart if chart < len(track.charts) else 0]
 
 
-def _told(
+def _track_message(
     name: str, track: Track, chart: Chart, part: Columns, near: Sequence[Limit], *, first: bool
 ) -> dict[str, Any]:
     digits = chart.decimals + 1
@@ -271,18 +271,18 @@ def _told(
         "lines": [[line, COLORS[i % len(COLORS)], i >= len(COLORS)] for i, line in enumerate(chart.names)],
         "end": float(track.time[-1]),
         "times": np.round(part.time, 9).tolist(),
-        "low": [_known(line, digits) for line in part.low.T],
-        "high": None if part.high is part.low else [_known(line, digits) for line in part.high.T],
+        "low": [_finite(line, digits) for line in part.low.T],
+        "high": None if part.high is part.low else [_finite(line, digits) for line in part.high.T],
         "limits": [[limit.value, limit.name, limit.upper] for limit in chart.limits if limit in near],
         "far": ", ".join(far) if first else "",
         "spans": [[span.start, span.end, span.why] for span in track.spans],
-        "marks": [[mark.time, mark.text, mark.bad] for mark in _shown(track)],
+        "marks": [[mark.time, mark.text, mark.bad] for mark in _most_important(track)],
         "paths": [[path, f"rgb{color}"] for path, color in track.paths],
     }
 
 
-def _shown(track: Track) -> list[Any]:
-    """What happened; of too much what is bad, and of the rest the last."""
+def _most_important(track: Track) -> list[Any]:
+    """Marks of a track; of too many, the bad ones and the last of the others."""
     bad = [mark for mark in track.marks if mark.bad][-MOST_MARKS:]
     rest = [mark for mark in track.marks if not mark.bad]
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)
@@ -290,7 +290,7 @@ def _shown(track: Track) -> list[Any]:
 
 def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, float, list[Limit]]:
     """Lowest and highest value of the axis, and the limits that lie on it."""
-    ends = [_ends(part) for part in parts]
+    ends = [_extent(part) for part in parts]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
     if low > high:
         low, high = 0.0, 1.0
@@ -301,15 +301,15 @@ def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, fl
     return low - _BORDER * spread, high + _BORDER * spread, near
 
 
-def _ends(part: Columns) -> tuple[float, float]:
+def _extent(part: Columns) -> tuple[float, float]:
     low, high = part.low[np.isfinite(part.low)], part.high[np.isfinite(part.high)]
     return (float(low.min()), float(high.max())) if low.size and high.size else (np.inf, -np.inf)
 
 
 def _extremes(which: np.ufunc, values: Array, starts: Any) -> Array:
-    """Of the samples from each start to the next, line by line."""
+    """Extreme values of the samples from each start to the next, line by line."""
     return np.stack([which.reduceat(np.ascontiguousarray(line), starts) for line in values.T], axis=1)
 
 
-def _known(line: Array, digits: int) -> list[float | None]:
+def _finite(line: Array, digits: int) -> list[float | None]:
     return [value if np.isfinite(value) else None for value in np.round(line, digits).tolist()]

@@ -1,4 +1,4 @@
-"""The viewer itself: one thread that waits for a change, solves, and shows; callbacks only wake it."""
+"""The viewer: one thread waits for a change, solves and draws; callbacks only wake it."""
 
 from __future__ import annotations
 
@@ -16,19 +16,16 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import home_pose as home_pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
-from sagline.viewer import playback, readout, session
-from sagline.viewer.drawn import Drawn
+from sagline.viewer import readout
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.feature import Feature, Reading, View
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.calibration import CalibrationFeature
 from sagline.viewer.page import Page
-from sagline.viewer.playback import Moment
 from sagline.viewer.player import Beside, Played
-from sagline.viewer.session import SessionMoment
-from sagline.viewer.snapshot import Settings, Snapshot, taken_at
-from sagline.viewer.stage import TRACE_POINTS
+from sagline.viewer.robot_scene import TRACE_POINTS
+from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, taken_at
 from sagline.viewer.state_code import Source
-from sagline.viewer.wording import remembers
 
 FRAME_TIME = 1.0 / 60.0  # s: no update comes sooner after the one before
 SOON = 0.05  # s: how long what is worked out beside the page may wait until it is shown
@@ -125,7 +122,7 @@ class Viewer:
 
     @property
     def _pace(self) -> float:
-        """How long nothing needs to be drawn [s]."""
+        """Time until the next update, unless something wakes it [s]."""
         if self.page.player.clock.playing or any(feature.moving for feature in self.page.features):
             return FRAME_TIME
         return SOON if any(feature.waiting for feature in self.page.features) else IDLE
@@ -139,7 +136,7 @@ class Viewer:
         self._extended += 1
 
     def _build_gizmo(self) -> None:
-        @self.page.stage.gizmo.on_update
+        @self.page.scene.gizmo.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
             if event.phase == "start":
                 self.page.later(self.page.player.leave)
@@ -179,13 +176,13 @@ class Viewer:
             self._changed = (settings.changes, settings.applied(self.page.robot))
         snapshot = taken_at(
             self._changed[1],
-            self.page.stage.dragged_pose(),
+            self.page.scene.dragged_pose(),
             settings,
             self._previous,
             confirmed=self.page.ready(Reading.REST),
             wrench=self.page.wrench,
         )
-        if not remembers(settings.tension):
+        if not depends_on_history(settings.tension):
             self._forget()  # what one comes from by another way of sharing is no way there
         elif snapshot.feasible:
             self._previous = snapshot.plan
@@ -195,12 +192,12 @@ class Viewer:
         snapshot, settings, played = view.snapshot, view.settings, self.page.player.played
         with self.page.server.atomic():
             if view.played is not None:
-                self.page.stage.place(snapshot.pose)
-            self.page.stage.show(snapshot, self.page.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
+                self.page.scene.place(snapshot.pose)
+            self.page.scene.show(snapshot, self.page.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
             traced = self.page.player.number, self._extended, settings.error_scale
             if played is not None and traced != self._traced:
                 self._traced = traced
-                self.page.stage.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
+                self.page.scene.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
         self.page.view = view
         self.page.panel.read_out(*self._words(snapshot))
         for feature in self.page.features:
@@ -212,13 +209,10 @@ class Viewer:
         self.updates += 1
         self.shown.set()
 
-    def _words(self, snapshot: Snapshot | Drawn) -> tuple[str, str]:
+    def _words(self, snapshot: Snapshot | InMotion) -> tuple[str, str]:
         """Verdict and numbers."""
-        if isinstance(snapshot, SessionMoment):
-            return session.verdict(snapshot), session.numbers(snapshot, self.page.scale)
-        if isinstance(snapshot, Drawn):
-            assert isinstance(snapshot, Moment)
-            return playback.verdict(snapshot), playback.numbers(snapshot, self.page.scale)
+        if isinstance(snapshot, InMotion):
+            return snapshot.verdict(), snapshot.numbers(self.page.scale)
         return readout.verdict(snapshot, capacity=self.page.ready(Reading.MARGIN)), self._numbers(snapshot)
 
     def _numbers(self, snapshot: Snapshot) -> str:

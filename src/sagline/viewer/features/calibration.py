@@ -2,243 +2,225 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
+from html import escape
 from typing import Any, Final
 
 import numpy as np
-import viser
 
+from sagline.calibration.findings import CalibrationStatus, Direction
+from sagline.calibration.least_squares import exceeded_with
+from sagline.calibration.log import reading_deviations
 from sagline.calibration.result import Calibration
-from sagline.calibration.summary import Anchors, anchor_covariance, relative_covariance, without_motion
-from sagline.core.arrays import Array
+from sagline.calibration.summary import (
+    Anchors,
+    anchor_covariance,
+    chi_squared_text,
+    outlier_text,
+    relative_covariance,
+    without_motion,
+)
+from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.viewer import calibration_words, solids
+from sagline.core.numbers import counted, n
+from sagline.viewer import solids
+from sagline.viewer.channel import chosen_by
 from sagline.viewer.feature import Feature, View
+from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
-from sagline.viewer.readout import refused, sentence
+from sagline.viewer.readout import block, box, color_key, refused, sentence
+from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH
 from sagline.viewer.solids import Ellipsoids, ball, readable
-from sagline.viewer.stage import TRACE_WIDTH, TRUTH
-from sagline.viewer.tension_scale import Colors
 
 FIELD: Final = "Row of the log"
-TOPIC: Final = "row"  # that a page tells the number of a row under that is clicked
-MOST: Final = 100.0  # times the factor at first
-
-
-class CalibrationPanel:
-    """A tab."""
-
-    def __init__(self, gui: viser.GuiApi, readings: Any, factor: float, changed: Callable[[], None]) -> None:
-        """Build the tab."""
-        with readings.add_tab("Calibration"):
-            self._verdict = gui.add_html("")
-            self._ellipsoids: Any = gui.add_checkbox("Errors of the anchors", True)
-            self._relative: Any = gui.add_checkbox(
-                "Relative to one another",
-                False,
-                hint="Without what only shifts all of them or turns them together, which readings may leave open.",
-            )
-            self._factor: Any = gui.add_number(
-                "Drawn ×", factor, min=1.0, hint="How many times as large the errors are drawn."
-            )
-            self._magnified = gui.add_html("")
-            self._poses: Any = gui.add_checkbox(
-                "Poses of the log", True, hint="Click one, and the platform goes there."
-            )
-            self._key = gui.add_html("")
-            self._row: Any = gui.add_text(FIELD, "", hint="Number of a row; empty for none.")
-            self._outliers = gui.add_html("")
-            self._pose = gui.add_html("")
-            self._kinds = gui.add_html("")
-        self._largest = MOST * factor
-        for handle in (self._ellipsoids, self._relative, self._factor, self._poses, self._row):
-            handle.on_update(lambda _: changed())
-
-    @property
-    def values(self) -> tuple[Hashable, ...]:
-        """All that is chosen."""
-        return self.ellipsoids, self.relative, self._factor.value, self.poses, self.row
-
-    @property
-    def ellipsoids(self) -> bool:
-        """Whether the errors of the anchors are wanted."""
-        return bool(self._ellipsoids.value)
-
-    @property
-    def relative(self) -> bool:
-        """Whether without what moves all anchors together."""
-        return bool(self._relative.value)
-
-    @property
-    def factor(self) -> float:
-        """How many times as large errors are drawn."""
-        value = float(self._factor.value)
-        if not 1.0 <= value <= self._largest:
-            raise InvalidValueError("Drawn ×", value, f"1 to {self._largest:g}", "Type a factor.")
-        return value
-
-    @property
-    def poses(self) -> bool:
-        """Whether the poses of the log are wanted."""
-        return bool(self._poses.value)
-
-    @property
-    def row(self) -> str:
-        """The row that is asked for, as it was typed; "" for none."""
-        return " ".join(str(self._row.value).split())[:20]
-
-    def choose(self, row: int) -> None:
-        """Ask for a row."""
-        self._row.value = str(row)
-
-    def toggle(self, row: Any) -> None:
-        """Ask for a row that a page tells, or no more if it was asked for before."""
-        self._row.value = "" if str(row) == self.row else str(row)
-
-    def tell(self, verdict: str, kinds: str, key: str) -> None:
-        """What does not change: verdict, kinds of numbers, and which color is which fit."""
-        self._verdict.content, self._kinds.content, self._key.content = verdict, kinds, key
-
-    def explain(self, magnified: str) -> None:
-        """What the ellipsoids are."""
-        self._magnified.content = magnified
-
-    def tell_pose(self, outliers: str, pose: str) -> None:
-        """What does not fit, and what was read at the pose that is asked for."""
-        self._outliers.content, self._pose.content = outliers, pose
-
-
+TOPIC: Final = "row"  # of the messages with the number of a row that is clicked
+LARGEST: Final = 100.0  # times the factor at first
 OPACITY: Final = 0.55
 _DOT: Final = 0.0055  # radius of a pose, of the robot's size
 _ABOVE: Final = 0.02  # of the robot's size: the name of a pose over it
-
-
-class CalibrationStage:
-    """What is drawn of a calibration."""
-
-    def __init__(self, scene: viser.SceneApi, size: float, picked: Callable[[int], None]) -> None:
-        """Begin with nothing."""
-        self._scene, self._size, self._picked = scene, size, picked
-        self._ball = ball()
-        self._ellipsoids: dict[str, list[Any]] = {}
-        self._dots: Any = None
-        self._names: list[Any] = []
-        self._chosen: Any = None
-
-    def show_ellipsoids(self, where: str, some: Ellipsoids, moved_from: Array, factor: float) -> None:
-        """Draw ellipsoids in place of those before, with lines from where the points were."""
-        self.hide_ellipsoids(where)
-        if not len(some.which):
-            return
-        ends = np.stack((some.middle + factor * (moved_from - some.middle), some.middle), axis=1)
-        self._ellipsoids[where] = [
-            self._scene.add_batched_meshes_simple(
-                f"{where}/errors", self._ball.vertices.astype(np.float32), self._ball.faces.astype(np.uint32),
-                some.turn.astype(np.float32), some.middle.astype(np.float32),
-                batched_scales=some.drawn(factor).astype(np.float32), batched_colors=TRUTH, opacity=OPACITY,
-                lod="off", cast_shadow=False, receive_shadow=False,
-            ),
-            self._scene.add_line_segments(
-                f"{where}/moves", ends.astype(np.float32), TRUTH, thickness=TRACE_WIDTH, thickness_units="screen"
-            ),
-        ]  # fmt: skip
-
-    def hide_ellipsoids(self, where: str) -> None:
-        """Draw none there."""
-        for handle in self._ellipsoids.pop(where, []):
-            handle.remove()
-
-    def show_poses(self, places: Array, colors: Colors, names: dict[int, str]) -> None:
-        """Draw poses as dots to be clicked, some of them with a name."""
-        self.hide_poses()
-        if not len(places):
-            return
-        upright = np.tile(np.array([1.0, 0.0, 0.0, 0.0], dtype=np.float32), (len(places), 1))
-        self._dots = self._scene.add_batched_meshes_simple(
-            "/log", self._ball.vertices.astype(np.float32), self._ball.faces.astype(np.uint32), upright,
-            places.astype(np.float32), batched_scales=np.full(len(places), _DOT * self._size, dtype=np.float32),
-            batched_colors=colors, lod="off", cast_shadow=False, receive_shadow=False,
-        )  # fmt: skip
-        self._dots.on_click(lambda event: self._picked(int(event.instance_index)))
-        over = np.array([0.0, 0.0, _ABOVE * self._size])
-        self._names = [
-            self._scene.add_label(f"/log/{k}", name, position=places[k] + over, font_screen_scale=0.8)
-            for k, name in names.items()
-        ]
-
-    def hide_poses(self) -> None:
-        """Draw none."""
-        while self._names:
-            self._names.pop().remove()
-        if self._dots is not None:
-            self._dots.remove()
-            self._dots = None
-
-    def choose(self, place: Array | None, name: str) -> None:
-        """Name a pose; None for none."""
-        if self._chosen is not None:
-            self._chosen.remove()
-            self._chosen = None
-        if place is not None:
-            under = place - np.array([0.0, 0.0, _ABOVE * self._size])
-            self._chosen = self._scene.add_label("/chosen", name, position=under, anchor="top-center")
-
-
 NODES: Final[dict[Anchors, str]] = {"frame_anchors": "", "platform_anchors": "/platform"}
-MOST_POSES: Final = 2000  # that are drawn; of more every so-manieth, and all that do not fit
+MOST_POSES: Final = 2000  # that are drawn; of more every so-manieth, and all outliers
 MOST_NAMED: Final = 8  # outliers that have their names in the scene
 LARGE: Final = 0.04  # of the robot's size: the largest ellipsoid at first
+QUANTILES: Final = (0.95, 0.999)  # of chi squared, between the colors
+COLORS: Final = np.array([PLATFORM, REST, INFEASIBLE], dtype=np.uint8)
+NAMES: Final = ("as expected", "one in 20", "one in 1,000")
+MOST_LISTED = 12  # outliers
+
+
+def degrees_of_freedom(found: Calibration) -> Indices:
+    """Degrees of freedom of the residuals of each pose, shape (N,), >= 1."""
+    read = np.isfinite(found.residuals).sum(axis=1) - found.robot.cable_count
+    return np.asarray(np.maximum(read, 1)).astype(np.int64)
+
+
+def bands(found: Calibration) -> Indices:
+    """Band of chi squared of each pose, 0 for an expected value, shape (N,)."""
+    limits = exceeded_with(1.0 - np.array(QUANTILES)[:, None], degrees_of_freedom(found))
+    return np.asarray((found.chi_squared_of_pose > limits).sum(axis=0)).astype(np.int64)
+
+
+def key_text(counts: Indices) -> str:
+    """HTML of the key of colors, with the number of poses of each."""
+    key = color_key((color, f"{name}: {count}") for color, name, count in zip(COLORS, NAMES, counts, strict=True))
+    return block(f"<b>Chi squared of the poses</b><br>{key}")
+
+
+def verdict_text(found: Calibration) -> str:
+    """HTML of the status."""
+    kind = "good" if found.status is CalibrationStatus.FOUND else "bad"
+    head = {CalibrationStatus.FOUND: "Calibrated", CalibrationStatus.DOUBTFUL: "Doubtful"}.get(
+        found.status, "Not converged"
+    )
+    text = "" if kind == "good" else f"{escape(found.status.text)}<br>"
+    of = f"{len(found.values)} numbers from {counted(len(found.rows), 'pose')}"
+    out = (f"<br>{counted(len(rows), 'row')} left out: {escape(why.text)}" for why, rows in found.left_out.items())
+    return box(kind, head, f"{text}{of}; {escape(chi_squared_text(found))}{''.join(out)}")
+
+
+def parameters_text(found: Calibration) -> str:
+    """HTML of each kind of parameter: change, standard error and prior deviation, as root mean squares."""
+    parameters, rows = found.parameters, ""
+    for name, unit in dict.fromkeys(zip(parameters.names, parameters.units, strict=True)):
+        mine = (np.array(parameters.names) == name) & (np.array(parameters.units) == unit)
+        moved, error = found.values[mine] - parameters.prior[mine], found.standard_error[mine]
+        cells = (n(_root_mean_square(each), ".2g", unit) for each in (moved, error, parameters.prior_deviation[mine]))
+        title = name.replace("_", " ")
+        rows += f"<tr><td>{title}</td>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+    head = "<tr><th></th><th>moved</th><th>error now</th><th>before</th></tr>"
+    items = "".join(f"<li>{_direction_text(one)}</li>" for one in (*found.gauge, *found.cannot_tell_apart))
+    remark = f"<b>Left open, or hardly told</b><ul>{items}</ul>" if items else ""
+    return block(f"<table>{head}{rows}</table>{remark}")
+
+
+def ellipsoids_text(factor: float, *, relative: bool) -> str:
+    """HTML of the meaning of the ellipsoids."""
+    but = ", but for what moves all anchors together" if relative else ""
+    return sentence(f"Ellipsoids: one standard error{but}, drawn {factor:g} times as large; lines: from where it was.")
+
+
+def outliers_text(found: Calibration, chosen: int | None) -> str:
+    """HTML of the outliers, each to be clicked."""
+    if not found.outliers:
+        return sentence("No outliers.")
+    rows = "".join(
+        f'<tr {chosen_by("row", one.row)} class="{"chosen" if one.row == chosen else ""}"><td>'
+        f"<button {chosen_by('row', one.row)}>{escape(outlier_text(one))}</button></td></tr>"
+        for one in found.outliers[:MOST_LISTED]
+    )
+    rest = len(found.outliers) - MOST_LISTED
+    more = f'<div class="quiet">and {rest:,} more</div>' if rest > 0 else ""
+    return block(f'<b>What does not fit</b><div class="rows"><table>{rows}</table></div>{more}')
+
+
+def pose_residuals(found: Calibration, number: int) -> str:
+    """HTML of the residuals at a pose, beside the standard deviations of the sensors."""
+    m, row = found.robot.cable_count, found.residuals[number]
+    spread = reading_deviations(found.sensors, found.robot.cable_count)
+    lines = "".join(
+        f"<tr><td>{k}</td>{_cell(row[k], spread[k], 'm')}{_cell(row[m + k], spread[m + k], 'N')}</tr>" for k in range(m)
+    )
+    cables = f"<table><tr><th>cable</th><th>length</th><th></th><th>load cell</th><th></th></tr>{lines}</table>"
+    places = "".join(
+        f"<tr><td>{name}</td>{_cell(row[2 * m + axis], spread[2 * m + axis], unit)}</tr>"
+        for axis, (name, unit) in enumerate([(x, "m") for x in "xyz"] + [(f"about {x}", "rad") for x in "xyz"])
+        if np.isfinite(row[2 * m + axis])
+    )
+    measured = f"<table><tr><th>position</th><th>residual</th><th></th></tr>{places}</table>" if places else ""
+    weight = f", counts {n(found.weights[number], '.2g')}" if found.weights[number] < 1.0 else ""
+    freedom = degrees_of_freedom(found)[number]
+    fit = f"chi squared {n(found.chi_squared_of_pose[number], '.3g')}, expected {freedom}{weight}"
+    return block(f"<b>Row {found.rows[number]}</b>: {fit}{cables}{measured}")
+
+
+def _cell(residual: float, deviation: float, unit: str) -> str:
+    """Cells of a residual, also in standard deviations."""
+    if not np.isfinite(residual):
+        return "<td>–</td><td></td>"
+    times = residual / deviation
+    wrong = ' style="color:var(--sagline-bad)"' if abs(times) > 3.0 else ""
+    return f"<td>{n(residual, '.2g', unit)}</td><td{wrong}>{n(times, '.1f')} σ</td>"
+
+
+def _direction_text(one: Direction) -> str:
+    """A direction, and the part of its prior error that remains where it is observed."""
+    left = f", {100.0 * one.known:.0f} % of the error before" if one.known < 0.995 else ""
+    return f"{escape(one.name.replace('_', ' '))}{left}"
+
+
+def _root_mean_square(values: Array) -> float:
+    """Root mean square; NaN where a value is not finite."""
+    return float(np.sqrt(np.mean(values**2))) if np.isfinite(values).all() else float("nan")
 
 
 class CalibrationFeature(Feature):
-    """Follows what its panel says; all of it belongs to the thread that serves."""
+    """A tab with a calibration, ellipsoids of the errors of the anchors, and the poses of the log to be clicked."""
 
     def __init__(self, page: Page, found: Calibration) -> None:
         """Build tab and scene of a calibration."""
-        server = page.server
-        self._found, self._go = found, page.go
-        size = solids.size_of(found.robot)
-        self._panel = CalibrationPanel(
-            server.gui,
-            page.panel.readings,
-            readable(self._anchors("frame_anchors", relative=False).radius, LARGE * size),
-            page.refresh,
-        )
-        self._stage = CalibrationStage(server.scene, size, lambda k: page.later(lambda: self._pick(k)))
-        page.channel.on(TOPIC, lambda row, _: self._panel.toggle(row))
-        bands = calibration_words.bands(found)
-        self._panel.tell(
-            calibration_words.verdict(found),
-            calibration_words.kinds(found),
-            calibration_words.key(np.bincount(bands, minlength=len(calibration_words.COLORS)).astype(np.int64)),
-        )
-        held = np.flatnonzero(np.isin(found.rows, [one.row for one in found.outliers]) | (bands == bands.max()))
+        self._found, self._go, self._size = found, page.go, solids.size_of(found.robot)
+        self._nodes, self._ball, self._later = Nodes(page.server.scene), ball(), page.later
+        self._bands = bands(found)
+        factor = readable(self._anchors("frame_anchors", relative=False).radius, LARGE * self._size)
+        self._largest = LARGEST * factor
+        self._build_tab(page, factor)
+        page.channel.on(TOPIC, lambda row, _: self._toggle(row))
+        outliers = np.isin(found.rows, [one.row for one in found.outliers]) | (self._bands == self._bands.max())
         some = np.arange(0, len(found.rows), -(-len(found.rows) // MOST_POSES))
-        self._drawn = np.union1d(some, held[:MOST_POSES])
-        self._ellipsoids: Hashable = ()  # of what they are drawn: nothing yet
+        self._drawn = np.union1d(some, np.flatnonzero(outliers)[:MOST_POSES])
+        self._ellipsoids: Hashable = ()  # for which settings they are drawn: none yet
         self._poses: bool | None = None
         self._row: str | None = None
 
+    def _build_tab(self, page: Page, factor: float) -> None:
+        gui, found = page.server.gui, self._found
+        with page.panel.readings.add_tab("Calibration"):
+            gui.add_html(verdict_text(found))
+            self._wanted: Any = gui.add_checkbox("Errors of the anchors", True)
+            hint = "Without what only shifts all of them or turns them together, which readings may leave open."
+            self._relative: Any = gui.add_checkbox("Relative to one another", False, hint=hint)
+            hint = "How many times as large the errors are drawn."
+            self._factor: Any = gui.add_number("Drawn ×", factor, min=1.0, hint=hint)
+            self._ellipsoids_html = gui.add_html("")
+            hint = "Click one, and the platform goes there."
+            self._poses_wanted: Any = gui.add_checkbox("Poses of the log", True, hint=hint)
+            gui.add_html(key_text(np.bincount(self._bands, minlength=len(COLORS)).astype(np.int64)))
+            self._field: Any = gui.add_text(FIELD, "", hint="Number of a row; empty for none.")
+            self._outliers_html = gui.add_html("")
+            self._pose_html = gui.add_html("")
+            gui.add_html(parameters_text(found))
+        page.refresh_on(self._wanted, self._relative, self._factor, self._poses_wanted, self._field)
+
     def depends(self, view: View) -> Hashable:
-        """The panel alone."""
-        return self._panel.values
+        """The controls alone."""
+        controls = self._wanted, self._relative, self._factor, self._poses_wanted, self._field
+        return tuple(each.value for each in controls)
 
     def follow(self, view: View) -> None:
-        """Draw and say what the panel asks for, whatever else is shown."""
+        """Draw and write what the controls ask for."""
         try:
             self._follow_ellipsoids()
         except SaglineError as error:
             self._ellipsoids = ()
-            self._panel.explain(refused(str(error)))
-        if self._panel.poses != self._poses:
-            self._poses = self._panel.poses
-            self._follow_poses()
-        if self._panel.row != self._row:
-            self._row = self._panel.row
+            self._ellipsoids_html.content = refused(str(error))
+        if bool(self._poses_wanted.value) != self._poses:
+            self._poses = bool(self._poses_wanted.value)
+            self._draw_poses()
+        if self._typed != self._row:
+            self._row = self._typed
             self._follow_row(self._row)
 
+    @property
+    def _typed(self) -> str:
+        """The row that is asked for, as it was typed; "" for none."""
+        return " ".join(str(self._field.value).split())[:20]
+
+    def _toggle(self, row: Any) -> None:
+        """Ask for a row that is clicked, or for none if it was asked for before."""
+        self._field.value = "" if str(row) == self._typed else str(row)
+
     def _anchors(self, which: Anchors, *, relative: bool) -> Ellipsoids:
-        """Ellipsoids of the anchors of frame or platform; none where nobody asked for them."""
+        """Ellipsoids of the anchors of frame or platform; none where they were not calibrated."""
         points = getattr(self._found.robot, which)
         covariance = anchor_covariance(self._found.parameters, self._found.covariance, which)
         if covariance is None:
@@ -247,8 +229,8 @@ class CalibrationFeature(Feature):
             covariance = relative_covariance(points, covariance, which)
         return Ellipsoids.of(points, np.einsum("kikj->kij", covariance))
 
-    def _moved(self, which: Anchors, *, relative: bool) -> Array:
-        """By how much the anchors have moved [m], shape (m, 3)."""
+    def _displacement(self, which: Anchors, *, relative: bool) -> Array:
+        """Change of the anchors by the calibration [m], shape (m, 3)."""
         points = getattr(self._found.robot, which)
         moved = points - getattr(self._found.before, which)
         if relative:
@@ -256,53 +238,85 @@ class CalibrationFeature(Feature):
         return np.asarray(moved)
 
     def _follow_ellipsoids(self) -> None:
-        panel = self._panel
-        wanted = (panel.relative, panel.factor) if panel.ellipsoids else None
+        wanted = (bool(self._relative.value), self._checked_factor()) if self._wanted.value else None
         if wanted == self._ellipsoids:
             return
         self._ellipsoids = wanted
+        for parent in NODES.values():
+            self._nodes.remove(f"{parent}/errors", f"{parent}/moves")
         if wanted is None:
-            for where in NODES.values():
-                self._stage.hide_ellipsoids(where)
-            panel.explain("")
+            self._ellipsoids_html.content = ""
             return
         relative, factor = wanted
-        for which, where in NODES.items():
-            some, moved = self._anchors(which, relative=relative), self._moved(which, relative=relative)
-            self._stage.show_ellipsoids(where, some, some.middle - moved[some.which], factor)
-        panel.explain(calibration_words.magnified(factor, relative=relative))
+        for which, parent in NODES.items():
+            self._draw_ellipsoids(
+                parent, self._anchors(which, relative=relative), self._displacement(which, relative=relative), factor
+            )
+        self._ellipsoids_html.content = ellipsoids_text(factor, relative=relative)
 
-    def _follow_poses(self) -> None:
-        if not self._poses:
-            self._stage.hide_poses()
+    def _checked_factor(self) -> float:
+        """The scale of the errors."""
+        value = float(self._factor.value)
+        if not 1.0 <= value <= self._largest:
+            raise InvalidValueError("Drawn ×", value, f"1 to {self._largest:g}", "Type a factor.")
+        return value
+
+    def _draw_ellipsoids(self, parent: str, some: Ellipsoids, moved: Array, factor: float) -> None:
+        """Draw ellipsoids, with lines from the points before the calibration."""
+        if not len(some.which):
             return
-        rows = self._found.rows[self._drawn]
+        ends = np.stack((some.middle - factor * moved[some.which], some.middle), axis=1)
+        self._draw_balls(f"{parent}/errors", some.middle, some.turn, some.drawn(factor), TRUTH, opacity=OPACITY)
+        self._nodes.lines(f"{parent}/moves", ends, TRUTH, TRACE_WIDTH)
+
+    def _draw_balls(self, name: str, places: Array, turns: Array, scales: Array, colors: Any, **looks: Any) -> Any:
+        """Draw balls at places (k, 3), with quaternions (k, 4) and scales (k,) or (k, 3)."""
+        return self._nodes.draw(
+            name,
+            self._nodes.scene.add_batched_meshes_simple,
+            vertices=self._ball.vertices.astype(np.float32),
+            faces=self._ball.faces.astype(np.uint32),
+            batched_wxyzs=turns.astype(np.float32),
+            batched_positions=places.astype(np.float32),
+            batched_scales=scales.astype(np.float32),
+            batched_colors=np.asarray(colors, dtype=np.uint8),
+            lod="off",
+            cast_shadow=False,
+            receive_shadow=False,
+            **looks,
+        )
+
+    def _draw_poses(self) -> None:
+        """Draw the poses of the log as dots to be clicked, some outliers with their names."""
+        self._nodes.remove("/log")
+        if not self._poses:
+            return
+        found, rows, places = self._found, self._found.rows[self._drawn], self._found.poses.position[self._drawn]
         names: dict[int, str] = {}
-        for one in self._found.outliers:
+        for one in found.outliers:
             for k in np.flatnonzero(rows == one.row)[: MOST_NAMED - len(names)]:
                 cable = "" if one.cable is None else f", cable {one.cable}"
                 names.setdefault(int(k), f"row {one.row}{cable}")
-        colors = calibration_words.colors(self._found)[self._drawn]
-        self._stage.show_poses(self._found.poses.position[self._drawn], colors, names)
+        upright, scales = np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1)), np.full(len(places), _DOT * self._size)
+        dots = self._draw_balls("/log", places, upright, scales, COLORS[self._bands[self._drawn]])
+        dots.on_click(lambda event: self._later(lambda: self._pick(int(event.instance_index))))
+        for k, name in names.items():
+            self._nodes.label(f"/log/{k}", name, places[k] + [0.0, 0.0, _ABOVE * self._size], "top-left", 0.8)
 
     def _follow_row(self, typed: str) -> None:
-        """Go to the pose of a row, and say what was read there."""
+        """Go to the pose of a row, and write its residuals."""
         found = self._found
-        k = self._place_of(typed)
-        self._panel.tell_pose(
-            calibration_words.outliers(found, None if k is None else int(found.rows[k])),
-            calibration_words.pose(found, k) if k is not None else self._why_not(typed),
-        )
-        self._stage.choose(None if k is None else found.poses.position[k], "" if k is None else f"row {found.rows[k]}")
+        there = np.flatnonzero(found.rows == int(typed)) if typed.isdecimal() else np.empty(0)
+        k = int(there[0]) if len(there) else None
+        self._outliers_html.content = outliers_text(found, None if k is None else int(found.rows[k]))
+        self._pose_html.content = self._why_no_row(typed) if k is None else pose_residuals(found, k)
+        self._nodes.remove("/chosen")
         if k is not None:
+            below = found.poses.position[k] - [0.0, 0.0, _ABOVE * self._size]
+            self._nodes.label("/chosen", f"row {found.rows[k]}", below, "top-center")
             self._go(found.poses[k])
 
-    def _place_of(self, typed: str) -> int | None:
-        """The pose of a row; None if there is none."""
-        there = np.flatnonzero(self._found.rows == int(typed)) if typed.isdecimal() else np.empty(0)
-        return int(there[0]) if len(there) else None
-
-    def _why_not(self, typed: str) -> str:
+    def _why_no_row(self, typed: str) -> str:
         if not typed:
             return ""
         for reason, rows in self._found.left_out.items():
@@ -311,5 +325,6 @@ class CalibrationFeature(Feature):
         return sentence("The log has no such row.")
 
     def _pick(self, k: int) -> None:
+        """Ask for the row of a dot that is clicked."""
         if 0 <= k < len(self._drawn):
-            self._panel.choose(int(self._found.rows[self._drawn[k]]))
+            self._field.value = str(int(self._found.rows[self._drawn[k]]))

@@ -1,4 +1,4 @@
-"""Export of pictures and films."""
+"""Export of pictures, films and the scene as GLB."""
 
 from __future__ import annotations
 
@@ -15,14 +15,19 @@ import viser
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.writing import file_stem
-from sagline.viewer.channel import Told
+from sagline.robot.batch import pulleys_of
+from sagline.viewer import lines, solids
+from sagline.viewer.channel import Messages
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.feature import Feature, View
+from sagline.viewer.offscreen import HEIGHT as STRIP
+from sagline.viewer.offscreen import PAPERS, Shot, offscreen_scene, save_picture, strip_of
 from sagline.viewer.page import Page
 from sagline.viewer.player import Played
 from sagline.viewer.readout import headline
+from sagline.viewer.robot_scene import DRUM, INFEASIBLE, PLATFORM, STEEL
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.studio import HEIGHT as STRIP
-from sagline.viewer.studio import PAPERS, Shot, pictured, strip_of, studio
+from sagline.viewer.tension_scale import TensionScale
 
 WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # px
 RATE = 30.0  # pictures a second
@@ -32,10 +37,60 @@ TOPIC: Final = "film"  # what the film is, once
 CLOCK: Final = "film clock"  # what its strip says, before each picture
 
 
+_CABLE_RADIUS = 0.0012  # of the robot's size: real cables would not be seen
+_DEAD_RADIUS = 0.0006  # the same of what runs guided behind the pulleys
+_Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+
+
+def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: float = 1.0) -> bytes:
+    """Frame, pulleys, winches, platform and cables, in meters, y up as glTF wants it."""
+    import trimesh  # a fifth of the time in which the viewer starts
+    from trimesh.transformations import compose_matrix, quaternion_matrix
+
+    robot = snapshot.robot
+    scene = trimesh.Scene()
+    place = np.eye(4)
+    place[:3, :3], place[:3, 3] = snapshot.pose.matrix, snapshot.pose.position
+    _add(scene, "frame", solids.frame(robot), STEEL)
+    winches = solids.winches(robot)
+    if len(winches.faces):
+        _add(scene, "winches", winches, DRUM)
+    for i, (radius, turn) in enumerate(
+        zip(pulleys_of(robot).radius, solids.pulley_rotations(robot, snapshot.pose), strict=True)
+    ):
+        if radius > 0.0:
+            placed = compose_matrix(scale=np.full(3, radius), translate=robot.frame_anchors[i])
+            _add(scene, f"pulley {i}", solids.wheel(), DRUM, placed @ quaternion_matrix(turn))
+    thin = _DEAD_RADIUS * solids.size_of(robot)
+    for i, (run, known) in enumerate(zip(*lines.dead_runs(robot), strict=True)):
+        if run[0, 2] != run[1, 2]:
+            name = f"dead cable {i}" if known else f"dead cable {i}, its way not known"
+            _add(scene, name, solids.rod(run, thin), STEEL)
+    _add(scene, "platform", solids.platform(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
+    colors = scale.colors(snapshot.tension)
+    for i, course in enumerate(snapshot.courses(sag_scale)):
+        _add(scene, f"cable {i}", solids.tube(course, _CABLE_RADIUS * solids.size_of(robot)), tuple(colors[i]))
+    scene.apply_transform(_Z_UP_TO_Y_UP)
+    glb: bytes = scene.export(file_type="glb")
+    return glb
+
+
+def _add(scene: Any, name: str, solid: solids.Solid, color: tuple[int, ...], place: Any = None) -> None:
+    """Add a solid of a color to a scene of trimesh."""
+    import trimesh
+
+    mesh = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
+    shade = [*(int(part) for part in color[:3]), 255]
+    mesh.visual = trimesh.visual.TextureVisuals(
+        material=trimesh.visual.material.PBRMaterial(baseColorFactor=shade, metallicFactor=0.1, roughnessFactor=0.7)
+    )
+    scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
+
+
 def filmed(
     client: viser.ClientHandle,
     server: viser.ViserServer,
-    told: Told,
+    messages: Messages,
     played: Played,
     view: View,
     speed: float,
@@ -48,7 +103,7 @@ def filmed(
     Args:
         client: Who asked.
         server: The server, whose scene is hidden from that client meanwhile; others see and drag what they did.
-        told: What that page is told.
+        messages: Messages to its page.
         played: The run, or simulation.
         view: How it is drawn.
         speed: Time of what is played a second of film.
@@ -69,19 +124,19 @@ def filmed(
         "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
     }  # fmt: skip
     shot = Shot.of(client.camera, *extent, WIDTH, HEIGHT - strip)
-    told.tell(CLOCK, None)  # pictures without a clock are none of the film's
-    told.tell(TOPIC, about)
+    messages.send(CLOCK, None)  # pictures without a clock are none of the film's
+    messages.send(TOPIC, about)
     try:
-        with studio(client, server, shot, view, LINE_WIDTH, played) as scene:
+        with offscreen_scene(client, server, shot, view, LINE_WIDTH, played) as scene:
             for time in times:
                 if cancelled():
                     return
                 sight = replace(view, snapshot=played.sight(float(time)))
                 scene.show(sight)
-                told.tell(CLOCK, _clock(sight, float(time), speed))
+                messages.send(CLOCK, _clock(sight, float(time), speed))
                 scene.take("jpeg")
     finally:
-        told.tell(TOPIC, None)  # nothing more comes; a page that has all pictures records them nevertheless
+        messages.send(TOPIC, None)  # nothing more comes; a page that has all pictures records them nevertheless
 
 
 def moments(duration: float, speed: float) -> Array:
@@ -98,24 +153,24 @@ def moments(duration: float, speed: float) -> Array:
 
 
 def _clock(view: View, time: float, speed: float) -> dict[str, Any]:
-    """What changes in the strip from picture to picture."""
+    """Text of the strip that changes from picture to picture."""
     digits = max(1, ceil(-log10(speed / RATE)))
     said = headline(view.snapshot) if isinstance(view.snapshot, Snapshot) else view.snapshot.notice
     return {"time": f"{time:.{digits}f} s", "said": "" if view.snapshot.feasible else said}
 
 
-class Visitor:
-    """Who takes something away: one thing at a time."""
+class Exporter:
+    """A client that exports, one thing at a time."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         """Begin with nothing."""
         self.client = client
-        self.told = Told(client.gui)
+        self.messages = Messages(client.gui)
         self.taking = threading.Lock()
         self.cancelled = threading.Event()
 
 
-Send = Callable[[Visitor], None]
+Send = Callable[[Exporter], None]
 
 
 class ExportFeature(Feature):
@@ -125,7 +180,7 @@ class ExportFeature(Feature):
         """Build the panel."""
         server, channel = page.server, page.channel
         self._page, self._server, self._extent = page, server, page.extent
-        self._visitors: dict[int, Visitor] = {}
+        self._exporters: dict[int, Exporter] = {}
         gui = server.gui
         with gui.add_folder("Take away", expand_by_default=False):
             self._paper = gui.add_dropdown("Picture for", tuple(PAPERS))
@@ -151,35 +206,33 @@ class ExportFeature(Feature):
         self._film.visible = played is not None
         self._film.label = f"Film of the {None if played is None else played.name}"
 
-    def _send_picture(self, visitor: Visitor) -> None:
+    def _send_picture(self, exporter: Exporter) -> None:
         view, paper = self._page.view, PAPERS.get(self._paper.value)
         if view is not None and paper is not None:
-            told, strip = visitor.told, bool(self._strip.value)
-            pictured(visitor.client, self._server, told, view, paper, self._name(), self._extent, strip=strip)
+            messages, strip = exporter.messages, bool(self._strip.value)
+            save_picture(exporter.client, self._server, messages, view, paper, self._name(), self._extent, strip=strip)
 
-    def _send_scene(self, visitor: Visitor) -> None:
-        from sagline.viewer.export import scene_as_glb  # trimesh: a fifth of what starts the viewer
-
+    def _send_scene(self, exporter: Exporter) -> None:
         view = self._page.view
         if view is not None:
             glb = scene_as_glb(view.snapshot, view.scale, view.settings.sag_scale)
-            visitor.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
+            exporter.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
 
-    def _send_film(self, visitor: Visitor) -> None:
+    def _send_film(self, exporter: Exporter) -> None:
         view, played, speed = self._page.view, self._page.player.played, self._page.player.speed
         if played is not None and view is not None:
-            visitor.cancelled.clear()
-            client, name = visitor.client, f"{self._name()}-{played.name}"
-            told, cancelled = visitor.told, visitor.cancelled.is_set
-            filmed(client, self._server, told, played, view, speed, name, self._extent, cancelled)
+            exporter.cancelled.clear()
+            client, name = exporter.client, f"{self._name()}-{played.name}"
+            messages, cancelled = exporter.messages, exporter.cancelled.is_set
+            filmed(client, self._server, messages, played, view, speed, name, self._extent, cancelled)
 
     def _cancel(self, _: Any, client: int) -> None:
         """A page does not want its film any more."""
-        if client in self._visitors:
-            self._visitors[client].cancelled.set()
+        if client in self._exporters:
+            self._exporters[client].cancelled.set()
 
     def _part(self, client: viser.ClientHandle) -> None:
-        self._visitors.pop(client.client_id, None)
+        self._exporters.pop(client.client_id, None)
 
     def _name(self) -> str:
         view = self._page.view
@@ -190,18 +243,18 @@ class ExportFeature(Feature):
         client = event.client
         if client is None:
             return
-        visitor = self._visitors.setdefault(client.client_id, Visitor(client))
-        if not visitor.taking.acquire(blocking=False):
+        exporter = self._exporters.setdefault(client.client_id, Exporter(client))
+        if not exporter.taking.acquire(blocking=False):
             return  # pressed twice
         try:
-            send(visitor)
+            send(exporter)
         except (RuntimeError, TimeoutError, SaglineError) as error:
             if client.client_id in self._server.get_clients():
                 client.add_notification(
                     "Nothing to take away", _why(error), with_close_button=True, auto_close_seconds=8.0
                 )
         finally:
-            visitor.taking.release()
+            exporter.taking.release()
 
 
 def _why(error: Exception) -> str:

@@ -12,16 +12,15 @@ from sagline.core.errors import SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer import solids
-from sagline.viewer.drawn import Drawn
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import headline
-from sagline.viewer.tension_scale import force_unit
-from sagline.viewer.wording import number
+from sagline.viewer.tension_scale import force_unit, number
 
 
-class Spoken(NamedTuple):
-    """A sentence in parts.
+class ScreenReaderText(NamedTuple):
+    """Parts of a text for screen readers.
 
     Attributes:
         head: The verdict in a word or two: when it changes, it is said soon.
@@ -34,20 +33,20 @@ class Spoken(NamedTuple):
     place: str
 
 
-def spoken(view: View) -> Spoken:
-    """What there is to say of what is shown."""
+def screen_reader_text(view: View) -> ScreenReaderText:
+    """Text of a view for screen readers."""
     snapshot = view.snapshot
     place = place_of(snapshot.pose)
-    if isinstance(snapshot, Drawn):
+    if isinstance(snapshot, InMotion):
         head = snapshot.notice or f"As in the {'recording' if view.played is None else view.played.name}"
-        return Spoken(head, _with(head, _tensions(snapshot.robot, snapshot.tension)), place)
+        return ScreenReaderText(head, _with(head, _tensions(snapshot.robot, snapshot.tension)), place)
     head = headline(snapshot)
-    told = _tensions(snapshot.robot, snapshot.tension) if snapshot.feasible else snapshot.reason
-    return Spoken(head, _with(head, told), place)
+    text = _tensions(snapshot.robot, snapshot.tension) if snapshot.feasible else snapshot.reason
+    return ScreenReaderText(head, _with(head, text), place)
 
 
 def described(robot: Robot) -> str:
-    """What the picture shows, whatever its pose."""
+    """Description of the robot."""
     return f"{robot.name}: a platform of {number(robot.mass, '.4g')} kg on {robot.cable_count} cables"
 
 
@@ -59,8 +58,8 @@ def place_of(pose: Pose) -> str:
     return place if angles == ["0"] * 3 else f"{place}, turned {', '.join(angles)} degrees about z, y, x"
 
 
-def _with(head: str, told: str) -> str:
-    return f"{head}, {told}" if told else head
+def _with(head: str, text: str) -> str:
+    return f"{head}, {text}" if text else head
 
 
 def _tensions(robot: Robot, tension: Array) -> str:
@@ -79,7 +78,7 @@ MOST: Final = 100.0  # steps at once: keys that were held while nobody listened
 
 
 class KeyboardFeature(Feature):
-    """Says what is shown, and hears keys; all of it belongs to the thread that serves."""
+    """Control of the platform by keys, and text for screen readers."""
 
     def __init__(self, page: Page) -> None:
         """Build nothing; say what the picture is of."""
@@ -87,16 +86,16 @@ class KeyboardFeature(Feature):
         self._channel, self._go, self._go_home = channel, page.go_near, page.go_home
         self._step = solids.round_below(STEP * solids.size_of(robot))
         self._pose: Pose | None = None
-        channel.tell("scene", {"what": described(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)})
-        channel.on("nudge", self._nudge)
+        channel.send("scene", {"what": described(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)})
+        channel.on("nudge", self._on_nudge)
         channel.on("home", lambda *_: self._go_home())
 
     def follow(self, view: View) -> None:
-        """Tell the verdict."""
+        """Send the verdict."""
         self._pose = view.snapshot.pose
-        self._channel.tell("spoken", spoken(view)._asdict())
+        self._channel.send("spoken", screen_reader_text(view)._asdict())
 
-    def _nudge(self, value: Any, _: int) -> None:
+    def _on_nudge(self, value: Any, _: int) -> None:
         """Move by steps along x, y, z, and turn by steps about z, y, x."""
         steps = _steps(value)
         if steps is None or self._pose is None:
@@ -105,10 +104,10 @@ class KeyboardFeature(Feature):
         try:
             self._go(pose)
         except SaglineError as error:
-            self._channel.tell("nudge-told", str(error))
+            self._channel.send("nudge-told", str(error))
         else:
             self._pose = pose  # more may come before this is shown
-            self._channel.tell("nudge-told", None)
+            self._channel.send("nudge-told", None)
 
 
 def nudged(pose: Pose, way: Array, turn: Array) -> Pose:

@@ -2,169 +2,64 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import viser
 
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, locked
-from sagline.core.errors import SaglineError
+from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.feature import Aside, Feature, Reading, View
-from sagline.viewer.free_travel import NAMES, SpacePanel, WhereTo, free_ways, where_to
-from sagline.viewer.hull import CELLS, REACH, Asked, Hull, Patch, Patches, hull_of, left, lit
+from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
+from sagline.viewer.free_travel import NAMES, FreeTravel, free_directions, free_travel, travel_text
+from sagline.viewer.hull import (
+    CELLS,
+    REACH,
+    Hull,
+    Patch,
+    WorkspaceQuery,
+    draw_patches,
+    margin_text,
+    near_patches,
+    region_hull,
+)
+from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
-from sagline.viewer.readout import LATER
+from sagline.viewer.readout import LATER, block, refused, sentence
+from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST
 from sagline.viewer.slices import MarginScale, Picture, picture_of
-from sagline.viewer.stage import INFEASIBLE, PLATFORM, REST
 from sagline.viewer.tension_scale import force_unit
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Plane, Region, region_of, slice_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
-BOUNDARY, BETWEEN = INFEASIBLE, (120, 128, 138)
-BOUNDARY_WIDTH, BETWEEN_WIDTH = 4.0, 1.5  # px
-_SMALL, _SAID = 0.7, 0.85  # of what stands on lines, and at the platform
-GO, STOP = PLATFORM, REST  # ways to where it has to stop, and ways back
-_BELOW: Final = 0.04  # of the robot's size, from the platform to what is said under it
-_SHAFT, _HEAD, _LONG = 0.002, 0.009, 0.03  # of an arrow, of the robot's size
-# what lies in x and y of a picture: turned so that they are the two axes of a plane, by its normal
+BOUNDARY_WIDTH, LINE_WIDTH, LINE_COLOR = 4.0, 1.5, (120, 128, 138)  # px
+_SMALL, _TEXT_SCALE = 0.7, 0.85  # of labels on lines, and of others
+INWARD, OUTWARD = REST, PLATFORM  # arrows back to the workspace, and to its boundary
+_BELOW: Final = 0.04  # of the robot's size, from the platform to the text below it
+_ARROW: Final = np.array([0.002, 0.009, 0.03])  # radii of shaft and head, length of the head; of the robot's size
+# turn x and y of a picture to the two axes of a plane, by its normal
 _TURNS: Final = np.array([[0.5, 0.5, 0.5, 0.5], [np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
-
-
-class SpaceStage:
-    """What is drawn of a workspace; nothing until it is asked for."""
-
-    def __init__(self, server: viser.ViserServer, size: float) -> None:
-        """Begin with nothing, for a robot of a size [m]."""
-        self._server, self._scene, self.size = server, server.scene, size
-        self._hull, self._wall = Patches(server.scene, "/hull"), Patches(server.scene, "/wall")
-        self._left: Any = None
-        self._slice: list[Any] = []
-        self._levels: list[Any] = []
-        self._plane: tuple[object, ...] = ()
-        self._arrows: Any = None
-        self._names: list[Any] = []
-
-    def show_hull(self, patches: list[Patch], *, opened: bool) -> None:
-        """Draw a hull in place of the one before; none for nothing."""
-        with self._server.atomic():
-            self._hull.show(patches, "back" if opened else "double")
-
-    def show_wall(self, patches: list[Patch], left: str) -> None:
-        """Draw what of the hull is lit in place of what was, and say at the platform how much is left."""
-        with self._server.atomic():
-            self._wall.show(patches)
-            if self._left is None and left:
-                self._left = self._scene.add_label(
-                    "/platform/left",
-                    left,
-                    position=(0.0, 0.0, -_BELOW * self.size),
-                    anchor="top-center",
-                    font_screen_scale=_SAID,
-                )
-            if self._left is not None:
-                self._left.text, self._left.visible = left, bool(left)
-
-    def show_slice(self, plane: Plane, low: Array, high: Array, picture: Picture) -> None:
-        """Draw a slice of a box in place of the one before."""
-        first, second = plane.axes
-        key = (plane.normal, float(low[first]), float(high[first]), float(low[second]), float(high[second]))
-        place = 0.5 * (low + high)
-        place[plane.normal] = plane.at
-        if key != self._plane:
-            self.hide_slice()
-            self._plane = key
-            size = high - low
-            self._slice = [
-                self._scene.add_image(
-                    "/slice/picture", picture.image, float(size[first]), float(size[second]), format="png",
-                    wxyz=_TURNS[plane.normal], position=place, cast_shadow=False, receive_shadow=False,
-                ),
-                *(
-                    self._scene.add_line_segments(
-                        f"/slice/{name}", np.zeros((1, 2, 3), dtype=np.float32), color, thickness=width,
-                        thickness_units="screen",
-                    )
-                    for name, color, width in (
-                        ("boundary", BOUNDARY, BOUNDARY_WIDTH), ("lines", BETWEEN, BETWEEN_WIDTH),
-                    )
-                ),
-            ]  # fmt: skip
-        image, *drawn = self._slice
-        image.image, image.position = picture.image, place
-        for handle, segments in zip(drawn, (picture.boundary, picture.lines), strict=True):
-            handle.visible = len(segments) > 0
-            if len(segments):
-                handle.points = segments.astype(np.float32)
-        for k, mark in enumerate(picture.marks):
-            if k == len(self._levels):
-                self._levels.append(self._scene.add_label(f"/slice/level{k}", "", font_screen_scale=_SMALL))
-            self._levels[k].text, self._levels[k].position, self._levels[k].visible = mark.text, mark.place, True
-        for handle in self._levels[len(picture.marks) :]:
-            handle.visible = False
-
-    def hide_slice(self) -> None:
-        """Draw no slice."""
-        _take_away(self._levels)
-        _take_away(self._slice)
-        self._plane = ()
-
-    def show_ways(self, found: WhereTo) -> None:
-        """Draw an arrow along each way, with its length in words."""
-        ends = np.stack((np.broadcast_to(found.start, found.ends.shape), found.ends), axis=1).astype(np.float32)
-        if self._arrows is None or len(self._names) != len(ends):
-            self.hide_ways()
-            self._arrows = self._scene.add_arrows(
-                "/ways", ends, GO, shaft_radius=_SHAFT * self.size, head_radius=_HEAD * self.size,
-                head_length=_LONG * self.size,
-            )  # fmt: skip
-            self._names = [
-                self._scene.add_label(f"/ways/{NAMES[k]}", "", anchor="bottom-center", font_screen_scale=0.85)
-                for k in found.which
-            ]
-        self._arrows.points = ends
-        self._arrows.colors = np.tile(np.array(GO if found.inside else STOP, dtype=np.uint8), (len(ends), 1))
-        for name, end, distance, which, crossed in zip(
-            self._names, found.ends, found.distance, found.which, found.crossed, strict=True
-        ):
-            name.visible = bool(crossed)
-            name.text = f"{NAMES[which]} {distance:.2f} m"
-            name.position = end
-
-    def hide_ways(self) -> None:
-        """Draw no arrows."""
-        _take_away(self._names)
-        if self._arrows is not None:
-            self._arrows.remove()
-            self._arrows = None
-
-
-def _take_away(handles: list[Any]) -> None:
-    while handles:
-        handles.pop().remove()
-
-
 POINTS: Final = 40  # of a slice, along each axis of its plane
-COARSE: Final = 7  # points along each axis whose margins say how far the colors reach
-
-MakeHull = Callable[[Asked, bool, Callable[[int, int], None]], Hull]
+COARSE: Final = 7  # points along each axis whose margins give the range of the colors
+BY_CABLE, BY_MARGIN = "limiting cable", "margin"
+PLANES: Final = {"level": 2, "upright, along x": 1, "upright, along y": 0}  # names of planes, and their normals
+_NOTHING: Final = sentence("Nothing is computed until something is asked for.")
 
 
 class _SupersededError(SaglineError):
-    """Something else is shown meanwhile."""
+    """Another workspace is asked for."""
 
 
-class _Made(NamedTuple):
-    """A hull.
+class _Result(NamedTuple):
+    """A hull that was computed.
 
     Attributes:
-        key: Of what.
-        rough: Whether it is only the first.
-        hull: It; None where it could not be had.
+        key: Identifies the workspace.
+        rough: Whether it is the coarse one, which comes first.
+        hull: The hull; None where it cannot be computed.
     """
 
     key: Hashable
@@ -173,176 +68,277 @@ class _Made(NamedTuple):
 
 
 def planes_of(robot: Robot) -> tuple[int, ...]:
-    """Axes at right angles to which a robot's space can be sliced: of a planar one its own."""
+    """Normals of the planes in which a robot's space can be sliced: of a planar robot its own."""
     flat = region_of(robot, None, CELLS).flat
     return (2, 1, 0) if flat is None else (flat,)
 
 
 class RegionFeature(Feature):
-    """Follows what is shown; all of it belongs to the thread that serves."""
+    """A tab with the loads and the choice of region, slice and free travel, which are drawn in the scene."""
 
     def __init__(self, page: Page) -> None:
         """Build the tab."""
-        self._panel = SpacePanel(page.server.gui, page.panel.readings, planes_of(page.robot), page.refresh)
-        self._stage = SpaceStage(page.server, page.size)
-        self._aside, self._ready = Aside(page.later), page.ready
-        self._key: Hashable = None  # of what margins are of
-        self._asked: Asked | None = None
+        self._server, self._size, self._nodes = page.server, page.size, Nodes(page.server.scene)
+        self._task, self._ready = BackgroundTask(page.later), page.ready
+        self._key: Hashable = None  # identifies the workspace
+        self._query: WorkspaceQuery | None = None
         self._levels: Levels | None = None
         self._region: Region | None = None
         self._place = np.zeros(3)  # of the platform [m]
         self._scale = MarginScale(1.0)
-        self._scaled: Hashable = None  # the key of what it is for
-        self._made: _Made | None = None
-        self._drawn: Hashable = None
-        self._cut: Hashable = None  # what the slice is of
-        self._share = 0.0
+        self._scale_key: Hashable = None  # of the workspace that the scale is for
+        self._result: _Result | None = None
+        self._hull_key: Hashable = None  # of the hull that is drawn
+        self._slice_key: Hashable = None  # of the slice that is drawn
+        self._progress = 0.0
+        self._build_tab(page)
+
+    def _build_tab(self, page: Page) -> None:
+        gui = page.server.gui
+        with page.panel.readings.add_tab("Workspace"):
+            hint = "Further load that is to be borne, of this size along each axis."
+            self._force = gui.add_number("Force ± [N]", 0.0, min=0.0, hint=hint)
+            hint = "The same about each axis, about the center of mass."
+            self._moment = gui.add_number("Moment ± [N m]", 0.0, min=0.0, hint=hint)
+            hint = "Where the platform may go, turned as it is now, with these loads."
+            self._region_box: Any = gui.add_checkbox("Region", False, hint=hint)
+            self._color: Any = gui.add_dropdown("Region colored by", (BY_CABLE, BY_MARGIN), visible=False)
+            self._hull_html = gui.add_html("")
+            self._margin_html = gui.add_html("")
+            self._slice_box: Any = gui.add_checkbox("Slice", False, hint="Margins on a plane through the platform.")
+            names = tuple(name for name, normal in PLANES.items() if normal in planes_of(page.robot))
+            self._plane: Any = gui.add_dropdown("Plane", names, visible=False)
+            self._key_html = gui.add_html("")
+            hint = "How far along each axis, the platform turned as it is."
+            self._travel_box: Any = gui.add_checkbox("Where can I go", False, hint=hint)
+            self._travel_html = gui.add_html(_NOTHING)
+        page.refresh_on(
+            self._force, self._moment, self._region_box, self._color, self._slice_box, self._plane, self._travel_box
+        )
 
     @property
     def waiting(self) -> bool:
-        """Whether something is to come without anybody's doing."""
-        return self._aside.busy
+        """Whether a hull is being computed."""
+        return self._task.busy
+
+    @property
+    def _anything(self) -> bool:
+        """Whether anything is to be drawn."""
+        return bool(self._region_box.value or self._slice_box.value or self._travel_box.value)
+
+    @property
+    def _by_cable(self) -> bool:
+        """Whether the colors of the hull are those of the limiting cables."""
+        return bool(self._color.value != BY_MARGIN)
+
+    @property
+    def _scaled(self) -> bool:
+        """Whether anything is drawn in the colors of margins."""
+        return bool(self._slice_box.value or (self._region_box.value and not self._by_cable))
 
     def depends(self, view: View) -> Hashable:
-        """Nothing while nothing is asked for."""
-        return view if self._panel.anything else None
+        """The view while anything is to be drawn."""
+        return view if self._anything else None
 
     def follow(self, view: View) -> None:
-        """A robot is shown at a pose; its workspace is that of this orientation."""
-        panel = self._panel
-        panel.arrange()
+        """Draw the workspace at the orientation that is shown."""
+        self._arrange()
         if not self._ready(Reading.WORKSPACE):
-            if panel.anything:
-                panel.say(LATER.capitalize())
+            if self._anything:
+                self._hull_html.content = sentence(LATER.capitalize())
             return
-        if not panel.anything:
+        if not self._anything:
             self._clear()
             return
         robot, pose, model, wrench = view.snapshot.robot, view.snapshot.pose, view.settings.model, view.wrench
         try:
-            levels, region = self._prepared(robot, pose, model, wrench)
+            levels, region = self._prepare(robot, pose, model, wrench)
             self._follow_hull()
             self._place = pose.position
             self._follow_wall()
             self._follow_slice(levels, region, pose)
-            self._follow_ways(levels, region, robot, pose)
+            self._follow_travel(levels, region, robot, pose)
         except SaglineError as error:
             self._clear()
-            panel.refuse(str(error))
+            self._refuse(str(error))
 
     def tick(self) -> None:
-        """Say how far the hull is."""
-        if self._panel.hull and self._aside.waited:
-            self._panel.say(f"The region is worked out: {100.0 * self._share:.0f} %, {self._aside.waited:.0f} s so far")
+        """Write the progress of a hull."""
+        if self._region_box.value and self._task.waited:
+            text = f"The region is worked out: {100.0 * self._progress:.0f} %, {self._task.waited:.0f} s so far"
+            self._hull_html.content = sentence(text)
 
-    def _prepared(self, robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> tuple[Levels, Region]:
-        """What gives levels and margins, made anew where it would give others; and where they are looked at."""
-        loads = self._panel.loads
+    def _arrange(self) -> None:
+        """Show the choices for what is drawn, and clear the text of what is not."""
+        self._color.visible, self._plane.visible = bool(self._region_box.value), bool(self._slice_box.value)
+        if not self._region_box.value:
+            self._hull_html.content = self._margin_html.content = ""
+        if not self._scaled:
+            self._key_html.content = ""
+        if not self._travel_box.value:
+            self._travel_html.content = "" if self._anything else _NOTHING
+
+    def _refuse(self, message: str) -> None:
+        self._hull_html.content, self._margin_html.content = refused(message), ""
+
+    def _prepare(self, robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> tuple[Levels, Region]:
+        """Levels and region, made again where they would differ."""
+        loads = _load(self._force, "N"), _load(self._moment, "N m")
         key = (id(robot), pose.quaternion.tobytes(), type(model), loads, None if wrench is None else wrench.tobytes())
         if key != self._key or self._levels is None or self._region is None:
-            turned = locked(np.array(pose.quaternion))
-            self._asked = Asked(robot, turned, model, WrenchBox(*loads, center=wrench))  # and the id stays this robot's
-            self._region, self._levels = region_of(robot, None, CELLS), self._asked.levels()
+            quaternion = locked(np.array(pose.quaternion))
+            self._query = WorkspaceQuery(robot, quaternion, model, WrenchBox(*loads, center=wrench))  # keeps the id
+            self._region, self._levels = region_of(robot, None, CELLS), self._query.levels()
             self._key = key
-        if self._scaled != key and (self._panel.slice or (self._panel.hull and not self._panel.by_cable)):
-            self._scaled, self._scale = key, _scale_of(self._levels, self._region)
+        if self._scale_key != key and self._scaled:
+            self._scale_key, self._scale = key, _scale_of(self._levels, self._region)
         return self._levels, self._region
 
+    def _show_hull(self, patches: list[Patch], *, opened: bool = False) -> None:
+        """Draw the hull, its front faces left out where opened."""
+        with self._server.atomic():
+            draw_patches(self._nodes, "/hull", patches, "back" if opened else "double")
+
     def _follow_hull(self) -> None:
-        """Draw the latest hull there is, and have a better one made."""
-        if not self._panel.hull:
-            self._stage.show_hull([], opened=False)
-            self._drawn = self._made = None
+        """Draw the latest hull, and have a better one computed."""
+        if not self._region_box.value:
+            self._show_hull([])
+            self._hull_key = self._result = None
             return
-        made = self._made
-        if (made is None or made.key != self._key or made.rough) and not self._aside.busy:
-            self._ask(rough=made is None or made.key != self._key)
-        if made is None:
+        result = self._result
+        if (result is None or result.key != self._key or result.rough) and not self._task.busy:
+            self._compute(rough=result is None or result.key != self._key)
+        if result is None:
             return
-        if made.hull is None:
-            self._stage.show_hull([], opened=False)
+        if result.hull is None:
+            self._show_hull([])
             return
-        look = (made.key, made.rough, self._panel.by_cable, self._panel.slice)
-        if look != self._drawn:
-            self._drawn = look
-            patches = made.hull.by_cable if self._panel.by_cable else made.hull.by_margin(self._scale)
-            self._stage.show_hull(patches, opened=self._panel.slice)
-            self._panel.tell_hull(made.hull.told)
+        opened = bool(self._slice_box.value)
+        key = (result.key, result.rough, self._by_cable, opened)
+        if key != self._hull_key:
+            self._hull_key = key
+            self._show_hull(
+                result.hull.by_cable if self._by_cable else result.hull.by_margin(self._scale), opened=opened
+            )
+            self._hull_html.content = block(result.hull.text)
 
-    def _ask(self, *, rough: bool) -> None:
-        """Have a hull of what is shown made beside the page."""
-        asked, key = self._asked, self._key
-        assert asked is not None
-        self._share = 0.0
+    def _compute(self, *, rough: bool) -> None:
+        """Have the hull of the workspace that is shown computed in the background."""
+        query, key = self._query, self._key
+        assert query is not None
+        self._progress = 0.0
 
-        def told(done: int, total: int) -> None:  # in the thread that works it out
-            self._share = min(done / max(total, 1), 1.0)
-            if self._key != key and not rough:  # a rough one is shown all the same: something follows a slider
+        def progress(done: int, total: int) -> None:  # in the background thread
+            self._progress = min(done / max(total, 1), 1.0)
+            if self._key != key and not rough:  # a rough one is shown all the same while a slider moves
                 raise _SupersededError
 
         def failed(message: str) -> None:
             if not message:  # superseded
-                self._have(self._made)
+                self._receive(self._result)
             elif self._key == key:
-                self._have(_Made(key, rough=False, hull=None))
-                self._panel.refuse(message)
+                self._receive(_Result(key, rough=False, hull=None))
+                self._refuse(message)
 
-        self._aside.ask(lambda: hull_of(asked, rough, told), lambda hull: self._have(_Made(key, rough, hull)), failed)
+        self._task.start(
+            lambda: region_hull(query, rough, progress), lambda hull: self._receive(_Result(key, rough, hull)), failed
+        )
 
-    def _have(self, made: _Made | None) -> None:
-        """A hull is there, or cannot be had."""
-        if self._panel.hull and self._key is not None:
-            self._made = made
+    def _receive(self, result: _Result | None) -> None:
+        """Draw a result of the background task."""
+        if self._region_box.value and self._key is not None:
+            self._result = result
             self._follow_hull()
             self._follow_wall()
 
     def _follow_wall(self) -> None:
-        """Light the wall that the platform is near, and say how much is left."""
-        if not self._panel.hull or self._levels is None:
-            self._stage.show_wall([], "")
-            return
-        here = self._levels.details(self._place[None])
-        text = left(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
-        hull = None if self._made is None else self._made.hull
-        patches = [] if hull is None else lit(hull, self._place, REACH * self._stage.size)
-        self._stage.show_wall(patches, text)
-        self._panel.tell_left(text)
+        """Draw the wall near the platform, and write the margin."""
+        text = ""
+        patches: list[Patch] = []
+        if self._region_box.value and self._levels is not None:
+            here = self._levels.details(self._place[None])
+            text = margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
+            if self._result is not None and self._result.hull is not None:
+                patches = near_patches(self._result.hull, self._place, REACH * self._size)
+            self._margin_html.content = block(f"<b>Here</b> {text}")
+        with self._server.atomic():
+            draw_patches(self._nodes, "/wall", patches)
+            below = (0.0, 0.0, -_BELOW * self._size)
+            self._nodes.label("/platform/left", text, below, "top-center", _TEXT_SCALE)
 
     def _follow_slice(self, levels: Levels, region: Region, pose: Pose) -> None:
-        panel, unit = self._panel, force_unit(levels.robot)
-        if panel.slice or (panel.hull and not panel.by_cable):
-            panel.explain(self._scale, unit)
-        if not panel.slice:
-            self._stage.hide_slice()
-            self._cut = None
+        unit = force_unit(levels.robot)
+        if self._scaled:
+            self._key_html.content = self._scale.key(unit)
+        if not self._slice_box.value:
+            self._nodes.remove("/slice")
+            self._slice_key = None
             return
-        plane = Plane(panel.normal, float(pose.position[panel.normal]))
-        if self._cut == (self._key, plane):
-            return
-        self._cut = (self._key, plane)
-        cut = slice_of(levels.details, plane, region.low, region.high, (POINTS, POINTS))
-        self._stage.show_slice(plane, region.low, region.high, picture_of(cut, self._scale, unit))
+        normal = PLANES.get(self._plane.value, PLANES[self._plane.options[0]])
+        plane = Plane(normal, float(pose.position[normal]))
+        if self._slice_key != (self._key, plane):
+            self._slice_key = (self._key, plane)
+            cut = slice_of(levels.details, plane, region.low, region.high, (POINTS, POINTS))
+            self._draw_slice(plane, region.low, region.high, picture_of(cut, self._scale, unit))
 
-    def _follow_ways(self, levels: Levels, region: Region, robot: Robot, pose: Pose) -> None:
-        if not self._panel.ways:
-            self._stage.hide_ways()
+    def _draw_slice(self, plane: Plane, low: Array, high: Array, picture: Picture) -> None:
+        nodes = self._nodes
+        first, second = plane.axes
+        middle = 0.5 * (low + high)
+        middle[plane.normal] = plane.at
+        nodes.draw(
+            "/slice/picture",
+            nodes.scene.add_image,
+            image=picture.image,
+            render_width=float(high[first] - low[first]),
+            render_height=float(high[second] - low[second]),
+            format="png",
+            wxyz=_TURNS[plane.normal],
+            position=middle,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        nodes.lines("/slice/boundary", picture.boundary, INFEASIBLE, BOUNDARY_WIDTH)
+        nodes.lines("/slice/lines", picture.lines, LINE_COLOR, LINE_WIDTH)
+        for k, mark in enumerate(picture.marks):
+            nodes.label(f"/slice/levels/{k}", mark.text, mark.place, "top-left", _SMALL)
+        nodes.keep_first("/slice/levels", len(picture.marks))
+
+    def _follow_travel(self, levels: Levels, region: Region, robot: Robot, pose: Pose) -> None:
+        if not self._travel_box.value:
+            self._nodes.remove("/ways")
             return
-        found = where_to(levels.details, pose.position, free_ways(robot, region.flat), region.low, region.high)
-        self._stage.show_ways(found)
-        self._panel.tell_ways(found, force_unit(robot))
+        which = free_directions(robot, region.flat)
+        travel = free_travel(levels.details, pose.position, which, region.low, region.high)
+        self._draw_travel(travel)
+        self._travel_html.content = travel_text(travel, force_unit(robot))
+
+    def _draw_travel(self, travel: FreeTravel) -> None:
+        """Draw an arrow in each direction, with its length where it ends at the boundary."""
+        ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
+        self._nodes.arrows("/ways", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))
+        for k, which in enumerate(travel.which):
+            text = f"{NAMES[which]} {travel.distance[k]:.2f} m" if travel.crossed[k] else ""
+            self._nodes.label(f"/ways/{NAMES[which]}", text, travel.ends[k], scale=_TEXT_SCALE)
 
     def _clear(self) -> None:
-        """Draw nothing, and forget what it was of."""
-        self._stage.show_hull([], opened=False)
-        self._stage.show_wall([], "")
-        self._stage.hide_slice()
-        self._stage.hide_ways()
-        self._drawn = self._key = self._made = self._cut = None
+        """Draw nothing, and forget the workspace."""
+        self._nodes.remove("/hull", "/wall", "/slice", "/ways")
+        self._nodes.hide("/platform/left")
+        self._hull_key = self._key = self._result = self._slice_key = None
 
 
 def _scale_of(levels: Levels, region: Region) -> MarginScale:
-    """Colors for all margins that there are in a region."""
+    """Colors for the range of margins in a region."""
     corners = np.linspace(region.low, region.high, COARSE)
     grid = np.stack(np.meshgrid(*corners.T), axis=-1).reshape(-1, 3)
     known = levels.details(grid).margin
     return MarginScale.up_to(float(known[np.isfinite(known)].max(initial=0.0)))
+
+
+def _load(field: Any, unit: str) -> float:
+    """The number of a field."""
+    value = float(field.value)
+    if not 0.0 <= value < 1e12:
+        raise InvalidValueError(field.label, value, f"0 {unit} or more", "Type a load, 0 for none.")
+    return value

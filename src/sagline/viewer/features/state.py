@@ -16,7 +16,7 @@ from sagline.viewer.link import LinkedControls, Linking
 from sagline.viewer.page import Page
 from sagline.viewer.readout import block
 from sagline.viewer.state_code import code_of
-from sagline.viewer.wording import number
+from sagline.viewer.tension_scale import number
 
 FIRST: Final = -0.9  # among the controls: above all but what is played
 EXAMPLE: Final = "1, 0, 1.5 or 1, 0, 1.5, 10, 0, 0"
@@ -54,7 +54,7 @@ LONGEST_NAME = 40  # characters of what a page calls its question
 
 
 class StateFeature(Feature):
-    """Tells pages where the platform is, and hears where it shall go; all of it belongs to the thread that serves."""
+    """Field of the pose, and the state as code or as a link."""
 
     def __init__(self, page: Page) -> None:
         """Build the panel; last of all, as it knows the controls that there are."""
@@ -66,21 +66,21 @@ class StateFeature(Feature):
         self._view: View | None = None
         self._time = 0.0
         self._asked: deque[tuple[Any, int]] = deque()  # what is to be given as text, and to whom
-        channel.on("pose", self._hear_pose)
-        channel.on("copy", self._hear_copy)
-        channel.on("link", self._hear_link)
+        channel.on("pose", self._on_pose)
+        channel.on("copy", self._on_copy)
+        channel.on("link", self._on_link)
 
     def follow(self, view: View) -> None:
-        """Tell the pose."""
+        """Send the pose."""
         self._view, self._time = view, self._player.clock.time
-        self._channel.tell("pose", pose_text(view.snapshot.pose))
+        self._channel.send("pose", pose_text(view.snapshot.pose))
 
     def tick(self) -> None:
-        """Give what was asked for, now that all that was said before is shown."""
+        """Send the texts that were asked for, after the messages before them are shown."""
         while self._asked:
-            self._give(*self._asked.popleft())
+            self._send_text(*self._asked.popleft())
 
-    def _hear_pose(self, value: Any, client: int) -> None:
+    def _on_pose(self, value: Any, client: int) -> None:
         """Go to a pose that was typed."""
 
         def go(text: str) -> dict[str, str]:
@@ -89,15 +89,15 @@ class StateFeature(Feature):
 
         self._answer(client, "pose-told", value, go)
 
-    def _hear_copy(self, value: Any, client: int) -> None:
-        """Note what is asked for as text."""
+    def _on_copy(self, value: Any, client: int) -> None:
+        """Queue a text that is asked for."""
         self._asked.append((value, client))
 
-    def _give(self, value: Any, client: int) -> None:
-        """Give what was asked for as text."""
+    def _send_text(self, value: Any, client: int) -> None:
+        """Send a text that was asked for."""
         self._answer(client, "copy-told", value, lambda what: self._copy(what, client))
 
-    def _hear_link(self, value: Any, client: int) -> None:
+    def _on_link(self, value: Any, client: int) -> None:
         """Follow a link."""
 
         def follow(text: str) -> dict[str, str]:
@@ -110,7 +110,7 @@ class StateFeature(Feature):
         if self._view is None:
             raise InvalidValueError("the view", "not there yet", "something on the screen", "Wait until it stands.")
         if what == "link":
-            return {"text": self.linking.told(self._view, client)}
+            return {"text": self.linking.link_to(self._view, client)}
         if what != "code":
             raise InvalidValueError("what to copy", repr(what), "code or link", "Press one of the buttons.")
         if self._view.played is not None and not (self._player.given and self._source.played):
@@ -119,7 +119,7 @@ class StateFeature(Feature):
         return {"text": code_of(self._view, self._robot, self._source, self._time)}
 
     def _answer(self, client: int, topic: str, value: Any, done: Callable[[str], dict[str, str]]) -> None:
-        """Do what a page asks, [name of the question, text], and answer it alone: {"to": name, ...}, refused or not."""
+        """Handle a request [name, text] of a page, and send the answer {"to": name, ...} to it alone."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(each, str) for each in value):
             return
         name, text = value
@@ -129,4 +129,4 @@ class StateFeature(Feature):
             answer = done(text)
         except SaglineError as error:
             answer = {"refused": str(error)}
-        self._channel.answer(client, topic, {"to": name, **answer})
+        self._channel.send_to(client, topic, {"to": name, **answer})

@@ -19,22 +19,19 @@ from sagline.kinematics.status import PoseStatus
 from sagline.tension.methods import MinimumNorm
 from sagline.tension.options import kernel_options, takes_default_kernel
 from sagline.tension.polygon import TensionPolygon
-from sagline.viewer import playback, session
 from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.feature import Feature, Reading, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import LATER, block, sentence
-from sagline.viewer.session import SessionMoment
-from sagline.viewer.snapshot import METHODS, Snapshot
-from sagline.viewer.tension_scale import force_unit
-from sagline.viewer.wording import method_name, number
+from sagline.viewer.snapshot import METHODS, Snapshot, method_name
+from sagline.viewer.tension_scale import force_unit, number
 
 NEAR: Final = 10.0  # px: marks that are closer share one
 
 
 class Mark(NamedTuple):
-    """A way of sharing.
+    """A tension distribution method with its result.
 
     Attributes:
         name: As it is chosen.
@@ -137,13 +134,13 @@ def polygon_figure(
         return sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
     return (
         block(_drawing(snapshot, drawn, marks, movable=field is not None))
-        + sentence(_told(snapshot, drawn, movable=field is not None))
+        + sentence(_description(snapshot, drawn, movable=field is not None))
         + _key(snapshot, marks, back)
     )
 
 
 def polygon_later() -> str:
-    """HTML: that the polygon is not there yet."""
+    """HTML: the polygon is not compiled yet."""
     return sentence(LATER.capitalize())
 
 
@@ -156,7 +153,7 @@ def why_none(snapshot: Snapshot) -> str:
 
 
 def field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
-    """What there is to choose from, with the pulls of the cables as they hang; None where there is nothing."""
+    """Feasible tensions of a pose, with the sag forces of its cables; None where there are none."""
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
         return None
@@ -204,19 +201,19 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     if not movable:
         return dot
     unit, tension, plan = force_unit(snapshot.robot), snapshot.tension, snapshot.plan
-    told = f"{unit.bare(tension.min())} to {unit.written(tension.max())}"
-    told += "" if plan is None else f", {method_name(plan.tension)}"
+    text = f"{unit.bare(tension.min())} to {unit.written(tension.max())}"
+    text += "" if plan is None else f", {method_name(plan.tension)}"
     share = (point[0] - field.low[0]) / max(float(field.high[0] - field.low[0]), 1e-9)
     return (
         '<g class="handle" tabindex="0" role="slider" aria-label="Tensions, in the field of all that are feasible" '
         f'aria-roledescription="slider of {field.redundant} dimensions" aria-valuemin="0" aria-valuemax="100" '
-        f'aria-valuenow="{100.0 * share:.0f}" aria-valuetext="{escape(told)}">'
+        f'aria-valuenow="{100.0 * share:.0f}" aria-valuetext="{escape(text)}">'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="18" class="reach"/>{dot}</g>'
     )
 
 
 def _marks(field: DotField, marks: tuple[Mark, ...]) -> str:
-    """A small mark for each way of sharing, with its letter; those in one place share it."""
+    """A mark for each tension distribution method, with its letter; those in one place share it."""
     parts = []
     for (x, y), group in grouped(marks, field):
         letters, names = "".join(mark.letter for mark in group), ", ".join(mark.name for mark in group)
@@ -230,15 +227,15 @@ def _marks(field: DotField, marks: tuple[Mark, ...]) -> str:
     return "".join(parts)
 
 
-def _told(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
+def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     unit = force_unit(snapshot.robot)
     how = "Drag the dot, or move it with the arrow keys." if movable else "Dot: the chosen tensions."
     if field.redundant == 1:
         ends = field.polygon.vertices[:, 0]
         point = float(field.polygon.coordinates(snapshot.tension)[0])
         span = f"{ends.min():.4g} to {ends.max():.4g} N" if np.isfinite(ends).all() else "without an end"
-        told = f"One redundant cable: λ may be {span}; chosen: {number(point, '.4g')} N."
-        return f"{told} {how}" if movable else told
+        text = f"One redundant cable: λ may be {span}; chosen: {number(point, '.4g')} N."
+        return f"{text} {how}" if movable else text
     if not field.polygon.bounded:
         return f"{how} Sides: the limit that each is; one without a name is none, there it goes on."
     width, height = np.ptp(field.corners, axis=0)
@@ -298,7 +295,7 @@ FARTHEST: Final = 1.0  # share of the drawing that a step may be
 
 
 class TensionsFeature(Feature):
-    """Draws the field and moves the dot; all of it belongs to the thread that serves."""
+    """Drawing of the feasible tensions, with a dot to choose some."""
 
     def __init__(self, page: Page) -> None:
         """Build nothing yet."""
@@ -307,16 +304,15 @@ class TensionsFeature(Feature):
         self._field: DotField | None = None  # where the dot can go
         self._key: tuple[object, ...] = ()  # of the pose that the field is of
         self._aim: Array | None = None  # coordinates that were chosen last, (r,)
-        page.channel.on(DOT, self._hear_dot)
-        page.channel.on(SHARING, self._hear_sharing)
+        page.channel.on(DOT, self._on_dot)
+        page.channel.on(SHARING, self._on_method)
 
     def follow(self, view: View) -> None:
         """Draw what there is to choose from."""
         snapshot = view.snapshot
         before, self._field = self._field, None
         if not isinstance(snapshot, Snapshot):
-            recorded = isinstance(snapshot, SessionMoment)
-            self._panel.show_polygon(session.polygon() if recorded else playback.polygon())
+            self._panel.show_polygon(sentence(snapshot.why_no_choice))
         elif not self._ready(Reading.POLYGON):
             self._panel.show_polygon(polygon_later())
         elif view.played is not None or snapshot.plan is None or why_none(snapshot):
@@ -335,7 +331,7 @@ class TensionsFeature(Feature):
             marks = self._marks.at(snapshot.plan, further=further, verdicts=verdicts) if self._field else ()
             self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.way))
 
-    def _hear_dot(self, value: Any, _: int) -> None:
+    def _on_dot(self, value: Any, _: int) -> None:
         """The dot has been dragged, or stepped; what is no such thing, or comes too late, is not heard."""
         field = self._field
         if field is None or not isinstance(value, dict):
@@ -354,8 +350,8 @@ class TensionsFeature(Feature):
         far = float(np.linalg.norm(away))
         return away * min(1.0, OVER * float(np.max(field.high - field.low)) / far) if far > 0.0 else away
 
-    def _hear_sharing(self, value: Any, _: int) -> None:
-        """A way of sharing has been chosen by its mark."""
+    def _on_method(self, value: Any, _: int) -> None:
+        """Choose a tension distribution method by its mark."""
         if self._field is not None and isinstance(value, str) and value in METHODS:
             self._panel.choose_way(value)
 

@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import solids
-from sagline.viewer.camera import Eye, chosen_line, met
+from sagline.viewer.camera import Camera, nearest_line, ray_distance
 
 CAMERA = SimpleNamespace(  # ten meters before the origin, looking along y
     wxyz=np.array([np.sqrt(0.5), -np.sqrt(0.5), 0.0, 0.0]),
@@ -18,14 +18,14 @@ CAMERA = SimpleNamespace(  # ten meters before the origin, looking along y
 )
 
 
-def eye() -> Eye:
-    found = Eye.of(CAMERA)
+def eye() -> Camera:
+    found = Camera.of(CAMERA)
     assert found is not None
     return found
 
 
 def test_a_point_is_seen_where_similar_triangles_put_it() -> None:
-    places, deep = eye().seen(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 1.0], [1.0, 10.0, 0.0], [0.0, -20.0, 0.0]]))
+    places, deep = eye().project(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 1.0], [1.0, 10.0, 0.0], [0.0, -20.0, 0.0]]))
     # half of the picture's height, 300 px, is 5 m at a distance of 10 m
     np.testing.assert_allclose(places[:3], [[400.0, 300.0], [520.0, 240.0], [430.0, 300.0]], atol=1e-9)
     np.testing.assert_allclose(deep, [10.0, 10.0, 20.0, -10.0], atol=1e-12)
@@ -33,7 +33,7 @@ def test_a_point_is_seen_where_similar_triangles_put_it() -> None:
 
 def test_a_ray_leads_back_to_what_is_seen() -> None:
     some = np.random.default_rng(2).uniform(-3.0, 3.0, size=(20, 3))
-    places, deep = eye().seen(some)
+    places, deep = eye().project(some)
     for point, place, depth in zip(some, places / [800.0, 600.0], deep, strict=True):
         np.testing.assert_allclose(eye().place + depth * eye().ray((place[0], place[1])), point, atol=1e-12)
 
@@ -51,7 +51,7 @@ def test_a_ray_leads_back_to_what_is_seen() -> None:
     ],
 )
 def test_nonsense_is_no_camera(wrong: dict[str, object]) -> None:
-    assert Eye.of(SimpleNamespace(**(vars(CAMERA) | wrong))) is None
+    assert Camera.of(SimpleNamespace(**(vars(CAMERA) | wrong))) is None
 
 
 @pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
@@ -66,7 +66,7 @@ def test_a_ray_meets_the_platform_where_each_triangle_by_itself_is(name: str) ->
         direction = (
             body.vertices.mean(axis=0) + random.uniform(-0.6, 0.6, size=3) * np.ptp(body.vertices, axis=0) - start
         )
-        far = met(body, start, direction)
+        far = ray_distance(body, start, direction)
         fars = []
         for a, b, c in body.vertices[body.faces]:
             matrix = np.column_stack((b - a, c - a, -direction))
@@ -85,9 +85,9 @@ def test_the_nearest_line_is_chosen_and_of_two_that_cross_the_one_in_front() -> 
     upright = np.array([[1.0, 2.0, -3.0], [1.0, 2.0, 3.0]])  # behind it
     lines = np.stack((across, upright))
     # z = 1 at 10 m is 60 px above the middle; x = 1 at 12 m is 50 px to the right
-    assert chosen_line(eye(), (300.0 / 800.0, 245.0 / 600.0), lines, 8.0) == 0
-    assert chosen_line(eye(), (452.0 / 800.0, 300.0 / 600.0), lines, 8.0) == 1
-    assert chosen_line(eye(), (450.0 / 800.0, 240.0 / 600.0), lines, 8.0) == 0
-    assert chosen_line(eye(), (300.0 / 800.0, 290.0 / 600.0), lines, 8.0) is None
+    assert nearest_line(eye(), (300.0 / 800.0, 245.0 / 600.0), lines, 8.0) == 0
+    assert nearest_line(eye(), (452.0 / 800.0, 300.0 / 600.0), lines, 8.0) == 1
+    assert nearest_line(eye(), (450.0 / 800.0, 240.0 / 600.0), lines, 8.0) == 0
+    assert nearest_line(eye(), (300.0 / 800.0, 290.0 / 600.0), lines, 8.0) is None
     behind = lines - np.array([0.0, 20.0, 0.0])
-    assert chosen_line(eye(), (300.0 / 800.0, 240.0 / 600.0), behind, 1e9) is None
+    assert nearest_line(eye(), (300.0 / 800.0, 240.0 / 600.0), behind, 1e9) is None

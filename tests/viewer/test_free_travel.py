@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from sagline.viewer.free_travel import NAMES, ways_told, where_to
-from sagline.viewer.wording import ForceUnit
+from sagline.viewer.free_travel import NAMES, free_travel, travel_text
+from sagline.viewer.tension_scale import ForceUnit
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
 
 LOW, HIGH = np.full(3, -2.0), np.full(3, 2.0)
@@ -16,7 +16,7 @@ NEWTON = ForceUnit("N", 1.0, ".1f")
 
 def test_ways_end_at_the_boundary_or_at_the_box() -> None:
     start = np.array([0.2, -0.3, 0.4])
-    found = where_to(ball, start, ALL, LOW, np.array([2.0, 0.5, 2.0]))
+    found = free_travel(ball, start, ALL, LOW, np.array([2.0, 0.5, 2.0]))
     half = np.sqrt(RADIUS**2 - start @ start + start**2)  # of the chord along each axis
     exact = [WALL - start[0], 0.5 - start[1], half[2] - start[2], *(half + start)]
     np.testing.assert_allclose(found.distance, exact, atol=2e-5)
@@ -28,8 +28,8 @@ def test_ways_end_at_the_boundary_or_at_the_box() -> None:
 
 
 def test_the_nearest_end_is_told_first() -> None:
-    found = where_to(ball, np.array([0.2, -0.3, 0.4]), ALL, LOW, HIGH)
-    html = ways_told(found, NEWTON)
+    found = free_travel(ball, np.array([0.2, -0.3, 0.4]), ALL, LOW, HIGH)
+    html = travel_text(found, NEWTON)
     nearest = NAMES[int(found.distance.argmin())]
     assert re.search(rf"Boundary</b> {found.distance.min():.3f} m [a-z]+ {re.escape(nearest)}, cable 3", html)
     assert "<b>Margin</b> 96.1 N" in html
@@ -37,23 +37,23 @@ def test_the_nearest_end_is_told_first() -> None:
 
 
 def test_from_outside_ways_lead_back() -> None:
-    found = where_to(ball, np.array([-1.9, 0.0, -0.1]), ALL, LOW, HIGH)
+    found = free_travel(ball, np.array([-1.9, 0.0, -0.1]), ALL, LOW, HIGH)
     assert not found.inside
     assert found.crossed.tolist() == [True, False, False, False, False, False]
     assert found.distance[0] == pytest.approx(1.9 - np.sqrt(RADIUS**2 - 0.01), abs=1e-4)
-    html = ways_told(found, NEWTON)
+    html = travel_text(found, NEWTON)
     assert "Way back" in html
     assert "workspace, cable 5" in html
 
 
 def test_ways_of_a_platform_that_moves_in_a_plane_are_four() -> None:
-    found = where_to(ball, np.zeros(3), np.array([0, 2, 3, 5]), LOW, HIGH)
+    found = free_travel(ball, np.zeros(3), np.array([0, 2, 3, 5]), LOW, HIGH)
     np.testing.assert_allclose(found.distance, [WALL, RADIUS, RADIUS, RADIUS], atol=2e-5)
 
 
 def test_a_platform_beyond_the_box_finds_back_if_an_axis_leads_there() -> None:
-    found = where_to(ball, np.array([0.0, 0.0, 5.0]), ALL, LOW, HIGH)
+    found = free_travel(ball, np.array([0.0, 0.0, 5.0]), ALL, LOW, HIGH)
     assert found.crossed.tolist() == [False] * 5 + [True]
     assert found.distance[5] == pytest.approx(5.0 - RADIUS, abs=1e-3)
-    assert "3.500 m along −z" in ways_told(found, NEWTON)
-    assert "no axis" in ways_told(where_to(ball, np.array([3.0, 3.0, 5.0]), ALL, LOW, HIGH), NEWTON)
+    assert "3.500 m along −z" in travel_text(found, NEWTON)
+    assert "no axis" in travel_text(free_travel(ball, np.array([3.0, 3.0, 5.0]), ALL, LOW, HIGH), NEWTON)

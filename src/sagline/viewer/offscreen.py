@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.viewer.channel import Told
+from sagline.viewer.channel import Messages
 from sagline.viewer.feature import View
 from sagline.viewer.player import Played
 from sagline.viewer.readout import spaced
-from sagline.viewer.stage import TRACE_POINTS, Stage
+from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
 from sagline.viewer.tension_scale import force_unit
 
 HEIGHT: Final = 4.0  # of the size of its text
@@ -25,7 +25,7 @@ _STOPS = 16  # of the bar's colors
 
 
 def strip_of(view: View, *remarks: str) -> dict[str, Any]:
-    """What there is to say about a view, as JSON knows it."""
+    """Texts and colors of the strip of a view, as JSON."""
     settings, scale = view.settings, view.scale
     unit = force_unit(view.snapshot.robot)
     drawn = [(settings.sag_scale, "sag"), (settings.error_scale, "errors")]
@@ -43,7 +43,7 @@ def strip_of(view: View, *remarks: str) -> dict[str, Any]:
 
 PATIENCE: Final = 30.0  # s to wait for a picture
 NAMES: Final = ("/names", "/platform/notice")  # nodes that are in no picture
-STILL: Final = ("/hull", "/slice")  # nodes that are the same at any time of what is played
+STATIC: Final = ("/hull", "/slice")  # nodes that are the same at any time of what is played
 BORDER: Final = 1.06  # of the robot, to stay off the edges
 SHAPES: Final = 0.8, 2.4  # width over height of a picture, least and most
 DEEPEST: Final = 950.0  # m from the camera: of a picture that is asked for viser's client draws nothing beyond 1000 m
@@ -77,7 +77,7 @@ class Shot(NamedTuple):
 
 
 def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, float, float, float]:
-    """How far to the side and upward a box is seen [slope], how far away, and from where before the camera [m]."""
+    """Extent of a box to the side and upward [slope], its distance, and the advance of the camera [m]."""
     try:
         eye = np.array(camera.position, dtype=np.float64).reshape(3)
         edge = tan(0.5 * float(camera.fov)) * np.array([float(camera.aspect), 1.0])
@@ -102,8 +102,8 @@ def _turn(camera: viser.CameraHandle) -> Rotation:
     return Rotation.from_quat(np.array(camera.wxyz, dtype=np.float64).reshape(4), scalar_first=True)
 
 
-class Studio:
-    """A scene of a client's own."""
+class OffscreenScene:
+    """A scene of one client, for pictures."""
 
     def __init__(
         self,
@@ -118,12 +118,12 @@ class Studio:
         self._client, self._shot = client, shot
         snapshot = view.snapshot
         robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.home)
-        self._stage = Stage(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
+        self._robot_scene = RobotScene(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
         if played is not None:
-            self._stage.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))
+            self._robot_scene.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))
         drawn = set(client.scene._handle_from_node_name)  # viser lists its nodes nowhere else
         for name in sorted(set(server.scene._handle_from_node_name) - drawn):
-            if name.startswith(NAMES) or (played is not None and not name.startswith(STILL)):
+            if name.startswith(NAMES) or (played is not None and not name.startswith(STATIC)):
                 client.scene.add_frame(name, show_axes=False, visible=False)
         self.show(view)
         self._render(_FIRST, _FIRST, "jpeg")  # names come a picture late
@@ -132,8 +132,10 @@ class Studio:
         """Have something in the picture."""
         settings = view.settings
         with self._client.atomic():
-            self._stage.place(view.snapshot.pose)
-            self._stage.show(view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
+            self._robot_scene.place(view.snapshot.pose)
+            self._robot_scene.show(
+                view.snapshot, view.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost
+            )
 
     def take(self, kind: Literal["png", "jpeg"]) -> None:
         """Have the page take a picture, and keep it; returns when it has."""
@@ -149,17 +151,17 @@ class Studio:
 
 
 @contextmanager
-def studio(
+def offscreen_scene(
     client: viser.ClientHandle,
     server: viser.ViserServer,
     shot: Shot,
     view: View,
     line_width: float,
     played: Played | None = None,
-) -> Iterator[Studio]:
-    """A studio while inside."""
+) -> Iterator[OffscreenScene]:
+    """An off-screen scene while inside."""
     try:
-        yield Studio(client, server, shot, view, played, line_width)
+        yield OffscreenScene(client, server, shot, view, played, line_width)
     finally:
         client.scene.reset()
 
@@ -170,7 +172,7 @@ TOPIC: Final = "picture"
 
 
 class Paper(NamedTuple):
-    """Where a picture is printed.
+    """A size of print.
 
     Attributes:
         width: Of the picture [in].
@@ -194,10 +196,10 @@ PAPERS: Final = {
 }
 
 
-def pictured(
+def save_picture(
     client: viser.ClientHandle,
     server: viser.ViserServer,
-    told: Told,
+    messages: Messages,
     view: View,
     paper: Paper,
     name: str,
@@ -214,8 +216,8 @@ def pictured(
         "width": shot.width, "height": shot.height + beneath,
     }  # fmt: skip
     try:
-        with studio(client, server, shot, view, LINE * paper.dots / 72.0) as scene:
-            told.tell(TOPIC, about)
+        with offscreen_scene(client, server, shot, view, LINE * paper.dots / 72.0) as scene:
+            messages.send(TOPIC, about)
             scene.take("png")
     finally:
-        told.tell(TOPIC, None)
+        messages.send(TOPIC, None)

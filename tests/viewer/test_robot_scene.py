@@ -8,9 +8,9 @@ import pytest
 
 import sagline as sl
 from sagline.viewer import solids
+from sagline.viewer.robot_scene import RobotScene
 from sagline.viewer.server import Server, started, stop
 from sagline.viewer.snapshot import Settings, taken_at
-from sagline.viewer.stage import Stage
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.viewer import home_pose
 from tests.tiers import wide
@@ -30,7 +30,7 @@ def node(server: Server, name: str) -> Any:
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
 def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: Server, name: str) -> None:
     robot = sl.load_robot(name)
-    Stage(server.scene, robot, home_pose(robot))
+    RobotScene(server.scene, robot, home_pose(robot))
     size = solids.size_of(robot)
     gizmo = node(server, "/platform")
     assert 0.05 * size < gizmo.scale < 0.2 * size
@@ -40,7 +40,7 @@ def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
 def test_every_robot_has_a_floor_and_a_scale(server: Server, name: str) -> None:
     robot = sl.load_robot(name)
-    Stage(server.scene, robot, home_pose(robot))
+    RobotScene(server.scene, robot, home_pose(robot))
     low, high = solids.bounds(robot)
     floor = node(server, "/floor")
     assert floor.width > high[0] - low[0]
@@ -56,7 +56,7 @@ def test_every_robot_has_a_floor_and_a_scale(server: Server, name: str) -> None:
 
 def test_pulleys_turn_and_exit_points_move_with_the_platform(server: Server) -> None:
     robot = sl.load_robot("ipanema-2-pulleys")
-    stage = Stage(server.scene, robot, home_pose(robot))
+    stage = RobotScene(server.scene, robot, home_pose(robot))
     wheels = node(server, "/pulleys")
     assert np.asarray(wheels.batched_scales) == pytest.approx(0.25)
     assert np.asarray(wheels.batched_positions) == pytest.approx(robot.frame_anchors, abs=1e-6)
@@ -64,7 +64,9 @@ def test_pulleys_turn_and_exit_points_move_with_the_platform(server: Server) -> 
     for position in ([0.0, 0.0, 2.0], [1.0, 0.5, 2.5]):
         snapshot = taken_at(robot, sl.Pose(position, np.eye(3)), Settings(mass=robot.mass), None)
         stage.show(snapshot, TensionScale.of(robot), 1.0, 1.0, ghost=True)
-        assert np.asarray(wheels.batched_wxyzs) == pytest.approx(solids.turns(robot, snapshot.pose), abs=1e-6)
+        assert np.asarray(wheels.batched_wxyzs) == pytest.approx(
+            solids.pulley_rotations(robot, snapshot.pose), abs=1e-6
+        )
         points = np.asarray(node(server, "/cables").points).reshape(8, -1, 2, 3)
         assert points[:, 0, 0] == pytest.approx(robot.frame_anchors, abs=1e-6)
         exits = sl.inverse(robot, snapshot.pose).exit_point
@@ -78,7 +80,7 @@ def test_dead_cable_is_dashed_where_its_way_is_not_known(server: Server) -> None
     rise = np.array([2.0, 2.0, 2.0, 2.0, 1.0, 1.0, 0.0, 0.0])
     winch = sl.Winch(pulley_radius=0.2, dead_cable=2.0, dead_rise=rise, drum_radius=0.2)
     robot = base.replace(winches=winch)
-    stage = Stage(server.scene, robot, home_pose(robot))
+    stage = RobotScene(server.scene, robot, home_pose(robot))
     for name, runs in (("/dead", 4 * 2.0), ("/dead_assumed", 2 * 0.5 * 1.0)):
         points = np.asarray(node(server, name).points)
         assert np.linalg.norm(points[:, 1] - points[:, 0], axis=1).sum() == pytest.approx(runs, rel=1e-5)

@@ -7,13 +7,13 @@ from queue import Queue
 
 import pytest
 
-from sagline.viewer.feature import NICENESS, Aside
+from sagline.viewer.feature import NICENESS, BackgroundTask
 from tests.viewer.client import PATIENCE
 
 
 def test_it_gives_way_to_what_draws_which_stays_as_it_is() -> None:
     before, soon, found = os.nice(0), Queue[Callable[[], None]](), list[int]()
-    Aside(soon.put).ask(lambda: os.nice(0), found.append, pytest.fail)
+    BackgroundTask(soon.put).start(lambda: os.nice(0), found.append, pytest.fail)
     soon.get(timeout=PATIENCE)()
     assert found == [min(before + NICENESS, 19) if sys.platform == "linux" else before]
     assert os.nice(0) == before

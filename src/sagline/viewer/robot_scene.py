@@ -1,4 +1,4 @@
-"""The scene in the browser: what is built once, and what follows every snapshot."""
+"""The robot in the scene: built once, changed with every view."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
 from sagline.viewer import lines, solids
-from sagline.viewer.drawn import Drawn
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.readout import headline
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
@@ -37,7 +37,7 @@ _ABOVE: Final = np.array([0.02, 0.0, 0.08])  # room for the cables' names
 _GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, of the robot's size
 
 
-class Stage:
+class RobotScene:
     """The robot's parts in a scene. Every client of a server's scene sees, and may drag, the same."""
 
     def __init__(
@@ -70,7 +70,7 @@ class Stage:
 
     @property
     def gizmo(self) -> viser.TransformControlsHandle:
-        """What is dragged, where something is."""
+        """The transform controls of the platform."""
         gizmo: viser.TransformControlsHandle = self._gizmo
         return gizmo
 
@@ -80,7 +80,7 @@ class Stage:
         return corners.min(axis=0) - _BELOW * self._size, corners.max(axis=0) + _ABOVE * self._size
 
     def dragged_pose(self) -> Pose:
-        """Where the gizmo is."""
+        """Pose of the gizmo."""
         position = np.asarray(self._gizmo.position, dtype=np.float64).reshape(-1)
         wxyz = np.asarray(self._gizmo.wxyz, dtype=np.float64).reshape(-1)
         length = float(np.linalg.norm(wxyz)) if wxyz.size == 4 else 0.0
@@ -103,33 +103,34 @@ class Stage:
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def show(
-        self, snapshot: Snapshot | Drawn, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
+        self, snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
     ) -> None:
         """Draw a snapshot, or a moment of a simulation; the platform itself follows the gizmo."""
         self._cables.points = snapshot.cable_segments(sag_scale).astype(np.float32)
         self._cables.colors = snapshot.cable_colors(scale)
         if self._wheels is not None:
-            turns = solids.turns(snapshot.robot, snapshot.pose)[self._over_pulleys]
+            turns = solids.pulley_rotations(snapshot.robot, snapshot.pose)[self._over_pulleys]
             self._wheels.batched_wxyzs = turns.astype(np.float32)
         self._platform.color = PLATFORM if snapshot.feasible else INFEASIBLE
         self._notice.visible = self._live and not snapshot.feasible
         if isinstance(snapshot, Snapshot) and not snapshot.feasible:
             self._notice.text = headline(snapshot)
-        elif isinstance(snapshot, Drawn):
+        elif isinstance(snapshot, InMotion):
             self._notice.text = snapshot.notice
             self._show_truth(snapshot, error_scale)
         self._ghost.visible = ghost
         if ghost:
             self._ghost.points = snapshot.ghost_segments(sag_scale, APART * self._size).astype(np.float32)
-        rest = snapshot.drawn_rest(error_scale)
+        rest = snapshot.scaled_position(snapshot.rest, error_scale)
         shown = rest is not None and bool(np.isfinite(rest).all())
         self._rest_frame.visible = shown
         if shown and rest is not None and snapshot.rest is not None:
             self._rest_frame.position = rest
             self._rest_frame.wxyz = np.roll(snapshot.rest.quaternion, 1)
 
-    def _show_truth(self, drawn: Drawn, error_scale: float) -> None:
-        truth, place = drawn.truth, drawn.drawn_truth(error_scale)
+    def _show_truth(self, drawn: InMotion, error_scale: float) -> None:
+        truth = drawn.truth
+        place = drawn.scaled_position(truth, error_scale)
         if self._truth is None and truth is not None:
             self._truth = self._scene.add_frame("/truth", show_axes=False)
             self._scene.add_mesh_simple("/truth/body", self._body.vertices, self._body.faces, color=TRUTH, opacity=0.55)
@@ -161,7 +162,7 @@ class Stage:
                 self._traces.append(self._scene.add_line_segments(name, known, color, **self._wide(TRACE_WIDTH)))
 
     def _wide(self, pixels: float) -> dict[str, Any]:
-        """How viser is told the width of lines."""
+        """Arguments of the width of lines."""
         if self._pixel == 0.0:
             return {"thickness": pixels, "thickness_units": "screen"}
         return {"thickness": pixels * self._pixel, "thickness_units": "world"}
@@ -204,7 +205,8 @@ class Stage:
         """The pulleys as large as they are; they turn with the platform."""
         wheel, which = solids.wheel(), self._over_pulleys
         return self._scene.add_batched_meshes_simple(
-            "/pulleys", wheel.vertices, wheel.faces, solids.turns(robot, pose)[which], robot.frame_anchors[which],
+            "/pulleys", wheel.vertices, wheel.faces, solids.pulley_rotations(robot, pose)[which],
+            robot.frame_anchors[which],
             batched_scales=pulleys_of(robot).radius[which], batched_colors=DRUM, flat_shading=True, lod="off",
         )  # fmt: skip
 
