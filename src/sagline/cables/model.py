@@ -65,11 +65,7 @@ class CableModel:
     weightless: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse the model that is none: the interface by itself.
-
-        Raises:
-            InvalidValueError: If there are no equations.
-        """
+        """Refuse the model that is none: the interface by itself."""
         if type(self) is CableModel:
             step = "Choose one of the models, Catenary() for instance."
             raise InvalidValueError("CableModel()", "the interface alone", "a cable model", step)

@@ -36,19 +36,7 @@ class Problem(NamedTuple):
     def of(cls, cable: Cable, span: ArrayLike, rise: ArrayLike, given: Array, gravity: float) -> Self:
         """Check geometry and gravity and bring everything to one shape.
 
-        Args:
-            cable: Material.
-            span: Horizontal distance between the ends [m], >= 0.
-            rise: Height of the platform end above the frame end [m].
-            given: Tension [N] or length [m], already checked.
-            gravity: Gravitational acceleration [m/s^2], >= 0.
-
-        Returns:
-            The problem.
-
-        Raises:
-            CableGeometryError: If span is negative, or span and rise are both zero.
-            InvalidValueError: If gravity is negative or not finite, or shapes do not broadcast.
+        Units: span [m]; rise [m]; given [N]; gravity [m/s^2].
         """
         span = _checked_span(span)
         rise = checked(rise, "rise", "m")
@@ -68,22 +56,14 @@ class Problem(NamedTuple):
         return cls(shape, gravity, span, rise, (a, b, c, d, e))
 
     def outputs(self) -> tuple[Array, Array, Array, Codes]:
-        """Room for what kernels find: three numbers and a status a cable.
-
-        Returns:
-            Arrays as long as the batch, not yet filled.
-        """
+        """Room for what kernels find: three numbers and a status a cable."""
         size = math.prod(self.shape)
         return np.empty(size), np.empty(size), np.empty(size), np.empty(size, dtype=np.int8)
 
     def shaped(self, field: Array) -> Array:
         """A result or an operand in the batch's shape, locked.
 
-        Args:
-            field: Array as long as the batch, or one that broadcasts with its shape.
-
-        Returns:
-            Array of shape (...): results are reshaped, operands repeated without copying.
+        Returns (...).
         """
         whole = field.size == math.prod(self.shape)
         return locked(field.reshape(self.shape) if whole else np.broadcast_to(field, self.shape))

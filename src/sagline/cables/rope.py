@@ -37,14 +37,7 @@ class Rope:
     def cable(self, diameter: float) -> Cable:
         """A cable of this rope.
 
-        Args:
-            diameter: Nominal diameter [m], > 0.
-
-        Returns:
-            Its material.
-
-        Raises:
-            InvalidValueError: If the diameter is not one positive number.
+        Units: diameter [m].
         """
         square = float(checked(diameter, "diameter", "m", shape=(), above=0.0)) ** 2
         return Cable(self.density_factor * square, self.stiffness_factor * square, diameter=diameter)
@@ -52,11 +45,7 @@ class Rope:
     def breaking_force(self, diameter: float) -> float:
         """Least force at which a new rope breaks.
 
-        Args:
-            diameter: Nominal diameter [m].
-
-        Returns:
-            Force [N].
+        Units: diameter [m]; returns [N].
         """
         return self.strength_factor * diameter**2
 

@@ -153,10 +153,10 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
     """The table, with each massless mode beside the one in which most of its motion is found."""
-    from sagline.dynamics.vibration.mode_list import MASSLESS, WITH_MASS, successors
+    from sagline.dynamics.vibration.mode_list import MASSLESS, WITH_MASS, mode_correlation
 
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]
-    shares = successors(found)
+    shares = mode_correlation(found)
     beside: dict[int, list[str]] = {}
     beyond = []
     for mode in (each for each in modes if each.kind == MASSLESS):

@@ -88,18 +88,7 @@ class Path(Shown):
 
 
 def checked_time(time: ArrayLike, item: str = "time") -> Array:
-    """A locked copy of the sample times [s], strictly increasing, shape (N,) with N >= 1.
-
-    Args:
-        time: What a caller gave.
-        item: The name a message uses.
-
-    Returns:
-        The times, float64, write-locked.
-
-    Raises:
-        InvalidValueError: If they are no such times; it names the first sample that is wrong.
-    """
+    """A locked copy of the sample times [s], strictly increasing, shape (N,) with N >= 1."""
     clock = checked(time, item, "s", shape=(None,))
     if clock.ndim != 1 or clock.size == 0:
         raise InvalidValueError(item, f"of shape {clock.shape}", "shape (N,), N >= 1", "Give one time for each sample.")

@@ -189,15 +189,7 @@ def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None
 def time_grid(total: float, rate: float) -> Array:
     """Times k/rate from 0 to the total time, and the total itself as the last [s].
 
-    Args:
-        total: The total time [s].
-        rate: Samples per second [1/s], > 0.
-
-    Returns:
-        The times, shape (N,).
-
-    Raises:
-        InvalidValueError: If the rate is not positive, or makes too many samples.
+    Shapes: total [s]; rate [1/s]; returns (N,).
     """
     rate = number(rate, "rate", "1/s", above=0.0)
     steps = total * rate

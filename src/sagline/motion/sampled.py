@@ -59,12 +59,7 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
 def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
     """First and second derivative, at its knots, of the cubic spline through the values.
 
-    Args:
-        time: Times of the knots, strictly increasing, shape (N,), N >= 2.
-        values: Shape (N, ...).
-
-    Returns:
-        Two arrays of the shape of the values.
+    Shapes: time (N,); values (N, ...).
     """
     from scipy.interpolate import CubicSpline  # takes longer to load than all the rest of motion
 

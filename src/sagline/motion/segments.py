@@ -33,14 +33,7 @@ class Profile:
 
     @classmethod
     def of_order(cls, order: int) -> Profile:
-        """The profile whose first `order` derivatives vanish at both ends.
-
-        Args:
-            order: k, >= 2.
-
-        Returns:
-            Profile of degree 2 k + 1.
-        """
+        """The profile whose first `order` derivatives vanish at both ends."""
         k = order
         scale = factorial(2 * k + 1) // factorial(k) ** 2
         binomials = (factorial(k) // factorial(i) // factorial(k - i) for i in range(k + 1))
@@ -64,28 +57,14 @@ class Profile:
         return float(self.slope * k * (0.25 * (1.0 - q)) ** (k - 1) * np.sqrt(q))
 
     def share(self, s: Array) -> Array:
-        """Share of the way that is done.
-
-        Args:
-            s: Share of the time, 0 to 1, of any shape.
-
-        Returns:
-            Array of the shape of s, from 0 to 1.
-        """
+        """Share of the way that is done."""
         total: Array = np.full_like(s, self.tail[-1])
         for coefficient in self.tail[-2::-1]:
             total = coefficient + s * total
         return s ** (self.order + 1) * total
 
     def rates(self, s: Array) -> tuple[Array, Array, Array]:
-        """First, second and third derivative of the share by s; the first k of them exactly 0 at both ends.
-
-        Args:
-            s: Share of the time, 0 to 1, of any shape.
-
-        Returns:
-            Three arrays of the shape of s.
-        """
+        """First, second and third derivative of the share by s; the first k of them exactly 0 at both ends."""
         k = self.order
         u, bend = s * (1.0 - s), 1.0 - 2.0 * s
         second = self.slope * k * u ** (k - 1) * bend
@@ -124,15 +103,7 @@ class Segments:
 
     @classmethod
     def between(cls, stops: Pose, profile: Profile) -> Segments:
-        """The segments from each pose of a batch to the next.
-
-        Args:
-            stops: The waypoints, a batch of S + 1 poses.
-            profile: How to get from each to the next.
-
-        Returns:
-            S segments.
-        """
+        """The segments from each pose of a batch to the next."""
         move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
         if np.array_equal(kept, stops.quaternion[1:]):  # nothing turns: the axis is never asked for
             return cls(profile, stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
@@ -165,18 +136,8 @@ class Segments:
     ) -> Array:
         """Shortest times that keep all limits.
 
-        Args:
-            speed: Limit of the origin's speed [m/s], or None.
-            acceleration: Limit of the origin's acceleration [m/s^2], or None.
-            angular_speed: Limit of the angular speed [rad/s], or None.
-            angular_acceleration: Limit of the angular acceleration [rad/s^2], or None.
-
-        Returns:
-            Times [s], shape (S,).
-
-        Raises:
-            InvalidValueError: If a limit is not positive, a segment moves or turns without a limit on it, or goes
-                nowhere.
+        Shapes: speed [m/s]; acceleration [m/s^2]; angular_speed [rad/s]; angular_acceleration [rad/s^2]; returns
+        (S,) [s].
         """
         distance, angle = np.linalg.norm(self.move, axis=1), np.linalg.norm(self.turn, axis=1)
         same = np.flatnonzero((distance <= STILL) & (angle <= STILL))
@@ -196,13 +157,7 @@ class Segments:
     def sampled(self, time: Array, ends: Array, durations: Array) -> Path:
         """The path at given times.
 
-        Args:
-            time: Times of the samples [s], shape (N,).
-            ends: When each segment is over [s], shape (S,).
-            durations: How long each takes [s], shape (S,).
-
-        Returns:
-            Path with its jerk; a sample between two segments belongs to the later one.
+        Shapes: time (N,) [s]; ends (S,) [s]; durations (S,) [s].
         """
         starts = np.concatenate(([0.0], ends[:-1]))
         half_angle = 0.5 * np.linalg.norm(self.turn, axis=1, keepdims=True)

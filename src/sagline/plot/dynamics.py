@@ -19,7 +19,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
-from sagline.dynamics.vibration.response import FrequencyResponse, drawn_curves, response_curves
+from sagline.dynamics.vibration.response import FrequencyResponse, curves_of_response, response_curves
 from sagline.dynamics.vibration.vibration import Vibration
 from sagline.plot.labels import PLACE, TIME, legend_above, name_lines, wrap_heading
 from sagline.plot.sheet import BLUE, COLORS, DASHED, GAP_COLOR, TICK, VERMILLION, WIDTH, axes_or_new, format_axes, sheet
@@ -286,7 +286,7 @@ def response(
         InvalidValueError: If the vibration has no modes or the response no frequencies, or there is no such motion.
     """
     if isinstance(vibration, FrequencyResponse):
-        curves, modes = drawn_curves(vibration, force, motion), []
+        curves, modes = curves_of_response(vibration, force, motion), []
     else:
         curves = response_curves(vibration, force, motion)
         modes = list(zip(vibration.frequency, vibration.platform_share, strict=True))

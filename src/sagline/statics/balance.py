@@ -61,15 +61,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike
 def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
     """The caller's wrench, checked; zeros for None.
 
-    Args:
-        wrench: What the caller gave: force [N], then moment [N m], or None.
-        count: Number of poses; None for a single one.
-
-    Returns:
-        Array of shape (6,) or (N, 6).
-
-    Raises:
-        InvalidValueError: If it is no wrench, or its count is not that of the poses (None: a single pose).
+    Shapes: wrench [N]; returns (6,) or (N, 6).
     """
     if wrench is None:
         return locked(np.zeros(6))

@@ -18,12 +18,7 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 def chord_geometry(robot: Robots, pose: Pose) -> Array:
     """Geometry of every cable at every pose, rows as in `sagline.kernels.cable.geometry`.
 
-    Args:
-        robot: The robot, or one a pose.
-        pose: One pose or a batch of N.
-
-    Returns:
-        Array of shape (N, GEOMETRY_ROWS, m); the chord is NaN where no line touches a cable's pulley.
+    Returns (N, GEOMETRY_ROWS, m).
     """
     cables, poses = cable_table(robot), pose_rows(pose)
     out = np.empty((len(poses), rows.GEOMETRY_ROWS, cables.shape[1]))
@@ -35,12 +30,7 @@ def chord_geometry(robot: Robots, pose: Pose) -> Array:
 def touching_angle(robot: Robot, pose: Pose) -> Array:
     """Wrap angle psi of straight cables: where the lines from the platform ends touch the pulleys.
 
-    Args:
-        robot: The robot.
-        pose: One pose.
-
-    Returns:
-        Angles [rad], shape (m,); 0 without a pulley, NaN where no line touches it.
+    Returns (m,) [rad].
     """
     radius, entry = pulleys_of(robot)
     geometry = chord_geometry(robot, pose)[0]
@@ -49,16 +39,7 @@ def touching_angle(robot: Robot, pose: Pose) -> Array:
 
 
 def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = None) -> None:
-    """Refuse poses at which a cable has no chord: its ends coincide, or no line from its pulley leads to its end.
-
-    Args:
-        robot: The robot, or one a pose.
-        pose: One pose or a batch of N.
-        geometry: Their `chord_geometry`, where it is known.
-
-    Raises:
-        CableGeometryError: If there is one; the message names pose and cable.
-    """
+    """Refuse poses at which a cable has no chord: its ends coincide, or no line from its pulley leads to its end."""
     chord = (chord_geometry(robot, pose) if geometry is None else geometry)[:, rows.CHORD]
     missing = np.argwhere(~(chord >= SHORTEST_CHORD))
     if not len(missing):

@@ -55,14 +55,7 @@ class CableSlopes(NamedTuple):
 
 
 def cable_slopes(state: Equilibrium) -> CableSlopes:
-    """How the cables' forces change with the platform's motion and with their own data.
-
-    Args:
-        state: An equilibrium, single or N of them.
-
-    Returns:
-        The slopes; NaN where the state has no lengths.
-    """
+    """How the cables' forces change with the platform's motion and with their own data."""
     shared, cables = first_of(state.robot), state.cables
     bodies, robots = body_table(state.robot), cable_table(state.robot)
     poses, lengths = pose_rows(state.pose), np.atleast_2d(kernel_length(state))
@@ -105,12 +98,7 @@ def _turned(state: Equilibrium, vectors: Array) -> Array:
 def on_platform(forces: Array, levers: Array) -> Array:
     """Forces at the platform ends as wrenches about the center of mass.
 
-    Args:
-        forces: Of each cable, world axes [N] or N by something, shape (..., m, 3).
-        levers: From the center of mass to the platform ends [m], shape (..., m, 3).
-
-    Returns:
-        Columns of force and moment, shape (..., 6, m).
+    Shapes: forces (..., m, 3) [N]; levers (..., m, 3) [m]; returns (..., 6, m).
     """
     return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
 
@@ -132,15 +120,7 @@ class TensionSlopes(NamedTuple):
 
 
 def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
-    """How the tensions at the frame ends change.
-
-    Args:
-        state: An equilibrium, single or N of them.
-        slopes: Of its cables.
-
-    Returns:
-        The slopes; NaN where the state has no lengths.
-    """
+    """How the tensions at the frame ends change."""
     unit = np.eye(6)
     ends = unit[:, :3] + np.cross(unit[:, 3:], slopes.levers[..., None, :])
     forces = np.concatenate((ends @ np.swapaxes(slopes.blocks, -1, -2), slopes.by_length[..., None, :]), axis=-2)
@@ -167,11 +147,7 @@ def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array
 def _leaving(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
     """Of cables that leave pulleys, from H = T + T^2/(2 EA) - w z, which is one number from end to end.
 
-    Args:
-        state: The state.
-        slopes: Of its cables.
-        forces: Change of the force on each platform end, shape (..., m, 7, 3).
-        ends: Motion of each platform end, of the same shape.
+    Shapes: forces (..., m, 7, 3).
     """
     cables, contact = state.cables, state.contact
     assert contact is not None

@@ -247,11 +247,7 @@ def _inverse(matrix: Array) -> Array:
 def mass_matrix(state: Equilibrium) -> Array:
     """Mass and inertia of the platform about the center of mass, in world axes.
 
-    Args:
-        state: An equilibrium, single or N of them.
-
-    Returns:
-        Matrices that take twists to momenta, shape (..., 6, 6) [kg, kg m^2].
+    Returns (..., 6, 6) [kg, kg m^2].
     """
     rotation = state.pose.matrix
     body = bodies_of(state.robot)

@@ -38,15 +38,7 @@ class Strings(NamedTuple):
 
 
 def strings_of(state: Equilibrium) -> Strings:
-    """What the cables of an equilibrium are as strings.
-
-    Args:
-        state: An equilibrium, single or N of them; the table has a leading axis in either case.
-
-    Returns:
-        Strings.
-
-    """
+    """What the cables of an equilibrium are as strings."""
     cables = state.cables
     m = cables.shape[-1]
     material = cables_of(state.robot)
@@ -77,12 +69,7 @@ def strings_of(state: Equilibrium) -> Strings:
 def strings_below(strings: Strings, frequency: Array) -> Indices:
     """How many natural frequencies the cables have with both ends held, by the count of Wittrick and Williams.
 
-    Args:
-        strings: Of N states.
-        frequency: Those below which are counted [Hz], shape (N, F).
-
-    Returns:
-        Below each frequency, shape (N, F, m); none of cables that are not taut.
+    Shapes: frequency (N, F) [Hz]; returns (N, F, m).
     """
     below = np.zeros((*frequency.shape, strings.taut.shape[1]), dtype=np.int64)
     waves, room = undamped(frequency), np.empty(collocation.ROOM)
@@ -98,11 +85,7 @@ def strings_below(strings: Strings, frequency: Array) -> Indices:
 def undamped(frequency: Array) -> Array:
     """Frequencies as kernels take them.
 
-    Args:
-        frequency: [Hz], shape (N, F).
-
-    Returns:
-        Array of shape (N, F, WAVE_COLUMNS).
+    Shapes: frequency (N, F) [Hz]; returns (N, F, WAVE_COLUMNS).
     """
     waves = np.zeros((*frequency.shape, collocation.WAVE_COLUMNS))
     waves[..., collocation.OMEGA] = omega = 2.0 * np.pi * frequency
@@ -130,11 +113,7 @@ def _axes(state: Equilibrium) -> Array:
 def taut_of(table: Array) -> Flags:
     """Whether cables have linear vibrations: neither folded nor slack.
 
-    Args:
-        table: Of strings, shape (N, m, STRING_COLUMNS).
-
-    Returns:
-        Shape (N, m).
+    Shapes: table (N, m, STRING_COLUMNS); returns (N, m).
     """
     top = table[..., columns.VERTICAL]
     hanging = table[..., columns.WEIGHT] * table[..., columns.LENGTH]

@@ -13,11 +13,7 @@ from sagline.robot.robot import Robot
 def cable_table(robot: Robots) -> Array:
     """Anchors, material and limits of the cables, columns as in kernels.tables.
 
-    Args:
-        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
-
-    Returns:
-        Array of shape (1 or N, m, CABLE_COLUMNS).
+    Returns (1 or N, m, CABLE_COLUMNS).
     """
     robots = (robot,) if isinstance(robot, Robot) else robot
     return locked(np.array([_cable_rows(one) for one in robots]))
@@ -26,11 +22,7 @@ def cable_table(robot: Robots) -> Array:
 def body_table(robot: Robots) -> Array:
     """Mass, gravity and center of mass of the platform, columns as in kernels.tables.
 
-    Args:
-        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
-
-    Returns:
-        Array of shape (1 or N, BODY_COLUMNS).
+    Returns (1 or N, BODY_COLUMNS).
     """
     robots = (robot,) if isinstance(robot, Robot) else robot
     return locked(np.array([[one.mass, one.gravity, *one.center_of_mass] for one in robots]))
@@ -39,11 +31,7 @@ def body_table(robot: Robots) -> Array:
 def pose_rows(pose: Pose) -> Array:
     """Positions and quaternions of a pose or a batch.
 
-    Args:
-        pose: One pose or a batch of N.
-
-    Returns:
-        Shape (N, POSE_COLUMNS); N = 1 for a single pose.
+    Returns (N, POSE_COLUMNS).
     """
     rows = np.concatenate((np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)), axis=1)
     return locked(rows)
@@ -52,11 +40,7 @@ def pose_rows(pose: Pose) -> Array:
 def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
     """A robot, or several, as kernels take it.
 
-    Args:
-        robot: One robot for all poses, or a tuple of N that fit together, one a pose.
-
-    Returns:
-        Free motions (n, 6), body_table and cable_table.
+    Returns (n, 6).
     """
     return first_of(robot).freedom, body_table(robot), cable_table(robot)
 

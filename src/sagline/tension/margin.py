@@ -37,12 +37,7 @@ def limit_margin(state: Equilibrium) -> Array:
 def cable_margins(state: Equilibrium) -> Array:
     """Distance of each cable's tension to its nearest limit: what `limit_margin` takes the smallest of.
 
-    Args:
-        state: Robot or robots, and cables, `plan.state` for instance.
-
-    Returns:
-        Distance [N] of the quantity that the robot's limits name, shape (m,) or (N, m); NaN where there are no
-        tensions.
+    Returns (m,) or (N, m) [N].
     """
     tension, limits = instance(state, Equilibrium, "state").limited_tension, limits_of(state.robot)
     margins: Array = np.minimum(tension - limits.low, limits.high - tension)

@@ -95,12 +95,7 @@ class TensionMethod:
 def shared_tension(state: Equilibrium, variable: Variable) -> Array:
     """Tensions of a state in the variable in which the load is shared.
 
-    Args:
-        state: A single state or a batch.
-        variable: "chord", "horizontal" or "frame_end".
-
-    Returns:
-        Tensions [N], shape (m,) or (N, m).
+    Returns (m,) or (N, m) [N].
     """
     match variable:
         case "chord":

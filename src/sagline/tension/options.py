@@ -33,19 +33,7 @@ class Options(NamedTuple):
 
 
 def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> Options:
-    """Model, method and limits as kernels take them first.
-
-    Args:
-        robot: The robot, or several that fit together.
-        model: Cable model.
-        tension: How the load is shared.
-
-    Returns:
-        Options; the preferences among the cables are in those of the sharing.
-
-    Raises:
-        InvalidValueError: If a robot's tensions cannot be determined, or not by this method.
-    """
+    """Model, method and limits as kernels take them first."""
     shared = first_of(robot)
     if isinstance(robot, Robot):
         check_sharing(robot, tension)
@@ -64,29 +52,12 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """Whether a method shares nearest to a reference in a linear variable: what is compiled first.
-
-    Args:
-        tension: The method.
-
-    Returns:
-        Whether it does.
-    """
+    """Whether a method shares nearest to a reference in a linear variable: what is compiled first."""
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 
 def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None) -> None:
-    """Refuse a robot among whose cables a method cannot share the load.
-
-    Args:
-        robot: The robot.
-        tension: The method.
-        name: What a message calls the robot; None for its own name.
-
-    Raises:
-        InvalidValueError: If it has fewer cables than degrees of freedom, more redundant ones than the method can
-            share among, or no upper limits where the method needs them.
-    """
+    """Refuse a robot among whose cables a method cannot share the load."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     called = name or robot.name
     item = f"{called}: number of cables"

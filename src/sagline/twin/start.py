@@ -11,7 +11,7 @@ from sagline.control.link import HEARTBEAT
 from sagline.core.arguments import optional
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.simulation.steps import highest_frequency, with_drives
+from sagline.dynamics.simulation.steps import frequency_with_winches, platform_frequency
 from sagline.dynamics.simulation.winches import drive_data
 from sagline.kernels.cable.drum import lengths_of_turns, turns_of_lengths
 from sagline.kernels.dynamics import drives as d
@@ -179,8 +179,8 @@ def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> 
     length = state.unstrained_length
     pose = Pose.from_quaternion(state.pose.position[None], state.pose.quaternion[None])
     data = drive_data(robot, "robot", length, False)
-    platform = highest_frequency(robot, pose, length[None])
-    highest = with_drives(platform, d.DRUMS, data, length[None], robot.cables.axial_stiffness)
+    platform = platform_frequency(robot, pose, length[None])
+    highest = frequency_with_winches(platform, d.DRUMS, data, length[None], robot.cables.axial_stiffness)
     if step * highest > SHARE:
         limit, frequency = SHARE / highest, highest / (2.0 * math.pi)
         finer = 1e-3 / 2 ** math.ceil(math.log2(1e-3 / limit))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.dynamics.simulation.initial_conditions import beginning
-from sagline.dynamics.simulation.simulate import run_of
+from sagline.dynamics.simulation.initial_conditions import initial_conditions
+from sagline.dynamics.simulation.simulate import started_run
 from tests.tiers import wide
 
 PARTS = (0.03, 0.1, 0.1, 0.137, 0.3, 0.05, np.inf)  # also between records, twice, and back
@@ -36,7 +36,7 @@ def test_in_parts_it_is_what_it_is_at_once(elements: int, told: dict[str, Any]) 
     mass: dict[str, Any] = {"cable_mass": "lumped", "nodes": elements} if elements else {}
     start, gust = state(), ([0.0, 0.05, 0.1], np.outer([0.0, 1.0, 0.0], [300.0, 0.0, 0.0, 0.0, 0.0, 10.0]))
     at_once = sl.simulate(start, duration=0.405, wrench=gust, **mass, **told)
-    run = run_of(beginning(start, None, gust, 0.405), elements, **told)
+    run = started_run(initial_conditions(start, None, gust, 0.405), elements, **told)
     before = 0
     for part in PARTS:
         found = run.until(part)
@@ -62,7 +62,7 @@ def test_in_parts_it_is_what_it_is_at_once(elements: int, told: dict[str, Any]) 
 
 
 def test_what_has_been_told_stays_as_it_was_told() -> None:
-    run = run_of(beginning(state(), None, None, 0.4), events=EVENTS[:1])
+    run = started_run(initial_conditions(state(), None, None, 0.4), events=EVENTS[:1])
     early = run.until(0.1)
     copied = early.tensions.copy(), early.pose.position.copy(), early.largest_tension
     assert copied[2] is not None

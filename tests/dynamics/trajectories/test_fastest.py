@@ -7,9 +7,9 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline import structure_matrix
-from sagline.dynamics.trajectories.force_balance import Balances, HalfPlanes, fastest_profile
-from sagline.dynamics.trajectories.jerk_bounded import fastest_course
-from sagline.dynamics.trajectories.segments import moves_of
+from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes, fastest_speed_profile
+from sagline.dynamics.trajectories.jerk_bounded import fastest_jerk_profile
+from sagline.dynamics.trajectories.segments import segments_of
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
@@ -199,10 +199,10 @@ def test_half_planes_are_what_linear_programs_find(cogiro: sl.Robot, seed: int) 
     robot = cogiro.replace(center_of_mass=(0.05, 0.02, -0.1), tension_max=900.0)
     if seed == 3:
         robot = robot.replace(tension_max=np.inf)
-    move = moves_of(arc())[0]
+    move = segments_of(arc())[0]
     assert move.curve is not None
     jet = move.curve.at(rng.uniform(0.0, 1.0, 3))
-    balances = Balances.at(robot, jet, sl.inverse(robot, jet.pose))
+    balances = ForceBalance.at(robot, jet, sl.inverse(robot, jet.pose))
     planes = balances.half_planes()
     matrix = structure_matrix(robot, jet.pose)
     for k in range(3):
@@ -224,14 +224,14 @@ def test_profiles_of_constant_bounds_are_known() -> None:
         every = np.repeat(np.array(rows)[None], len(place), axis=0)
         return HalfPlanes(every[..., :2], every[..., 2])
 
-    bang = fastest_profile(place, planes((1.0, 0.0, a), (-1.0, 0.0, a)))
+    bang = fastest_speed_profile(place, planes((1.0, 0.0, a), (-1.0, 0.0, a)))
     assert bang is not None
     assert bang.duration == pytest.approx(2.0 / np.sqrt(a), rel=1e-12)
-    held = fastest_profile(place, planes((1.0, 0.0, a), (-1.0, 0.0, b), (0.0, 1.0, v**2)))
+    held = fastest_speed_profile(place, planes((1.0, 0.0, a), (-1.0, 0.0, b), (0.0, 1.0, v**2)))
     assert held is not None
     expected = 1.0 / v + 0.5 * v * (1.0 / a + 1.0 / b)  # two ramps and a way at the full speed
     assert held.duration == pytest.approx(expected, rel=2e-3)  # the ramps end between places
-    assert fastest_profile(place, planes((-1.0, 0.0, -1.0))) is None  # it can only speed up
+    assert fastest_speed_profile(place, planes((-1.0, 0.0, -1.0))) is None  # it can only speed up
     time = np.linspace(0.0, bang.duration, 9)
     np.testing.assert_allclose(bang.at(time)[0, :5], 0.5 * a * time[:5] ** 2, rtol=1e-12)
 
@@ -274,10 +274,10 @@ def test_the_polygons_border_is_where_the_exact_inverse_ends(cogiro: sl.Robot, k
         robot = robot.replace(tension_limits_of="frame_end")
     if kind == "pulleys":
         robot = robot.replace(winches=sl.Winch(0.05, dead_cable=4.0))
-    move = moves_of(arc())[0]
+    move = segments_of(arc())[0]
     assert move.curve is not None
     jet = move.curve.at(np.array([0.1, 0.5, 0.8]))
-    balances = Balances.at(robot, jet, sl.inverse(robot, jet.pose))
+    balances = ForceBalance.at(robot, jet, sl.inverse(robot, jet.pose))
     for sign in (1.0, -1.0):
         low, high = np.zeros(3), np.full(3, 50.0)
         for _ in range(40):
@@ -286,7 +286,7 @@ def test_the_polygons_border_is_where_the_exact_inverse_ends(cogiro: sl.Robot, k
             held = sl.inverse(robot, jet.pose, wrench=wrench).feasible
             low, high = np.where(held, middle, low), np.where(held, high, middle)
         border = np.stack((sign * low, 0.0 * low), axis=1)
-        planes = balances.near(border).half_planes()
+        planes = balances.near_motion(border).half_planes()
         along = sign * planes.rates[..., 0]
         found = np.min(np.where(along > 1e-9, planes.bound / np.where(along > 1e-9, along, 1.0), np.inf), axis=1)
         np.testing.assert_allclose(found, low, rtol=1e-4)
@@ -301,7 +301,7 @@ def test_bounds_hold_at_both_ends_of_every_step() -> None:
         planes = HalfPlanes(
             np.hstack((normals, box)), np.full((len(place), 11), 1.0) * [*rng.uniform(0.5, 2.0, 9), 5, 5]
         )
-        profile = fastest_profile(place, planes)
+        profile = fastest_speed_profile(place, planes)
         assert profile is not None
         for k in range(len(place) - 1):
             for end in (k, k + 1):
@@ -315,20 +315,20 @@ def test_what_must_brake_must_come_fast() -> None:
     for most, possible in ((0.5, False), (1.5, True)):
         up = np.where(place < 0.5, most, -1.0)
         rates = np.broadcast_to([[1.0, 0.0], [-1.0, 0.0]], (101, 2, 2))
-        profile = fastest_profile(place, HalfPlanes(rates.copy(), np.stack((up, np.full(101, 8.0)), axis=1)))
+        profile = fastest_speed_profile(place, HalfPlanes(rates.copy(), np.stack((up, np.full(101, 8.0)), axis=1)))
         assert (profile is not None) == possible
 
 
 @extended
 def test_the_jerk_on_a_curve_ends_within_its_limit(cogiro: sl.Robot) -> None:
-    move = moves_of(arc())[0]
+    move = segments_of(arc())[0]
     assert move.curve is not None
     robot = cogiro.replace(tension_max=5000.0)
 
     def free(parameter: np.ndarray) -> HalfPlanes:
         return HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
 
-    course = fastest_course(move.curve, robot, free, (20.0, np.inf), 0.5)
+    course = fastest_jerk_profile(move.curve, robot, free, (20.0, np.inf), 0.5)
     assert course is not None
     motion = course.at(np.linspace(0.0, course.duration, 2001))
     jerk = np.linalg.norm(move.curve.at(motion[0]).twists(motion)[2, :, :3], axis=1)

@@ -6,7 +6,7 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.dynamics.trajectories.segments import Bent, moves_of, piecewise
+from sagline.dynamics.trajectories.segments import SplineCurve, piecewise, segments_of
 from tests.motion.differences import angular_velocity, slope
 from tests.refusal import refused
 
@@ -191,7 +191,7 @@ def test_between_samples_moves_are_the_polynomials_that_they_were(
 ) -> None:
     coarse, fine = (make(STOPS, durations=durations, rate=rate) for rate in (50.0, 1000.0))
     which = np.minimum(np.searchsorted(there(fine.rests)[1:], fine.time, side="right"), 3)
-    for k, move in enumerate(moves_of(coarse)):
+    for k, move in enumerate(segments_of(coarse)):
         part = which == k
         if move.curve is None:
             assert not fine.twist[part].any()
@@ -207,7 +207,7 @@ def test_the_rates_of_a_bent_curve_are_those_of_its_poses() -> None:
     """By differences: each rate is the slope of the one before, along the parameter and in time."""
     s = np.linspace(0.0, 1.0, 201)
     position = np.stack((np.sin(2 * s), np.cos(3 * s), s**3), axis=1)
-    curve = Bent.through(sl.Pose.from_euler(position, 0.4 * np.sin(2 * s), 0.5 * s**2, 1.5 * s), s)
+    curve = SplineCurve.through(sl.Pose.from_euler(position, 0.4 * np.sin(2 * s), 0.5 * s**2, 1.5 * s), s)
     h = 1e-4
     place = np.linspace(0.2, 0.8, 7)[:, None] + h * np.arange(-1, 2)
     jets = [curve.at(column) for column in place.T]

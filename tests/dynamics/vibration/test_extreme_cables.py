@@ -7,7 +7,7 @@ import pytest
 
 import sagline as sl
 from sagline.dynamics.vibration.component_modes import component_modes
-from sagline.dynamics.vibration.robot_modes import setting_of
+from sagline.dynamics.vibration.robot_modes import vibration_model
 from sagline.statics.strings import Strings, strings_below, taut_of
 from tests.kernels.dynamics.strings import string
 from tests.tiers import wide
@@ -52,6 +52,6 @@ def test_robots_with_lengths_a_little_wrong_are_answered(name: str, count: int) 
         if not np.isfinite(lowest):
             continue
         found = sl.vibration(state, up_to=4.0 * float(lowest))
-        slack = np.flatnonzero(~setting_of(state).strings.taut[0])
+        slack = np.flatnonzero(~vibration_model(state).strings.taut[0])
         assert found.complete or list(found.slack_cables) == slack.tolist() != []
         assert found.count == found.frequency.size

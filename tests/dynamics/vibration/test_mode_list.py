@@ -5,7 +5,13 @@ import pytest
 
 import sagline as sl
 from sagline import vibration
-from sagline.dynamics.vibration.mode_list import end_motions, following, listed_modes, stretch_losses, successors
+from sagline.dynamics.vibration.mode_list import (
+    end_displacements,
+    listed_modes,
+    mode_correlation,
+    quasi_static_displacements,
+    stretch_losses,
+)
 from tests.tiers import wide
 
 ROBOT = sl.load_robot("article-suspended")
@@ -32,11 +38,11 @@ def test_massless_modes_are_found_again_in_those_with_cable_mass() -> None:
     cables = ROBOT.cables.replace(linear_density=1e-4 * ROBOT.cables.linear_density)
     light = sl.inverse(ROBOT.replace(cables=cables), STATE.pose, tension=sl.MinimumNorm()).state
     found = vibration(light, up_to=12.0)
-    shares = successors(found)
+    shares = mode_correlation(found)
     which = shares.argmax(axis=1)
     np.testing.assert_allclose(shares.max(axis=1), 1.0, atol=0.02)
     np.testing.assert_allclose(found.frequency[which], sl.modes(light).frequency, rtol=1e-3)
-    spread = successors(vibration(STATE, up_to=12.0))
+    spread = mode_correlation(vibration(STATE, up_to=12.0))
     assert spread.max(axis=1).min() < 0.9
     assert np.all(spread.sum(axis=1) < 1.0 + 1e-9)
 
@@ -48,8 +54,8 @@ def test_cables_without_inertia_follow_as_those_of_the_same_lengths_do() -> None
     rest = STATE.cables.points(41)
     errors = []
     for share in (1.0, 0.5):
-        ends = end_motions(STATE, share * motion)[..., 0]
-        moved = following(STATE, ends, 41)
+        ends = end_displacements(STATE, share * motion)[..., 0]
+        moved = quasi_static_displacements(STATE, ends, 41)
         run = STATE.pose.transform(ROBOT.platform_anchors) + ends - ROBOT.frame_anchors
         span, rise = np.hypot(run[:, 0], run[:, 1]), run[:, 2]
         hung = sl.Catenary().from_length(ROBOT.cables, span, rise, STATE.unstrained_length).points(41)
@@ -67,7 +73,7 @@ def test_the_stretch_of_straight_cables_takes_what_a_complex_stiffness_takes() -
     light = sl.inverse(ROBOT.replace(cables=cables), STATE.pose).state
     platform = sl.modes(light)
     ratio = stretch_losses(light, platform, 1e-4)
-    moved = end_motions(light, platform.shape)
+    moved = end_displacements(light, platform.shape)
     along = light.pose.transform(ROBOT.platform_anchors) - ROBOT.frame_anchors
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     springs = ROBOT.cables.axial_stiffness / light.unstrained_length
@@ -85,11 +91,13 @@ def test_massless_cables_lose_and_lie_as_those_that_weigh_hardly_anything(winche
     light = sl.inverse(ROBOT.replace(cables=cables, winches=winches), STATE.pose, tension=sl.MinimumNorm()).state
     platform = sl.modes(light)
     found = vibration(light, up_to=1.1 * platform.frequency[-1], damping=sl.Damping(loss_time=1e-4))
-    which = successors(found).argmax(axis=1)
+    which = mode_correlation(found).argmax(axis=1)
     np.testing.assert_allclose(stretch_losses(light, platform, 1e-4), found.loss[which], rtol=1e-5)
     for k in which:
         shape = found.cable_shape[k]
-        moved = following(light, end_motions(light, found.shape[:, k, None])[..., 0], shape.shape[1])
+        moved = quasi_static_displacements(
+            light, end_displacements(light, found.shape[:, k, None])[..., 0], shape.shape[1]
+        )
         np.testing.assert_allclose(moved, shape, atol=2e-4 * np.abs(shape).max())
 
 

@@ -3,7 +3,7 @@ import pytest
 from scipy.integrate import quad_vec
 
 import sagline as sl
-from sagline.dynamics.trajectories.segments import moves_of
+from sagline.dynamics.trajectories.segments import segments_of
 from sagline.dynamics.vibration.vibration import excitation
 from tests.refusal import refused
 
@@ -33,7 +33,7 @@ def test_the_excitation_of_a_straight_move_is_the_formula_in_words(robot: sl.Rob
     direction = robot.mass * (goal.position - start.position)
     shape = modes.shape
     expected = np.abs(shape[:3].T @ direction) * np.linalg.norm(shape, axis=0) * transform / turning
-    found = excitation(robot, moves_of(path)[0], modes.frequency, shape)
+    found = excitation(robot, segments_of(path)[0], modes.frequency, shape)
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-12)
 
 

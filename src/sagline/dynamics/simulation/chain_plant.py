@@ -12,7 +12,7 @@ from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.chains_at_rest import chains_at_rest
-from sagline.dynamics.simulation.initial_conditions import Beginning, Course
+from sagline.dynamics.simulation.initial_conditions import InitialConditions, TimeTable
 from sagline.dynamics.simulation.plant import Plant, Records
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels import codes, tables
@@ -26,7 +26,7 @@ from sagline.kernels.dynamics.progress import COUNTERS, FAILED
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Carrier:
+class LoadedPlatform:
     """The rigid body of a platform with masses at its cables' ends; both have principal axes of their own.
 
     Attributes:
@@ -40,13 +40,10 @@ class Carrier:
     axes: Array
 
     @classmethod
-    def of(cls, inertia: Array, masses: Array, ends: Array) -> Carrier:
+    def of(cls, inertia: Array, masses: Array, ends: Array) -> LoadedPlatform:
         """A platform and masses at places on it.
 
-        Args:
-            inertia: Mass and principal moments of the platform, (4,).
-            masses: [kg], (m,).
-            ends: From its center of mass, its principal axes [m], (m, 3).
+        Shapes: inertia (4,); masses (m,) [kg]; ends (m, 3) [m].
         """
         mass = inertia[0] + masses.sum()
         center = (masses @ ends) / mass
@@ -68,11 +65,7 @@ class Carrier:
     def state(self, place: Array, turning: Array, velocity: Array, spin: Array) -> Array:
         """The row of the whole's state, where the platform is and moves.
 
-        Args:
-            place: Of the platform's center of mass [m], (3,).
-            turning: From its principal axes to the world, (3, 3).
-            velocity: Of its center of mass [m/s], (3,).
-            spin: Its angular velocity, world axes [rad/s], (3,).
+        Shapes: place (3,) [m]; turning (3, 3); velocity (3,) [m/s]; spin (3,) [rad/s].
         """
         lever, axes = turning @ self.center, turning @ self.axes
         moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
@@ -80,7 +73,7 @@ class Carrier:
         momentum = axes @ (moments * (axes.T @ spin))
         return np.concatenate((place + lever, quaternion, velocity + np.cross(spin, lever), momentum))
 
-    def seen(self, states: Array) -> Array:
+    def platform_states(self, states: Array) -> Array:
         """States of the whole (N, 13) as those of the platform; both with the angular velocity in momentum's place."""
         turning = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]).as_matrix() @ self.axes.T
         lever, spin = turning @ self.center, states[:, body.MOMENTUM :]
@@ -137,17 +130,10 @@ class ChainPlant(Plant):
     kernel: ClassVar[Any] = staticmethod(chains.run_chains)
     cable_mass: ClassVar[str] = "lumped"
 
-    def __init__(self, given: Beginning, data: Array, nodes: int, losses: Damping) -> None:
+    def __init__(self, given: InitialConditions, data: Array, nodes: int, losses: Damping) -> None:
         """Hang a robot on chains, at rest or at the speed of its path.
 
-        Args:
-            given: The beginning.
-            data: Of the drives, (DATA_ROWS, m).
-            nodes: Elements a cable.
-            losses: Of the cables.
-
-        Raises:
-            InvalidValueError: If the start has a slack cable.
+        Shapes: data (DATA_ROWS, m).
         """
         state, robot = given.state, given.robot
         rest = chains_at_rest(state, nodes)
@@ -155,7 +141,7 @@ class ChainPlant(Plant):
         m, self.nodes = robot.cable_count, nodes
         self.rows[g.CHORD] = np.linalg.norm(rest.place[:, :, 0] - rest.place[:, :, -1], axis=1)
         self.counters = np.zeros(COUNTERS + 1, dtype=np.int64)
-        table = _table(given, rest.place, nodes, losses, data)
+        table = _chain_table(given, rest.place, nodes, losses, data)
         longest = STRETCH * given.lengths.value.max(axis=0)[:m] / table[:, c.ELEMENT]
         room = int(np.ceil(np.maximum(longest, nodes)).max()) + SPARE
         place = np.zeros((m, 3, room))
@@ -165,22 +151,22 @@ class ChainPlant(Plant):
         self._travel = nodes * table[:, c.ELEMENT] * np.sqrt(table[:, c.DENSITY] / table[:, c.STIFFNESS])
         self._ends = (robot.platform_anchors - robot.center_of_mass) @ self.axes
         self._carried = 0.5 * table[:, c.DENSITY] * table[:, c.ELEMENT]
-        self._carrier = Carrier.of(self.inertia, self._carried, self._ends)
+        self._carrier = LoadedPlatform.of(self.inertia, self._carried, self._ends)
         turning = Rotation.from_quat(self.state[body.TURN : body.VELOCITY]).as_matrix()
         velocity, spin = self.state[body.VELOCITY : body.MOMENTUM], given.twist[3:]
         self.state = self._carrier.state(self.state[: body.TURN], turning, velocity, spin)
-        self._swing(velocity + np.cross(spin, self._ends @ turning.T), given.rate)
+        self._set_node_speeds(velocity + np.cross(spin, self._ends @ turning.T), given.rate)
 
-    def _swing(self, at_platform: Array, rate: Array) -> None:
+    def _set_node_speeds(self, at_platform: Array, rate: Array) -> None:
         """Give the nodes the speeds between those of their cable's ends, of which one is that of what is let out."""
         table, place, speed, n = self._chains[0], self._chains[1], self._chains[2], self.nodes
         at_exit = (rate / table[:, c.ELEMENT])[:, None] * (place[:, :, n - 1] - place[:, :, n])
         share = np.linspace(0.0, 1.0, n + 1)
         speed[:, :, : n + 1] = at_platform[..., None] * (1.0 - share) + at_exit[..., None] * share
 
-    def arguments(self, rules: Any, numbers: Any, courses: Any) -> Any:
+    def arguments(self, rules: Any, numbers: Any, inputs: Any) -> Any:
         """As those of `Plant`, for the kernel of chains."""
-        lengths: Course = courses[0]
+        lengths: TimeTable = inputs[0]
         if self._room.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
             self._room = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
         ends = self._table.copy()
@@ -189,7 +175,7 @@ class ChainPlant(Plant):
         handle = self._carrier.levers(np.zeros(3))
         whole = tuple(locked(array) for array in (ends, self._carrier.inertia.copy(), freedom.T @ freedom, handle))
         kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._room)
-        given = tuple(course.arrays for course in courses)
+        given = tuple(table.arrays for table in inputs)
         _integrator, kind, remembered, _work, stride = rules
         step, _loss_time, _air, filtering = numbers
         self._chains[0][:, c.SMOOTH] = 1.0 - np.exp(-step / (TRAVELS * self._travel[self.cables]))
@@ -208,14 +194,14 @@ class ChainPlant(Plant):
         """Room for records of so many steps."""
         return ChainRecords(count, len(self.cables), self.nodes + 1)
 
-    def seen(self, states: Array) -> Array:
+    def platform_states(self, states: Array) -> Array:
         """Recorded states as those of the platform by itself."""
-        return self._carrier.seen(states)
+        return self._carrier.platform_states(states)
 
-    def without(self, cable: int) -> None:
+    def remove_cable(self, cable: int) -> None:
         """Take a cable away; half of its last element stays on the platform."""
         place = int(np.flatnonzero(self.cables == cable)[0])
-        super().without(cable)
+        super().remove_cable(cable)
         self._chains = [np.delete(array, place, axis=0) for array in self._chains]
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
@@ -223,9 +209,9 @@ class ChainPlant(Plant):
         before, state = self._carrier, self.state
         spin = before.spin(state)
         moving = np.concatenate((state[: body.MOMENTUM], spin))
-        own = before.seen(moving[None])[0]
+        own = before.platform_states(moving[None])[0]
         self.inertia = self.inertia * (mass / self.inertia[0])
-        self._carrier = after = Carrier.of(self.inertia, self._carried, self._ends)
+        self._carrier = after = LoadedPlatform.of(self.inertia, self._carried, self._ends)
         turning = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix()
         self.state = after.state(own[: body.TURN], turning, own[body.VELOCITY : body.MOMENTUM], spin)
         if at_rest:  # momentum, and moment of momentum about any point, are what they were
@@ -246,7 +232,7 @@ class ChainPlant(Plant):
         return InvalidValueError(f"cable {cable}: length", value, f"{low:.3g} to {high:.3g} m of its chain", advice)
 
 
-def _table(given: Beginning, place: Array, nodes: int, losses: Damping, data: Array) -> Array:
+def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Damping, data: Array) -> Array:
     """What chains at rest are, (m, CHAIN_COLUMNS)."""
     state, material = given.state, given.robot.cables
     table = np.zeros((given.robot.cable_count, c.CHAIN_COLUMNS))
@@ -263,29 +249,12 @@ def _table(given: Beginning, place: Array, nodes: int, losses: Damping, data: Ar
 
 
 def checked_nodes(nodes: Any) -> int:
-    """Elements a cable.
-
-    Args:
-        nodes: What a caller gave.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If it is out of range.
-    """
+    """Elements a cable."""
     return whole_number(nodes, "nodes", FEWEST, MOST)
 
 
-def check_lumped(given: Beginning) -> None:
-    """Refuse cables that cannot be lumped.
-
-    Args:
-        given: The beginning.
-
-    Raises:
-        InvalidValueError: If the cables have no weight or no mass.
-    """
+def check_lumped(given: InitialConditions) -> None:
+    """Refuse cables that cannot be lumped."""
     if given.model.code != codes.CATENARY:
         name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
         raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)
@@ -295,13 +264,8 @@ def check_lumped(given: Beginning) -> None:
         raise InvalidValueError(f"cable {light[0]}: linear_density", "0 kg/m", "> 0 kg/m where it has mass", step)
 
 
-def wave_frequency(given: Beginning, nodes: int) -> float:
-    """Highest angular frequency of cables in elements, one of which is as short as it may become [rad/s].
-
-    Args:
-        given: The beginning.
-        nodes: Elements a cable.
-    """
+def wave_frequency(given: InitialConditions, nodes: int) -> float:
+    """Highest angular frequency of cables in elements, one of which is as short as it may become [rad/s]."""
     material = given.robot.cables
     element = given.state.free_length / nodes
     return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())

@@ -33,7 +33,7 @@ class ChainsAtRest(NamedTuple):
     force: Array
 
 
-class Divided(NamedTuple):
+class LumpedCables(NamedTuple):
     """Cables divided into elements.
 
     Attributes:
@@ -51,11 +51,7 @@ class Divided(NamedTuple):
     def elements(self, force: Array) -> tuple[Array, Array]:
         """Forces of the elements from the platform on, those of the cable at their middles, and their sizes.
 
-        Args:
-            force: On the platform ends [N], shape (m, 3).
-
-        Returns:
-            Forces [N], shape (m, nodes, 3), and their norms.
+        Shapes: force (m, 3) [N]; returns (m, nodes, 3) [N].
         """
         below = (np.arange(self.nodes) + 0.5) * (self.weight * self.element)[:, None]
         forces = np.repeat(force[:, None, :], self.nodes, axis=1)
@@ -65,8 +61,7 @@ class Divided(NamedTuple):
     def steps(self, force: Array) -> Array:
         """The elements as vectors towards the platform [m], shape (m, nodes, 3).
 
-        Args:
-            force: On the platform ends [N], shape (m, 3).
+        Shapes: force (m, 3) [N].
         """
         forces, size = self.elements(force)
         return (self.element[:, None] * (1.0 / self.stiffness[:, None] + 1.0 / size))[..., None] * forces
@@ -74,8 +69,7 @@ class Divided(NamedTuple):
     def compliance(self, force: Array) -> Array:
         """Derivative of a chain's platform end by the force on it [m/N], shape (m, 3, 3).
 
-        Args:
-            force: On the platform ends [N], shape (m, 3).
+        Shapes: force (m, 3) [N].
         """
         forces, size = self.elements(force)
         unit = forces / size[..., None]
@@ -91,22 +85,12 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
     An element's force is the exact cable's at its middle: a chain reaches as far as the midpoint rule says. Pose and
     forces therefore differ from the exact ones by the order of nodes^-2, and the wrench is balanced to rounding.
 
-    Args:
-        state: A single equilibrium with taut cables.
-        nodes: Elements a cable.
-
-    Returns:
-        Pose, nodes and forces.
-
-    Raises:
-        InvalidValueError: If a cable is so slack that its chain folds, or the platform is not held.
-
     Source:
         docs/model.md, section 11.
     """
     robot, exits = state.one_robot, state.exit_point
     length, material = state.free_length, state.cables.cable
-    chains = Divided(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
+    chains = LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
     center, freedom = robot.center_of_mass, robot.freedom
     given = state.wrench - np.array([0.0, 0.0, robot.mass * robot.gravity, 0.0, 0.0, 0.0])
     force = _force_of(state)
@@ -114,18 +98,18 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
     pose, near = state.pose, False
     for _ in range(STEPS):
         levers = (robot.platform_anchors - center) @ pose.matrix.T
-        force = _hung(chains, pose.position + robot.platform_anchors @ pose.matrix.T - exits, force)
+        force = _solve_chains(chains, pose.position + robot.platform_anchors @ pose.matrix.T - exits, force)
         unbalance = np.concatenate((force.sum(axis=0), np.cross(levers, force).sum(axis=0))) - given
         blocks = np.asarray(np.linalg.inv(chains.compliance(force)), dtype=np.float64)
-        motion = _against(unbalance, _platform_stiffness(blocks, levers, force), freedom, _size(levers))
-        pose = _moved(pose, center, motion)
+        motion = _balancing_motion(unbalance, _platform_stiffness(blocks, levers, force), freedom, _size(levers))
+        pose = _displaced(pose, center, motion)
         if near:
             break
         near = bool(np.abs(motion).max() <= NEAR * length.max())
     else:
         raise _no_rest("start", "an equilibrium near which its chains have none")
     ends = pose.position + robot.platform_anchors @ pose.matrix.T
-    force = _hung(chains, ends - exits, force)
+    force = _solve_chains(chains, ends - exits, force)
     place = np.empty((len(force), nodes + 1, 3))
     place[:, 0] = ends
     place[:, 1:] = ends[:, None] - np.cumsum(chains.steps(force), axis=1)
@@ -142,7 +126,7 @@ def _force_of(state: Equilibrium) -> Array:
     return np.column_stack((sideways, state.cables.vertical_force))
 
 
-def _refuse_slack(force: Array, chains: Divided) -> None:
+def _refuse_slack(force: Array, chains: LumpedCables) -> None:
     slack = np.flatnonzero(~(chains.elements(force)[1].min(axis=1) > 0.0))
     if slack.size:
         raise _no_rest(f"cable {slack[0]}", "slack at the start")
@@ -153,7 +137,7 @@ def _no_rest(item: str, value: str) -> InvalidValueError:
     return InvalidValueError(item, value, "taut cables that hold the platform", step)
 
 
-def _hung(chains: Divided, chord: Array, force: Array) -> Array:
+def _solve_chains(chains: LumpedCables, chord: Array, force: Array) -> Array:
     """Forces on the platform ends of chains that reach along given chords (m, 3), from forces near them."""
     near = False
     for _ in range(STEPS):
@@ -173,7 +157,7 @@ def _size(levers: Array) -> float:
     return longest if longest > 0.0 else 1.0
 
 
-def _against(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
+def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
     """The motion that takes an unbalance away; none in directions in which the platform is neutral.
 
     So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, but for rounding.
@@ -207,7 +191,7 @@ def _cross_matrix(vectors: Array) -> Array:
     return matrix
 
 
-def _moved(pose: Pose, center: Array, motion: Array) -> Pose:
+def _displaced(pose: Pose, center: Array, motion: Array) -> Pose:
     """The pose after a motion: the center of mass displaced, the platform turned about it."""
     rotation = Rotation.from_rotvec(motion[3:]) * pose.rotation
     return Pose(pose.position + pose.matrix @ center + motion[:3] - rotation.as_matrix() @ center, rotation)

@@ -30,7 +30,7 @@ TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and a
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class TimeTable:
     """n numbers in time: a cubic between two instants, by values and rates at both; held before and after.
 
     Attributes:
@@ -46,19 +46,19 @@ class Course:
     end: Array
 
     @classmethod
-    def still(cls, value: Array) -> Course:
+    def constant(cls, value: Array) -> TimeTable:
         """Numbers (n,) that do not change."""
         none = np.empty((0, value.size))
         return cls(np.zeros(1), np.array(value[None]), none, none)
 
     @classmethod
-    def straight(cls, time: Array, value: Array) -> Course:
+    def linear(cls, time: Array, value: Array) -> TimeTable:
         """Straight lines between rows (K, n)."""
         slope = np.diff(value, axis=0) / np.diff(time)[:, None]
         return cls(time, value, slope, slope)
 
     @classmethod
-    def smooth(cls, time: Array, value: Array, rate: Array) -> Course:
+    def cubic(cls, time: Array, value: Array, rate: Array) -> TimeTable:
         """Cubics through rows (K, n) whose rates are known."""
         return cls(time, value, np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(rate[1:]))
 
@@ -71,14 +71,14 @@ class Course:
         )
         return time, value, begin, end
 
-    def part(self, columns: Any) -> Course:
+    def columns(self, columns: Any) -> TimeTable:
         """Some of the numbers."""
-        return Course(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
+        return TimeTable(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
 
-    def beside(self, other: Course) -> Course:
+    def joined_columns(self, other: TimeTable) -> TimeTable:
         """These numbers, then those of another course of the same instants."""
         pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
-        return Course(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
+        return TimeTable(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
 
     def at(self, time: float) -> tuple[Array, Array]:
         """Values and rates (n,) at a time; where the rate jumps, the later one."""
@@ -93,7 +93,7 @@ class Course:
         value = (1.0 - x) * self.value[k] + x * self.value[k + 1] + whole * x * (1.0 - x) * bend
         return value, slope + (1.0 - 2.0 * x) * bend - x * (1.0 - x) * (begin + end)
 
-    def with_instant(self, time: float) -> Course:
+    def with_instant(self, time: float) -> TimeTable:
         """The same course with one more instant."""
         if time in self.time:
             return self
@@ -104,47 +104,36 @@ class Course:
         times, values = np.insert(self.time, k, time), np.insert(self.value, k, value, axis=0)
         if outside:
             place = 0 if k == 0 else len(self.begin)
-            return Course(
+            return TimeTable(
                 times, values, np.insert(self.begin, place, before, axis=0), np.insert(self.end, place, before, axis=0)
             )
         begin, end = np.insert(self.begin, k, rate, axis=0), np.insert(self.end, k - 1, rate, axis=0)
-        return Course(times, values, begin, end)
+        return TimeTable(times, values, begin, end)
 
-    def brought_to_rest(self, time: float, duration: float, columns: Any) -> Course:
+    def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:
         """A course of which some columns come to rest from a time on, their rates falling evenly in a duration [s]."""
-        course = self.with_instant(time).with_instant(time + duration)
-        (start, rate), stop = course.at(time), time + duration
-        later = np.flatnonzero(course.time >= time)
-        passed = np.minimum(course.time[later] - time, duration)[:, None]
-        value, begin, end = course.value.copy(), course.begin.copy(), course.end.copy()
+        table = self.with_instant(time).with_instant(time + duration)
+        (start, rate), stop = table.at(time), time + duration
+        later = np.flatnonzero(table.time >= time)
+        passed = np.minimum(table.time[later] - time, duration)[:, None]
+        value, begin, end = table.value.copy(), table.begin.copy(), table.end.copy()
         whole = (start + rate * passed * (1.0 - 0.5 * passed / duration))[:, columns]
         left = (rate * (1.0 - passed / duration))[:, columns]
         value[np.ix_(later, columns)] = whole
         inner = later[later < len(begin)]
         begin[np.ix_(inner, columns)] = left[: len(inner)]
         end[np.ix_(later[1:] - 1, columns)] = left[1:]
-        assert stop in course.time
-        return Course(course.time, value, begin, end)
+        assert stop in table.time
+        return TimeTable(table.time, value, begin, end)
 
 
-def table_in_time(given: Any, item: str, unit: str, columns: int, begin: float) -> Course:
+def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: float) -> TimeTable:
     """Rows in time as a caller gives them: one row that holds all the time, or times and rows, straight in between.
 
-    Args:
-        given: Shape (n,); or a pair of times [s] (K,) and rows (K, n).
-        item: The name a message uses.
-        unit: Of the rows, for the message.
-        columns: n.
-        begin: The first time that is simulated [s].
-
-    Returns:
-        Course.
-
-    Raises:
-        InvalidValueError: If it is neither, or the table begins later.
+    Shapes: given (n,) [s]; begin [s].
     """
     if not (isinstance(given, tuple | list) and len(given) == 2):
-        return Course.still(exactly(given, item, unit, (columns,)))
+        return TimeTable.constant(exactly(given, item, unit, (columns,)))
     try:
         time = checked_time(given[0])
     except InvalidValueError as error:
@@ -156,14 +145,14 @@ def table_in_time(given: Any, item: str, unit: str, columns: int, begin: float) 
     if time[0] > begin:
         allowed = f"a time <= {begin:g} s, the start"
         raise InvalidValueError(f"{item}: time[0]", f"{time[0]:g} s", allowed, "Begin the table where the run begins.")
-    return Course.straight(time, rows) if time.size > 1 else Course.still(rows[0])
+    return TimeTable.linear(time, rows) if time.size > 1 else TimeTable.constant(rows[0])
 
 
 ROUNDING = 1e-12  # of the largest force and moment: less is none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Beginning:
+class InitialConditions:
     """A robot at the first instant, and what is given to it from then on.
 
     Attributes:
@@ -186,54 +175,44 @@ class Beginning:
     poses: Pose
     twist: Array
     rate: Array
-    lengths: Course
-    tensions: Course
-    wrench: Course
+    lengths: TimeTable
+    tensions: TimeTable
+    wrench: TimeTable
     begin: float
     end: float
 
 
-def beginning(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> Beginning:
+def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> InitialConditions:
     """What `simulate` is given, checked.
 
-    Args:
-        start: A plan along a path, or a single equilibrium.
-        unstrained_length: Lengths in time, for an equilibrium; None to hold its own.
-        wrench: In time; None for that of the start.
-        duration: How long [s]; None for as long as the plan or the table of lengths is.
-
-    Returns:
-        Beginning.
-
-    Raises:
-        InvalidValueError: If there is something that cannot be simulated; the message names it.
+    Units: duration [s].
     """
     if isinstance(start, Plan):
         if unstrained_length is not None:
             step = "Give plan.state[0] to wind other lengths than the plan's."
             raise InvalidValueError("unstrained_length", "given with a plan", "None", step)
-        found = _from_plan(start)
+        initial = _from_plan(start)
     elif isinstance(start, Equilibrium):
-        found = _from_equilibrium(start, unstrained_length)
+        initial = _from_equilibrium(start, unstrained_length)
     else:
         step = "Give inverse(robot, path), or the state of a pose: plan.state."
         raise InvalidValueError("start", brief(start), "a Plan along a path, or an Equilibrium", step)
-    _check_robot(found.robot, found.model)
-    end = found.end
+    _check_robot(initial.robot, initial.model)
+    end = initial.end
     if duration is not None:
-        end = found.begin + number(duration, "duration", "s", above=0.0)
-    elif not end > found.begin:
+        end = initial.begin + number(duration, "duration", "s", above=0.0)
+    elif not end > initial.begin:
         raise InvalidValueError(
             "duration", "not given", "> 0 s for a robot at rest", "Give duration=10.0 for instance."
         )
-    course = found.wrench
+    table = initial.wrench
     if wrench is not None:
-        course = table_in_time(wrench, "wrench", "N or N m", 6, found.begin)
-    check_lengths(found.robot, found.lengths)
-    return replace(found, wrench=course, end=end)
+        table = checked_time_table(wrench, "wrench", "N or N m", 6, initial.begin)
+    check_lengths(initial.robot, initial.lengths)
+    return replace(initial, wrench=table, end=end)
 
 
-def _from_plan(plan: Plan) -> Beginning:
+def _from_plan(plan: Plan) -> InitialConditions:
     """The start of a plan along a path, at the speed that the path has there."""
     path, rate = plan.path, plan.length_rate
     if path is None or rate is None:
@@ -254,22 +233,22 @@ def _from_plan(plan: Plan) -> Beginning:
     given[np.abs(given) <= ROUNDING * np.abs(inertial).max()] = 0.0
     some = np.unique(np.linspace(0, len(path) - 1, 16).astype(np.int64))
     tension = drum_tension(plan.state)
-    return Beginning(
+    return InitialConditions(
         robot=robot,
         model=plan.state.cables.model,
         state=plan.state[0],
         poses=path.pose[some],
         twist=path.twist[0],
         rate=rate[0],
-        lengths=Course.smooth(path.time, plan.unstrained_length, rate),
-        tensions=Course.straight(path.time, tension),
-        wrench=Course.straight(path.time, given) if given.any() else Course.still(np.zeros(6)),
+        lengths=TimeTable.cubic(path.time, plan.unstrained_length, rate),
+        tensions=TimeTable.linear(path.time, tension),
+        wrench=TimeTable.linear(path.time, given) if given.any() else TimeTable.constant(np.zeros(6)),
         begin=float(path.time[0]),
         end=float(path.time[-1]),
     )
 
 
-def _from_equilibrium(state: Equilibrium, table: Any) -> Beginning:
+def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
     """A robot at rest."""
     if state.pose.shape:
         item = f"a batch of {len(state)} equilibria"
@@ -278,13 +257,13 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> Beginning:
     if np.isnan(length).any():
         step = "Give a pose that is feasible."
         raise InvalidValueError("start", "a state without lengths", "one with an answer", step)
-    tension, end = Course.still(np.nan_to_num(drum_tension(state))), 0.0
-    lengths = Course.still(length)
+    tension, end = TimeTable.constant(np.nan_to_num(drum_tension(state))), 0.0
+    lengths = TimeTable.constant(length)
     if table is not None:
-        lengths = table_in_time(table, "unstrained_length", "m", robot.cable_count, 0.0)
-        tension = Course.straight(lengths.time, np.repeat(tension.value, lengths.time.size, axis=0))
+        lengths = checked_time_table(table, "unstrained_length", "m", robot.cable_count, 0.0)
+        tension = TimeTable.linear(lengths.time, np.repeat(tension.value, lengths.time.size, axis=0))
         end = float(lengths.time[-1])
-    return Beginning(
+    return InitialConditions(
         robot=robot,
         model=state.cables.model,
         state=state,
@@ -293,7 +272,7 @@ def _from_equilibrium(state: Equilibrium, table: Any) -> Beginning:
         rate=np.zeros(robot.cable_count),
         lengths=lengths,
         tensions=tension,
-        wrench=Course.still(state.wrench),
+        wrench=TimeTable.constant(state.wrench),
         begin=0.0,
         end=end,
     )
@@ -306,15 +285,10 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
         raise InvalidValueError("start: model", f"{type(model).__name__}()", "Catenary() or Elastic()", step)
 
 
-def check_lengths(robot: Robot, lengths: Course) -> None:
+def check_lengths(robot: Robot, lengths: TimeTable) -> None:
     """Refuse lengths that are none, or all dead cable.
 
-    Args:
-        robot: The robot.
-        lengths: Set points [m].
-
-    Raises:
-        InvalidValueError: If a length is not longer than its dead cable.
+    Units: lengths [m].
     """
     checked(lengths.value, "unstrained_length", "m")
     least, dead = lengths.value.min(axis=0), dead_cable(robot)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.dynamics.simulation.initial_conditions import Beginning, Course
+from sagline.dynamics.simulation.initial_conditions import InitialConditions, TimeTable
 from sagline.dynamics.simulation.results import Simulation, energy_balance, twist_of_origin
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
@@ -30,7 +30,7 @@ SHORTER: Final = "Simulate a shorter time, or record less often."
 SMALL: Final = 0.02  # of its length: what a cable may be let out
 
 
-class Answering(NamedTuple):
+class ModalModel(NamedTuple):
     """How the modes of a state answer to lengths and to the wrench, both as changes u = (dL, dw), (m + 6,).
 
     Attributes:
@@ -48,7 +48,7 @@ class Answering(NamedTuple):
     tension: Array
 
 
-class Swung(NamedTuple):
+class ModalMotion(NamedTuple):
     """Modes at N instants: amplitudes and rates, (N, K); work done on them and energy lost since the start, (N,)."""
 
     amplitude: Array
@@ -57,18 +57,8 @@ class Swung(NamedTuple):
     lost: Array
 
 
-def answering(state: Equilibrium, damping: Damping) -> Answering:
+def modal_model(state: Equilibrium, damping: Damping) -> ModalModel:
     """How the modes of a state answer.
-
-    Args:
-        state: A single equilibrium, nothing behind its cables.
-        damping: What takes energy out of the modes.
-
-    Returns:
-        Answering.
-
-    Raises:
-        InvalidValueError: If the state has no linear vibration.
 
     Source:
         docs/model.md, section 11.
@@ -90,7 +80,7 @@ def answering(state: Equilibrium, damping: Damping) -> Answering:
     whole = np.concatenate((rest.length_sensitivity, rest.compliance), axis=1)
     tension = np.concatenate((rest.tension_sensitivity, by_wrench), axis=1)
     slow = drive / square[:, None]
-    return Answering(found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow)
+    return ModalModel(found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow)
 
 
 def _at_frame(state: Equilibrium) -> Array:
@@ -137,32 +127,25 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
     return force
 
 
-def course_values(course: Course, time: Array) -> Array:
+def table_values(table: TimeTable, time: Array) -> Array:
     """Values (N, n) of a course at times (N,)."""
-    if len(course.time) == 1:
-        return np.repeat(course.value, len(time), axis=0)
-    at = np.clip(time, course.time[0], course.time[-1])
-    k = np.clip(np.searchsorted(course.time, at, side="right") - 1, 0, len(course.time) - 2)
-    whole = (course.time[k + 1] - course.time[k])[:, None]
-    x = (at - course.time[k])[:, None] / whole
-    low, high = course.value[k], course.value[k + 1]
+    if len(table.time) == 1:
+        return np.repeat(table.value, len(time), axis=0)
+    at = np.clip(time, table.time[0], table.time[-1])
+    k = np.clip(np.searchsorted(table.time, at, side="right") - 1, 0, len(table.time) - 2)
+    whole = (table.time[k + 1] - table.time[k])[:, None]
+    x = (at - table.time[k])[:, None] / whole
+    low, high = table.value[k], table.value[k + 1]
     slope = (high - low) / whole
-    bend = (1.0 - x) * (course.begin[k] - slope) - x * (course.end[k] - slope)
+    bend = (1.0 - x) * (table.begin[k] - slope) - x * (table.end[k] - slope)
     values: Array = (1.0 - x) * low + x * high + whole * x * (1.0 - x) * bend
     return values
 
 
-def swing_modes(frequency: Array, ratio: Array, force: Array, step: float) -> Swung:
+def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> ModalMotion:
     """Modes that rest at first, under forces that are straight between instants: exact but for rounding.
 
-    Args:
-        frequency: Angular [rad/s], (K,).
-        ratio: Of damping, below 1, (K,).
-        force: On the modes, (N, K).
-        step: Between instants [s].
-
-    Returns:
-        Swung; the energy that damping takes is an integral of order 4.
+    Shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s].
     """
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
     root = -ratio * frequency + 1j * ringing
@@ -185,33 +168,22 @@ def swing_modes(frequency: Array, ratio: Array, force: Array, step: float) -> Sw
     taken = 0.5 * step * (power[1:] + power[:-1]) - step * step / 12.0 * np.diff(bend, axis=0)
     start = np.zeros(1)
     supplied = np.concatenate((start, np.cumsum(work.sum(axis=1))))
-    return Swung(amplitude, rate, supplied, np.concatenate((start, np.cumsum(taken.sum(axis=1)))))
+    return ModalMotion(amplitude, rate, supplied, np.concatenate((start, np.cumsum(taken.sum(axis=1)))))
 
 
-def modal_simulation(given: Beginning, damping: Damping, step: Any, record: float) -> Simulation:
+def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
     """A robot in small motion about its equilibrium at the start.
 
-    Args:
-        given: The beginning.
-        damping: What takes energy out of the modes.
-        step: Between instants of the forces [s], which are straight between them; None for a tenth of a radian of the
-            highest frequency, at most 1 ms.
-        record: How often the motion is written down [s].
-
-    Returns:
-        Simulation; its energies are those of the modes, about rest.
-
-    Raises:
-        InvalidValueError: If the state has no linear vibration, or lengths change by more than is small.
+    Units: step [s]; record [s].
     """
     state = given.state
     _check(given)
-    answer = answering(state, damping)
-    found, frequency = answer.found, 2.0 * np.pi * answer.found.frequency
+    model = modal_model(state, damping)
+    found, frequency = model.found, 2.0 * np.pi * model.found.frequency
     if (found.loss >= 1.0).any():
         k = int(np.argmax(found.loss >= 1.0))
-        told = f"a ratio of {found.loss[k]:.3g} at {found.frequency[k]:.3g} Hz with cable mass"
-        raise InvalidValueError("damping", told, "< 1 for modes", 'Give less, or cable_mass="lumped".')
+        value = f"a ratio of {found.loss[k]:.3g} at {found.frequency[k]:.3g} Hz with cable mass"
+        raise InvalidValueError("damping", value, "< 1 for modes", 'Give less, or cable_mass="lumped".')
     usual = min(LONGEST, SHARE / frequency[-1])
     fine = usual if step is None else number(step, "step", "s", above=0.0)
     every = max(1, math.ceil(record / fine - 1e-9))
@@ -223,17 +195,17 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
     )
     time: Array = given.begin + size * np.arange(count + 1, dtype=np.float64)
     kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # the end too
-    lengths, wrenches = course_values(given.lengths, time), course_values(given.wrench, time)
+    lengths, wrenches = table_values(given.lengths, time), table_values(given.wrench, time)
     change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
-    _check_small(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
-    swung = swing_modes(frequency, found.loss, change @ answer.drive.T, size)
-    amplitude, rate, driven = swung.amplitude[kept], swung.rate[kept], change[kept]
-    motion = amplitude @ found.shape.T + driven @ answer.motion.T
+    _check_small_changes(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
+    response = modal_response(frequency, found.loss, change @ model.drive.T, size)
+    amplitude, rate, driven = response.amplitude[kept], response.rate[kept], change[kept]
+    motion = amplitude @ found.shape.T + driven @ model.motion.T
     kinetic, potential = 0.5 * (rate**2).sum(axis=1), 0.5 * ((amplitude * frequency) ** 2).sum(axis=1)
-    supplied, lost = swung.supplied[kept], swung.lost[kept]
-    at_steps = state.cables.frame_end_tension + swung.amplitude @ answer.pulled.T + change @ answer.tension.T
+    supplied, lost = response.supplied[kept], response.lost[kept]
+    at_steps = state.cables.frame_end_tension + response.amplitude @ model.pulled.T + change @ model.tension.T
     slopes = np.gradient(driven, time[kept], axis=0)
-    moving, pose = rate @ found.shape.T + slopes @ answer.motion.T, _moved(state, motion)
+    moving, pose = rate @ found.shape.T + slopes @ model.motion.T, _displaced(state, motion)
     return Simulation(
         robot=given.robot,
         time=locked(time[kept].copy()),
@@ -252,21 +224,14 @@ def modal_simulation(given: Beginning, damping: Damping, step: Any, record: floa
     )
 
 
-def refuse_with_modes(others: list[str]) -> None:
-    """Refuse what modes about one equilibrium do not know.
-
-    Args:
-        others: Names of arguments that were given.
-
-    Raises:
-        InvalidValueError: If there is one.
-    """
+def check_modal_arguments(others: list[str]) -> None:
+    """Refuse what modes about one equilibrium do not know."""
     if others:
         step = 'Leave it out, or give cable_mass="lumped".'
         raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
 
 
-def _check(given: Beginning) -> None:
+def _check(given: InitialConditions) -> None:
     """Refuse what has no modes that are known."""
     if given.state.contact is not None:
         step = 'Leave winches out of the robot, or give cable_mass="lumped".'
@@ -279,16 +244,16 @@ def _check(given: Beginning) -> None:
         raise InvalidValueError("start", "in motion", 'at rest for cable_mass="modal"', step)
 
 
-def _check_small(most: Array, state: Equilibrium) -> None:
+def _check_small_changes(most: Array, state: Equilibrium) -> None:
     share = most / state.free_length
     if (share > SMALL).any():
         i = int(np.argmax(share))
-        told, allowed = f"{most[i]:.3g} m from its own", f'<= {SMALL * state.free_length[i]:.3g} m for "modal"'
+        value, allowed = f"{most[i]:.3g} m from its own", f'<= {SMALL * state.free_length[i]:.3g} m for "modal"'
         step = 'Give cable_mass="lumped", which knows large motions.'
-        raise InvalidValueError(f"unstrained_length: cable {i}", told, allowed, step)
+        raise InvalidValueError(f"unstrained_length: cable {i}", value, allowed, step)
 
 
-def _moved(state: Equilibrium, motion: Array) -> Pose:
+def _displaced(state: Equilibrium, motion: Array) -> Pose:
     """Poses after motions (N, 6) of the platform: its center of mass displaced, itself turned about it."""
     center = state.pose.matrix @ state.one_robot.center_of_mass
     turned = Rotation.from_rotvec(motion[:, 3:])

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.simulation.initial_conditions import Course
+from sagline.dynamics.simulation.initial_conditions import TimeTable
 from sagline.kernels import tables
 from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.rows import LENGTH as LENGTH_ROW
@@ -86,13 +86,7 @@ class Plant:
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
         """Place a robot at a pose.
 
-        Args:
-            robot: The robot.
-            model: Cable model with an energy.
-            pose: A single one.
-            twist: Velocity of the platform's origin, and angular velocity, world axes, (6,).
-            length: Unstrained lengths [m], (m,).
-            data: Of the drives, (DATA_ROWS, m).
+        Shapes: twist (6,); length (m,) [m]; data (DATA_ROWS, m).
         """
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data
@@ -123,16 +117,10 @@ class Plant:
         self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
 
     def arguments(
-        self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], courses: Any
+        self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], inputs: Any
     ) -> Any:
-        """What the kernel takes but for records and counts of steps; valid until a cable breaks or the mass changes.
-
-        Args:
-            rules: See `sagline.kernels.dynamics.massless.Rules`.
-            numbers: See there.
-            courses: Of lengths, of wrenches, of the wind.
-        """
-        lengths, wrenches, winds = courses
+        """What the kernel takes but for records and counts of steps; valid until a cable breaks or the mass changes."""
+        lengths, wrenches, winds = inputs
         wide = lengths.value.shape[1]
         needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
         if self._room.size != needed:
@@ -141,22 +129,22 @@ class Plant:
         robot = (locked(self._table.view()), platform, locked(self.inertia.copy()), self.robot.freedom)
         kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._room)
         terms = (self.model.code, *self.model.parameters, self.robot.gravity, self._behind)
-        given: tuple[Course, Course, Course] = (lengths, wrenches, winds)
+        given: tuple[TimeTable, TimeTable, TimeTable] = (lengths, wrenches, winds)
         return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept
 
     def records(self, count: int) -> Records:
         """Room for records of so many steps."""
         return Records(count, len(self.cables))
 
-    def seen(self, states: Array) -> Array:
+    def platform_states(self, states: Array) -> Array:
         """Recorded states of what the kernel moves, (N, 13), as those of the platform."""
         return states
 
     def failure(self, time: float, step: float) -> InvalidValueError:
         """Why the kernel stopped: at a time [s], with steps of so many seconds."""
-        return grown(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
+        return energy_error(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
-    def without(self, cable: int) -> None:
+    def remove_cable(self, cable: int) -> None:
         """Take a cable away, by its index among all that were ever there."""
         place = int(np.flatnonzero(self.cables == cable)[0])
         self.cables = np.delete(self.cables, place)
@@ -173,7 +161,7 @@ class Plant:
             self._table[places, column] *= BROKEN
         self.counters[k.READY] = 0  # look at all forces and energies anew
 
-    def hold(self, places: Any) -> None:
+    def lock_winches(self, places: Any) -> None:
         """Lock winches, by their places among the cables that are there; what moves of them is lost at once."""
         self.now[d.HELD, places] = 1.0
         self.now[d.RATE, places] = 0.0
@@ -207,12 +195,7 @@ class Plant:
 
 
 def principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
-    """Principal moments of the platform [kg m^2], (3,), infinite where it does not turn, and axes, one a column.
-
-    Args:
-        robot: The robot.
-        pose: Where it is, by which the plane of a planar pattern is seen from the platform.
-    """
+    """Principal moments of the platform [kg m^2], (3,), infinite where it does not turn, and axes, one a column."""
     if robot.motion_pattern == "3R3T":
         moments, axes = np.linalg.eigh(robot.inertia)
         if np.linalg.det(axes) < 0.0:
@@ -228,16 +211,10 @@ def principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
     return np.array([np.inf, np.inf, normal @ robot.inertia @ normal]), axes
 
 
-def grown(step: float, time: float, cable: int) -> InvalidValueError:
+def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
     """What is said of a run whose energy has come or gone by itself.
 
-    Args:
-        step: Of the integrator [s].
-        time: When it was seen [s].
-        cable: Which has the largest tension.
-
-    Returns:
-        The error, to be raised.
+    Units: step [s]; time [s].
     """
     value = f"{step:g} s, at which energy grows or fades by itself: at {time:.6g} s most of it is in cable {cable}"
     return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")

@@ -122,7 +122,7 @@ Event: TypeAlias = Break | Stall | Brake | Drop | PickUp
 KINDS = {Break: "break", Stall: "stall", Brake: "brake", Drop: "drop", PickUp: "pick up"}
 
 
-def cable_of(event: Event) -> int | None:
+def event_cable(event: Event) -> int | None:
     """Which cable or winch an event is of; None for the platform's, and for that of all winches."""
     return event.cable if isinstance(event, Break) else getattr(event, "winch", None)
 
@@ -130,18 +130,7 @@ def cable_of(event: Event) -> int | None:
 def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple[Event, ...]:
     """Events in order of time.
 
-    Args:
-        events: What a caller gave: one event or several.
-        robot: What they happen to.
-        begin: First time that is simulated [s].
-        end: The last [s].
-
-    Returns:
-        Events, sorted; of one time in the order given.
-
-    Raises:
-        InvalidValueError: If one is none, names a cable that there is not (any more), happens outside the run, or takes
-            all of the mass.
+    Units: begin [s]; end [s].
     """
     given = (events,) if isinstance(events, Event) else events
     if not isinstance(given, Iterable) or isinstance(given, str):
@@ -154,7 +143,7 @@ def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple
             names = ", ".join(kind.__name__ for kind in KINDS)
             step = "Give sl.Break(cable=3, time=2.5) for instance."
             raise InvalidValueError(f"events[{k}]", brief(event), f"one of {names}", step)
-        cable = cable_of(event)
+        cable = event_cable(event)
         if cable is not None and cable >= robot.cable_count:
             name = "cable" if isinstance(event, Break) else "winch"
             allowed = f"0 to {robot.cable_count - 1}, as {robot.name} has"
@@ -173,7 +162,7 @@ def _check_order(events: list[Event], robot: Robot) -> None:
     broken: set[int] = set()
     mass = robot.mass
     for event in events:
-        cable = cable_of(event)
+        cable = event_cable(event)
         if cable in broken:
             step = "Leave out what happens to it later."
             raise InvalidValueError(f"events: cable {cable}", f"broken before {event.time:g} s", "there", step)
@@ -286,14 +275,7 @@ def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Arra
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:
     """Twists of the platform frame's origin, as a path has them, from motions of the center of mass.
 
-    Args:
-        robot: The robot.
-        pose: Poses, a batch of N.
-        velocity: Of the center of mass, world axes [m/s], (N, 3).
-        spin: Angular velocity, world axes [rad/s], (N, 3).
-
-    Returns:
-        Shape (N, 6), write-locked.
+    Shapes: velocity (N, 3) [m/s]; spin (N, 3) [rad/s]; returns (N, 6).
     """
     lever = pose.matrix @ robot.center_of_mass
     return locked(np.concatenate((velocity - np.cross(spin, lever), spin), axis=1))

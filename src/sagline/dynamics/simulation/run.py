@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.core.arrays import locked
-from sagline.dynamics.simulation.initial_conditions import Course
+from sagline.dynamics.simulation.initial_conditions import TimeTable
 from sagline.dynamics.simulation.plant import NOTES, Plant, Records
 from sagline.dynamics.simulation.results import (
     KINDS,
@@ -20,8 +20,8 @@ from sagline.dynamics.simulation.results import (
     PickUp,
     Simulation,
     Stall,
-    cable_of,
     energy_balance,
+    event_cable,
     twist_of_origin,
 )
 from sagline.kernels.dynamics import drives as d
@@ -30,7 +30,7 @@ from sagline.kernels.dynamics import rigid_body as body
 
 BLOCK: Final = 20_000  # steps at once: some 100 ms, after which an interrupt is heard
 NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
-Courses = tuple[Course, Course, Course]
+Inputs = tuple[TimeTable, TimeTable, TimeTable]
 
 
 class Run:
@@ -41,36 +41,25 @@ class Run:
         plant: Plant,
         rules: tuple[int, int, int, int, int],
         numbers: tuple[float, float, float, float],
-        courses: Courses,
+        inputs: Inputs,
         every: int,
         steps: int,
         events: tuple[Event, ...] = (),
-        said: dict[str, Any] | None = None,
+        settings: dict[str, Any] | None = None,
     ) -> None:
-        """Look at the start.
-
-        Args:
-            plant: The robot, which the run moves.
-            rules: Of the kernel.
-            numbers: Of the kernel.
-            courses: Of set points, wrenches and the wind.
-            every: After how many steps one is recorded.
-            steps: How many there are.
-            events: What happens on the way, in order.
-            said: What else the simulation is told of itself.
-        """
-        self._events, self._said = list(events), said or {}
+        """Look at the start."""
+        self._events, self._settings = list(events), settings or {}
         self.plant, self.every, self.steps = plant, every, steps
-        self._rules, self._numbers, self._courses = rules, numbers, courses
-        self._all = plant.records(-(-steps // every) + 1)  # the last step too
-        self._all.tensions[:] = 0.0
-        self._all.lengths[:] = np.nan
-        self._removed = np.zeros(len(self._all.energies))  # the kernel counts it as lost
+        self._rules, self._numbers, self._inputs = rules, numbers, inputs
+        self._record = plant.records(-(-steps // every) + 1)  # the last step too
+        self._record.tensions[:] = 0.0
+        self._record.lengths[:] = np.nan
+        self._removed = np.zeros(len(self._record.energies))  # the kernel counts it as lost
         self._occurrences: list[Occurrence] = []
         self._largest = np.zeros(plant.robot.cable_count)
         self._marks: list[int] = []  # of the scheduled events among them
-        self._arguments: Any = plant.arguments(rules, numbers, courses)
-        self._go(0)
+        self._arguments: Any = plant.arguments(rules, numbers, inputs)
+        self._advance(0)
 
     @property
     def step(self) -> float:
@@ -80,7 +69,7 @@ class Run:
     def _time(self, step: int) -> float:
         return float(self.plant.audit[d.BEGIN] + step * self.step)
 
-    def _go(self, last: int) -> None:
+    def _advance(self, last: int) -> None:
         """Go on to a step, recording on the way."""
         plant, first = self.plant, int(self.plant.counters[k.STEPS])
         row = first // self.every + 1 if plant.counters[k.READY] else 0
@@ -96,25 +85,28 @@ class Run:
             if plant.counters[k.STEPS] == last:
                 break
             if plant.counters[k.NOTES] > NOTES:
-                self._note(records)
+                self._store_notes(records)
                 plant.counters[k.NOTES] = 0
-        self._keep(records, row)
-        self._note(records)
+        self._store_records(records, row)
+        self._store_notes(records)
         if last == self.steps and last % self.every:
-            self._keep(self._look(), last // self.every + 1)
+            self._store_records(self._record_now(), last // self.every + 1)
 
-    def _keep(self, records: Records, row: int) -> None:
+    def _store_records(self, records: Records, row: int) -> None:
         """Take over what was recorded, from a row of the whole record on."""
         plant = self.plant
         rows = slice(row, row + int(plant.counters[k.RECORDS]))
         kept = slice(0, rows.stop - rows.start)
-        self._all.states[rows], self._all.energies[rows] = plant.seen(records.states[kept]), records.energies[kept]
-        if self._all.points is not None and records.points is not None:
-            self._all.points[rows, plant.cables] = records.points[kept]
-        self._all.tensions[rows, plant.cables] = records.tensions[kept]
-        self._all.lengths[rows, plant.cables] = records.lengths[kept]
+        self._record.states[rows], self._record.energies[rows] = (
+            plant.platform_states(records.states[kept]),
+            records.energies[kept],
+        )
+        if self._record.points is not None and records.points is not None:
+            self._record.points[rows, plant.cables] = records.points[kept]
+        self._record.tensions[rows, plant.cables] = records.tensions[kept]
+        self._record.lengths[rows, plant.cables] = records.lengths[kept]
 
-    def _note(self, records: Records) -> None:
+    def _store_notes(self, records: Records) -> None:
         """Take over what began by itself."""
         for row in records.notes[: int(self.plant.counters[k.NOTES])]:
             cable = int(self.plant.cables[int(row[k.NOTE_CABLE])])
@@ -122,59 +114,55 @@ class Run:
             before, after = float(row[k.NOTE_BEFORE]), float(row[k.NOTE_AFTER])
             self._occurrences.append(Occurrence(float(row[k.NOTE_TIME]), kind, cable, before, after))
 
-    def _look(self) -> Records:
+    def _record_now(self) -> Records:
         """The step that is reached, by itself."""
         plant, here = self.plant, self.plant.records(1)
         plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
         plant.kernel(*self._arguments, here.arrays, 0, self.every)
-        self._note(here)
+        self._store_notes(here)
         return here
 
-    def happen(self, event: Event) -> None:
-        """Go on to an event, and let it happen at the first step that is not earlier.
-
-        Args:
-            event: No earlier than those before.
-        """
+    def apply_event(self, event: Event) -> None:
+        """Go on to an event, and let it happen at the first step that is not earlier."""
         plant = self.plant
-        self._go(self._step_of(event))
-        time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._look())
-        cable = cable_of(event)
+        self._advance(self._step_of(event))
+        time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._record_now())
+        cable = event_cable(event)
         places = plant.cables == cable if cable is not None else np.ones(len(plant.cables), dtype=np.bool_)
         peak = float(plant.now[d.PEAK][places].max())
-        self._close()
+        self._finish_event()
         self._marks.append(len(self._occurrences))
         self._occurrences.append(Occurrence(time, KINDS[type(event)], cable, peak, 0.0))
         start = plant.audit[d.START]
-        self._change(event, time)
+        self._apply(event, time)
         plant.counters[[k.READY, k.LENGTH_AT, k.WRENCH_AT, k.WIND_AT]] = 0
         plant.now[d.PEAK] = 0.0
-        self._arguments = plant.arguments(self._rules, self._numbers, self._courses)
-        left = before - _energy(self._look())
+        self._arguments = plant.arguments(self._rules, self._numbers, self._inputs)
+        left = before - _energy(self._record_now())
         plant.audit[d.LOST] += left
         if isinstance(event, Break | Drop | PickUp):
             self._removed[int(plant.counters[k.STEPS]) // self.every + 1 :] += left
         plant.audit[d.START] = start
 
-    def _change(self, event: Event, time: float) -> None:
-        plant, (lengths, wrenches, winds) = self.plant, self._courses
+    def _apply(self, event: Event, time: float) -> None:
+        plant, (lengths, wrenches, winds) = self.plant, self._inputs
         wide = lengths.value.shape[1] // len(plant.cables)
         if isinstance(event, Break):
             kept = np.tile(plant.cables != event.cable, wide)
-            plant.without(event.cable)
-            self._courses = (lengths.part(kept), wrenches, winds)
+            plant.remove_cable(event.cable)
+            self._inputs = (lengths.columns(kept), wrenches, winds)
         elif isinstance(event, Stall):
-            plant.hold(plant.cables == event.winch)
+            plant.lock_winches(plant.cables == event.winch)
         elif isinstance(event, Brake):
             chosen = np.ones(len(plant.cables), dtype=np.bool_) if event.winch is None else plant.cables == event.winch
             columns = np.flatnonzero(np.tile(chosen, wide))  # the tensions that motors expect are held too
-            self._courses = (lengths.brought_to_rest(time, event.duration, columns), wrenches, winds)
+            self._inputs = (lengths.with_stop(time, event.duration, columns), wrenches, winds)
         elif isinstance(event, Drop):
             plant.with_mass(plant.inertia[0] - event.mass, at_rest=False)
         elif isinstance(event, PickUp):
             plant.with_mass(plant.inertia[0] + event.mass, at_rest=True)
 
-    def _close(self) -> None:
+    def _finish_event(self) -> None:
         """Say of the last event how large tensions became after it; keep the largest of all."""
         np.maximum.at(self._largest, self.plant.cables, self.plant.now[d.PEAK])
         if self._marks:
@@ -184,39 +172,31 @@ class Run:
             self._occurrences[last] = Occurrence(event.time, event.kind, event.cable, event.tension_before, after)
 
     def finish(self) -> Simulation:
-        """Go on to the end.
-
-        Returns:
-            The whole run.
-        """
+        """Go on to the end."""
         return self.until(math.inf)
 
     def until(self, time: float) -> Simulation:
         """Go on, and look back.
 
-        Args:
-            time: How far to go [s], at least: to the first record that is not earlier; the end at most.
-
-        Returns:
-            The run so far: its samples, and what they say, are those of the whole run.
+        Units: time [s].
         """
         ahead = (time - float(self.plant.audit[d.BEGIN])) / self.step
         records = math.ceil(min(ahead, self.steps) / self.every - 1e-9)
         last = max(min(records * self.every, self.steps), int(self.plant.counters[k.STEPS]))
         while self._events and self._step_of(self._events[0]) <= last:
-            self.happen(self._events.pop(0))
-        self._go(last)
-        self._close()
-        return self._seen(-(-last // self.every) + 1)
+            self.apply_event(self._events.pop(0))
+        self._advance(last)
+        self._finish_event()
+        return self._result(-(-last // self.every) + 1)
 
     def _step_of(self, event: Event) -> int:
         """The first step that is not earlier than an event."""
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
-    def _seen(self, count: int) -> Simulation:
+    def _result(self, count: int) -> Simulation:
         """So many of the records."""
-        plant, states, removed = self.plant, self._all.states[:count], self._removed[:count]
-        kinetic, potential, supplied, lost = (column.copy() for column in self._all.energies[:count].T)
+        plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
+        kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)
         pose, velocity, spin = plant.poses(states), states[:, body.VELOCITY : body.MOMENTUM], states[:, body.MOMENTUM :]
         return Simulation(
@@ -224,15 +204,15 @@ class Run:
             time=locked(plant.audit[d.BEGIN] + steps * self.step),
             pose=pose,
             twist=twist_of_origin(plant.robot, pose, velocity, spin),
-            tensions=locked(self._all.tensions[:count].copy()),
-            length=locked(self._all.lengths[:count].copy()),
+            tensions=locked(self._record.tensions[:count].copy()),
+            length=locked(self._record.lengths[:count].copy()),
             energy=energy_balance(kinetic, potential, supplied, lost - removed, removed.copy()),
             events=tuple(sorted(self._occurrences, key=lambda event: event.time)),
             cable_mass=plant.cable_mass,
             step=self.step,
-            nodes=None if self._all.points is None else locked(self._all.points[:count].copy()),
+            nodes=None if self._record.points is None else locked(self._record.points[:count].copy()),
             largest_tension=locked(self._largest.copy()),
-            **self._said,
+            **self._settings,
         )
 
 

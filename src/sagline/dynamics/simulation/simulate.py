@@ -12,13 +12,19 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.dynamics.simulation.chain_plant import ChainPlant, check_lumped, checked_nodes, wave_frequency
-from sagline.dynamics.simulation.initial_conditions import Beginning, Course, TableInTime, beginning, table_in_time
-from sagline.dynamics.simulation.modal import modal_simulation, refuse_with_modes
+from sagline.dynamics.simulation.initial_conditions import (
+    InitialConditions,
+    TableInTime,
+    TimeTable,
+    checked_time_table,
+    initial_conditions,
+)
+from sagline.dynamics.simulation.modal import check_modal_arguments, modal_simulation
 from sagline.dynamics.simulation.plant import Plant
 from sagline.dynamics.simulation.results import Drop, Event, PickUp, Simulation, checked_events
 from sagline.dynamics.simulation.run import Run
-from sagline.dynamics.simulation.steps import checked_step, highest_frequency, with_drives
-from sagline.dynamics.simulation.winches import Winches, Winding, check_winding, drive_data, kind_of
+from sagline.dynamics.simulation.steps import checked_step, frequency_with_winches, platform_frequency
+from sagline.dynamics.simulation.winches import Winches, Winding, check_winding, drive_data, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import massless as k
@@ -113,13 +119,13 @@ def simulate(
     """
     choice(cable_mass, "cable_mass", get_args(CableMass))
     elements = checked_nodes(nodes)
-    given = beginning(start, unstrained_length, wrench, duration)
+    given = initial_conditions(start, unstrained_length, wrench, duration)
     if cable_mass == "modal":
         others = {"events": events, "winches": winches != "ideal", "wind": wind is not None, "integrator": integrator}
-        refuse_with_modes([name for name, asked in others.items() if asked])
+        check_modal_arguments([name for name, asked in others.items() if asked])
         written = RECORD if record is None else number(record, "record", "s", above=0.0)
         return modal_simulation(given, optional(damping, Damping, "damping") or Damping(), step, written)
-    return run_of(
+    return started_run(
         given,
         elements if cable_mass == "lumped" else 0,
         step=step,
@@ -133,8 +139,8 @@ def simulate(
     ).finish()
 
 
-def run_of(
-    given: Beginning,
+def started_run(
+    given: InitialConditions,
     elements: int = 0,
     *,
     step: float | None = None,
@@ -146,84 +152,45 @@ def run_of(
     damping: Damping | None = None,
     record: float | None = None,
 ) -> Run:
-    """A simulation that has begun, and can be looked at on its way.
-
-    Args:
-        given: The beginning.
-        elements: Of each cable where it has mass; 0 where it has none.
-        step: As in `simulate`, like all that follow.
-        integrator: Which.
-        winches: Which kind.
-        winding: What lies on the drums.
-        events: What happens on the way.
-        wind: Velocity of the air.
-        damping: What takes energy out of the cables.
-        record: How often the motion is written down.
-
-    Returns:
-        Run, at its start.
-
-    Raises:
-        InvalidValueError: As `simulate`.
-    """
+    """A simulation that has begun, and can be looked at on its way."""
     if elements:
         check_lumped(given)
-    kind, losses = kind_of(winches), checked_damping(damping)
-    code = code_of(integrator, kind, elements)
+    kind, losses = winch_kind(winches), checked_damping(damping)
+    code = integrator_code(integrator, kind, elements)
     check_winding(winding, kind)
-    air = Course.still(np.zeros(3)) if wind is None else table_in_time(wind, "wind", "m/s", 3, given.begin)
+    air = TimeTable.constant(np.zeros(3)) if wind is None else checked_time_table(wind, "wind", "m/s", 3, given.begin)
     happening = checked_events(events, given.robot, given.begin, given.end)
-    plant = plant_at(given, winches, wind is not None, elements, losses)
+    plant = initial_plant(given, winches, wind is not None, elements, losses)
     if winding == "remembered" and kind == d.DRUMS:
         plant.remember_winding(float(given.lengths.value.max()))
     waves = wave_frequency(given, elements) if elements else 0.0
-    size = step_of(given, plant, step, code, kind, losses, happening, waves)
-    work, every, count = work_of(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
+    size = time_step(given, plant, step, code, kind, losses, happening, waves)
+    work, every, count = load_bits(losses, given.wrench, wind is not None), _every(record, size), _count(given, size)
     numbers_each = 19 + given.robot.cable_count * (2 + (3 * elements + 3 if elements else 0))
     check_memory("record", 8.0 * numbers_each * (count / every), "Record less often.")
     rules = (code, kind, int(winding == "remembered"), work, round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
-    said = {"integrator": get_args(Integrator)[code], "winches": winches, "winding": winding, "damping": losses}
+    settings = {"integrator": get_args(Integrator)[code], "winches": winches, "winding": winding, "damping": losses}
     return Run(
-        plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count, happening, said
+        plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count, happening, settings
     )
 
 
-def set_points(given: Beginning, plant: Plant, kind: int) -> Course:
-    """What the drives are to follow: lengths; of drums lengths along the path of winding, and tensions.
-
-    Args:
-        given: The beginning.
-        plant: The robot that is simulated.
-        kind: Of the winches.
-
-    Returns:
-        Course of m numbers, or 2 m.
-    """
+def set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
+    """What the drives are to follow: lengths; of drums lengths along the path of winding, and tensions."""
     if kind != d.DRUMS:
         return given.lengths
-    stretch, course = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
-    wound = Course(course.time, course.value * stretch, course.begin * stretch, course.end * stretch)
-    return wound.beside(given.tensions)
+    stretch, table = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
+    wound = TimeTable(table.time, table.value * stretch, table.begin * stretch, table.end * stretch)
+    return wound.joined_columns(given.tensions)
 
 
-def plant_at(
-    given: Beginning, winches: Winches, blown: bool, elements: int = 0, losses: Damping | None = None
+def initial_plant(
+    given: InitialConditions, winches: Winches, with_wind: bool, elements: int = 0, losses: Damping | None = None
 ) -> Plant:
-    """A robot at its beginning, its winches at the speeds that are asked for there.
-
-    Args:
-        given: The beginning.
-        winches: Which kind.
-        blown: Whether wind acts on the cables.
-        elements: Of each cable where it has mass; 0 where it has none.
-        losses: Of the cables, where they have mass.
-
-    Returns:
-        Plant.
-    """
+    """A robot at its beginning, its winches at the speeds that are asked for there."""
     length = given.state.unstrained_length
-    data = drive_data(given.robot, winches, length, blown)
+    data = drive_data(given.robot, winches, length, with_wind)
     if elements:
         plant: Plant = ChainPlant(given, data, elements, losses or Damping())
     else:
@@ -235,14 +202,7 @@ def plant_at(
 
 
 def checked_damping(damping: Damping | None) -> Damping:
-    """Damping that a motion in time knows; none for None.
-
-    Args:
-        damping: What a caller gave.
-
-    Raises:
-        InvalidValueError: If it is none, or damps modes.
-    """
+    """Damping that a motion in time knows; none for None."""
     found = optional(damping, Damping, "damping") or Damping()
     if found.modal_damping > 0.0:
         step = "Give loss_time or air_damping, which act on cables; a ratio belongs to a mode."
@@ -250,17 +210,8 @@ def checked_damping(damping: Damping | None) -> Damping:
     return found
 
 
-def code_of(integrator: Any, kind: int, elements: int = 0) -> int:
-    """The kernel's code of an integrator.
-
-    Args:
-        integrator: What a caller gave; None to choose by the kind of winches.
-        kind: Of the winches.
-        elements: Of each cable where it has mass; 0 where it has none.
-
-    Raises:
-        InvalidValueError: If there is no such integrator, or it is not for these winches.
-    """
+def integrator_code(integrator: Any, kind: int, elements: int = 0) -> int:
+    """The kernel's code of an integrator."""
     if integrator is not None:
         choice(integrator, "integrator", get_args(Integrator))
     if kind == d.DRUMS and integrator == "runge-kutta":
@@ -272,8 +223,8 @@ def code_of(integrator: Any, kind: int, elements: int = 0) -> int:
     return k.SPLITTING if kind == d.DRUMS or elements or integrator == "splitting" else k.RUNGE_KUTTA
 
 
-def step_of(
-    given: Beginning,
+def time_step(
+    given: InitialConditions,
     plant: Plant,
     step: Any,
     code: int,
@@ -284,19 +235,11 @@ def step_of(
 ) -> float:
     """The step, by the lightest platform that there will be.
 
-    Args:
-        given: The beginning.
-        plant: The robot that is simulated.
-        step: What a caller gave [s], or None.
-        code: Of the integrator.
-        kind: Of the winches.
-        losses: What damps.
-        events: What will happen.
-        waves: Highest angular frequency of cables with mass [rad/s]; 0 without.
+    Units: step [s]; waves [rad/s].
     """
     robot, lengths = given.robot, given.lengths.value
-    platform = highest_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
-    highest = with_drives(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
+    platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
+    highest = frequency_with_winches(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
     return checked_step(step, code, highest, losses, kind == d.DRUMS, waves)
 
 
@@ -309,17 +252,11 @@ def _lightness(mass: float, events: tuple[Event, ...]) -> float:
     return float(np.sqrt(mass / least))
 
 
-def work_of(losses: Damping, wrench: Course, blown: bool) -> int:
-    """The kernel's bits of what damps or loads.
-
-    Args:
-        losses: What damps.
-        wrench: In time.
-        blown: Whether there is wind.
-    """
+def load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
+    """The kernel's bits of what damps or loads."""
     damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
-    loaded = blown or bool(wrench.value.any())
-    return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * blown
+    loaded = with_wind or bool(wrench.value.any())
+    return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * with_wind
 
 
 def _every(record: Any, step: float) -> int:
@@ -330,7 +267,7 @@ def _every(record: Any, step: float) -> int:
     return max(1, round(min(given / step, MOST_STEPS)))
 
 
-def _count(given: Beginning, step: float) -> int:
+def _count(given: InitialConditions, step: float) -> int:
     """How many steps there are."""
     count = np.ceil((given.end - given.begin) / step - 1e-9)
     if not count <= MOST_STEPS:

@@ -11,17 +11,22 @@ from numpy.typing import ArrayLike
 from sagline.core.arguments import brief, instance, integer, whole_number
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.dynamics.simulation.initial_conditions import Beginning, Course, beginning, check_lengths
-from sagline.dynamics.simulation.plant import Plant, Records, grown
+from sagline.dynamics.simulation.initial_conditions import (
+    InitialConditions,
+    TimeTable,
+    check_lengths,
+    initial_conditions,
+)
+from sagline.dynamics.simulation.plant import Plant, Records, energy_error
 from sagline.dynamics.simulation.simulate import (
     Integrator,
     checked_damping,
-    code_of,
-    plant_at,
-    step_of,
-    work_of,
+    initial_plant,
+    integrator_code,
+    load_bits,
+    time_step,
 )
-from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding, check_winding, kind_of
+from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding, check_winding, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels.cable.rows import LENGTH
 from sagline.kernels.dynamics import drives as d
@@ -117,23 +122,23 @@ class Simulator:
             >>> print(f"{machine.time:.1f} s, {reading.position[2]:.3f} m")
             1.0 s, 2.034 m
         """
-        given: Beginning = beginning(_at_rest(instance(robot, Robot, "robot"), start), None, None, 1.0)
-        kind, losses = kind_of(winches), checked_damping(damping)
-        code = code_of(integrator, kind)
+        given: InitialConditions = initial_conditions(_at_rest(instance(robot, Robot, "robot"), start), None, None, 1.0)
+        kind, losses = winch_kind(winches), checked_damping(damping)
+        code = integrator_code(integrator, kind)
         check_winding(winding, kind)
-        self._plant: Plant = plant_at(given, winches, False)
+        self._plant: Plant = initial_plant(given, winches, False)
         if winding == "remembered" and kind == d.DRUMS:
             self._plant.remember_winding(2.0 * float(given.lengths.value.max()))
-        self._step = step_of(given, self._plant, step, code, kind, losses, ())
+        self._step = time_step(given, self._plant, step, code, kind, losses, ())
         self._kind, plant, m = kind, self._plant, given.robot.cable_count
         self._set_up_course(given, m)
         lag = number(load_cell_filter, "load_cell_filter", "s", low=0.0)
         stride = round(d.LOOP_PERIOD / self._step) if kind == d.DRUMS else 1
-        rules = (code, kind, int(winding == "remembered"), work_of(losses, given.wrench, False) | LOADED, stride)
+        rules = (code, kind, int(winding == "remembered"), load_bits(losses, given.wrench, False) | LOADED, stride)
         numbers = (self._step, losses.loss_time, losses.air_damping, self._step / (lag + self._step))
-        courses = (self._course, self._load, Course.still(np.zeros(3)))
+        inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)))
         self._records = Records(0, m).arrays
-        self._arguments = plant.arguments(rules, numbers, courses)
+        self._arguments = plant.arguments(rules, numbers, inputs)
         self._run: Any = machine_code(motion.run, (*self._arguments, self._records, 0, 0))
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
@@ -147,26 +152,28 @@ class Simulator:
         self._run(*self._arguments, self._records, 0, 0)
         self._read()
 
-    def _set_up_course(self, given: Beginning, m: int) -> None:
+    def _set_up_course(self, given: InitialConditions, m: int) -> None:
         """The lengths between the last set points and the next; of drums with the tensions that are expected."""
         drums = self._kind == d.DRUMS
         stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
         lengths = np.repeat(given.lengths.value, 2, axis=0)
         wide = 2 * m if drums else m
-        self._course = Course(np.array([-1.0, 0.0]), np.zeros((2, wide)), np.zeros((1, wide)), np.zeros((1, wide)))
-        self._course.value[:, :m], self._lengths = lengths * stretch, lengths[1]
+        self._length_table = TimeTable(
+            np.array([-1.0, 0.0]), np.zeros((2, wide)), np.zeros((1, wide)), np.zeros((1, wide))
+        )
+        self._length_table.value[:, :m], self._lengths = lengths * stretch, lengths[1]
         if drums:
-            self._course.value[:, m:] = given.tensions.value
-        self._load = Course(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
-        course, counters = self._course, self._plant.counters
+            self._length_table.value[:, m:] = given.tensions.value
+        self._wrench_table = TimeTable(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
+        table, counters = self._length_table, self._plant.counters
         # what is asked for goes here first, and to the run when all of it can be
         self._given = np.zeros(m), np.zeros(wide - m), np.zeros(6)
         self._asked, self._expected, self._wrench = (array.data for array in self._given)
-        writable = (course.time, course.value, course.begin, course.end)
+        writable = (table.time, table.value, table.begin, table.end)
         read_only = tuple(locked(array.view()) for array in self._given)
         least = locked(dead_cable(given.robot) + np.zeros(m))
         self._next: tuple[Any, ...] = (
-            read_only, least, locked(stretch), lengths, writable, self._load.value[0], counters
+            read_only, least, locked(stretch), lengths, writable, self._wrench_table.value[0], counters
         )  # fmt: skip
         self._begin: Any = machine_code(begin_period, (*self._next, False, False, 1.0))
         self._counters = counters.data
@@ -216,7 +223,7 @@ class Simulator:
             self._refuse(tension is not None)
         self._run(*self._arguments, self._records, count, 0)
         if self._counters[k.FAILED]:
-            raise grown(self._step, self.time, self._counters[k.FAILED] - 1)
+            raise energy_error(self._step, self.time, self._counters[k.FAILED] - 1)
         self._read()
         return self._reading
 
@@ -230,7 +237,7 @@ class Simulator:
         """Say what of what was asked for cannot be."""
         lengths, tension, wrench = self._given
         checked(lengths, "unstrained_length", "m", above=0.0)
-        check_lengths(self._plant.robot, Course.still(lengths))
+        check_lengths(self._plant.robot, TimeTable.constant(lengths))
         if with_tension:
             checked(tension, "tension", "N")
         checked(wrench, "wrench", "N or N m")
@@ -255,7 +262,7 @@ class Simulator:
         Raises:
             InvalidValueError: If there is no such winch.
         """
-        self._plant.hold(self._chosen(winches))
+        self._plant.lock_winches(self._chosen(winches))
 
     def release(self, *winches: int) -> None:
         """Let drums go that were locked: from where they stood they go straight to the next set points.
@@ -275,7 +282,7 @@ class Simulator:
         if self._kind != d.SECOND_ORDER:  # whose set points were not at where they stood before either
             stood = plant.now[d.WOUND] if self._kind == d.DRUMS else plant.rows[LENGTH]
             self._lengths[freed] = plant.rows[LENGTH, freed]
-            self._course.value[1, : len(freed)][freed] = stood[freed]
+            self._length_table.value[1, : len(freed)][freed] = stood[freed]
 
     def shift(self, length: float, *winches: int) -> None:
         """Let set points jump, as they do for a drive whose encoder loses counts; it comes after as its gains say.
@@ -290,7 +297,7 @@ class Simulator:
         chosen, by = self._chosen(winches), number(length, "length", "m")
         drums = self._kind == d.DRUMS
         self._lengths[chosen] += by
-        own = self._course.value[1, : len(self._asked)]
+        own = self._length_table.value[1, : len(self._asked)]
         own[chosen] += by * (1.0 + self._plant.data[d.WINDING_STRAIN, chosen] if drums else 1.0)
 
     def cut(self, *cables: int) -> None:

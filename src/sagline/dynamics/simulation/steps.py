@@ -21,17 +21,10 @@ WAVE_SHARE: Final = 0.465  # of the limit of cables with mass, 0.4 l sqrt(rho/EA
 LONGEST: Final = 1e-3  # s
 
 
-def highest_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
+def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
     """Highest angular frequency of the platform on cables that are all taut [rad/s]: sag only makes them softer.
 
-    Args:
-        robot: The robot.
-        poses: A batch along a way, to whose poses the lengths belong; or one, which the robot may leave: cables then
-            have their directions there, each the least of its lengths.
-        lengths: Set points of the unstrained lengths [m], (K, m).
-
-    Returns:
-        The highest at any of the poses, at tensions that stretch no cable by more than a hundredth.
+    Shapes: lengths (K, m) [m].
     """
     rotation, freedom = poses.matrix, robot.freedom
     levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
@@ -55,19 +48,7 @@ def checked_step(
 ) -> float:
     """The step of a run.
 
-    Args:
-        step: What a caller gave [s]; None to let it follow from the highest frequency.
-        integrator: SPLITTING or RUNGE_KUTTA.
-        highest: Highest angular frequency [rad/s].
-        damping: Of the cables.
-        stride: Whether loops are closed every millisecond, of which a step must then be a whole part.
-        waves: Highest angular frequency of cables with mass [rad/s]; 0 without.
-
-    Returns:
-        The step [s]: unless given, a whole part of a millisecond.
-
-    Raises:
-        InvalidValueError: If it is above the limit of stability, or no whole part where it must be.
+    Units: step [s]; highest [rad/s]; waves [rad/s]; returns [s].
     """
     limit = _limit(integrator, max(highest, waves), damping)
     if step is None:
@@ -94,15 +75,10 @@ def _limit(integrator: int, highest: float, damping: Damping) -> float:
     return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
 
 
-def with_drives(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
+def frequency_with_winches(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
     """Highest angular frequency of a platform and its winches together [rad/s].
 
-    Args:
-        platform: That of the platform where the winches stand [rad/s].
-        kind: IDEAL, SECOND_ORDER or DRUMS.
-        data: What the drives are, (DATA_ROWS, m).
-        lengths: Set points of the unstrained lengths [m], (K, m).
-        stiffness: EA [N], (m,).
+    Shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N].
     """
     if kind == d.SECOND_ORDER:
         return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))

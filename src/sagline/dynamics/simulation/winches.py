@@ -48,12 +48,8 @@ Winches: TypeAlias = Literal["ideal", "robot"] | SecondOrder
 Winding: TypeAlias = Literal["constant", "remembered"]
 
 
-def kind_of(winches: Any) -> int:
-    """The kernel's code of a kind of winches.
-
-    Raises:
-        InvalidValueError: If there is no such kind.
-    """
+def winch_kind(winches: Any) -> int:
+    """The kernel's code of a kind of winches."""
     if isinstance(winches, SecondOrder):
         return d.SECOND_ORDER
     if isinstance(winches, str) and winches in ("ideal", "robot"):
@@ -63,34 +59,16 @@ def kind_of(winches: Any) -> int:
 
 
 def check_winding(winding: Any, kind: int) -> None:
-    """Refuse what lies on drums where there are none.
-
-    Args:
-        winding: What a caller gave.
-        kind: Of the winches, from `kind_of`.
-
-    Raises:
-        InvalidValueError: If there is no such winding, or it is remembered by winches that have no drums.
-    """
+    """Refuse what lies on drums where there are none."""
     if choice(winding, "winding", get_args(Winding)) == "remembered" and kind != d.DRUMS:
         step = 'Give winches="robot" too, or leave winding out.'
         raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
 
 
-def drive_data(robot: Robot, winches: Winches, length: Array, blown: bool) -> Array:
+def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -> Array:
     """The drives as kernels take them, (DATA_ROWS, m).
 
-    Args:
-        robot: The robot.
-        winches: Which kind.
-        length: Unstrained lengths at the start [m], (m,), at which drums are looked at.
-        blown: Whether wind acts on the cables.
-
-    Returns:
-        Array, zero where a row has no meaning.
-
-    Raises:
-        InvalidValueError: If data are missing; the message names them.
+    Shapes: length (m,) [m].
     """
     data = np.zeros((d.DATA_ROWS, robot.cable_count))
     if isinstance(winches, SecondOrder):
@@ -99,12 +77,12 @@ def drive_data(robot: Robot, winches: Winches, length: Array, blown: bool) -> Ar
     if robot.winches is not None:
         data[d.WINDING_STRAIN] = robot.winches.winding_tension / robot.cables.axial_stiffness
         data[d.BEHIND_RISE] = robot.winches.dead_rise
-    if blown:
+    if with_wind:
         if robot.cables.diameter is None:
             step = "Give it in the robot file or with Cable(..., diameter=...), or leave wind out."
             raise InvalidValueError("cables: diameter", "not given", "known where there is wind", step)
         data[d.DRAG] = 0.5 * AIR * ROUND * robot.cables.diameter
-    if kind_of(winches) == d.DRUMS:
+    if winch_kind(winches) == d.DRUMS:
         _fill_drums(data, robot, length)
     return data
 
@@ -145,10 +123,7 @@ class Encoders:
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
         """Look at the drums of a robot that has all that counts need.
 
-        Args:
-            robot: The robot.
-            wound: Where its lengths off the drums will be [m], (m,).
-            stretch: From these to those along the path of winding, (m,).
+        Shapes: wound (m,) [m]; stretch (m,).
         """
         drums, m = drums_of(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
@@ -181,10 +156,7 @@ class LoadCells:
     def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
         """Make the load cells of a robot; without winches they read what is there.
 
-        Args:
-            robot: The robot.
-            seed: Of the noise.
-            tension: Where the tensions behind the filter will be [N], (m,).
+        Shapes: tension (m,) [N].
         """
         m, winch = robot.cable_count, robot.winches
         cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])

@@ -12,9 +12,9 @@ from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
-from sagline.dynamics.trajectories.force_balance import Balances, HalfPlanes, Profile, fastest_profile
-from sagline.dynamics.trajectories.jerk_bounded import Bounds, JerkProfile, fastest_course
-from sagline.dynamics.trajectories.segments import Curve, Move, moves_of
+from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes, Profile, fastest_speed_profile
+from sagline.dynamics.trajectories.jerk_bounded import Bounds, JerkProfile, fastest_jerk_profile
+from sagline.dynamics.trajectories.segments import Curve, RestToRestSegment, segments_of
 from sagline.dynamics.trajectories.shapers import sample_time
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
@@ -37,7 +37,7 @@ _ROUNDING: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class _Timed:
+class _TimedSegment:
     """A move with its new motion: parameter of the curve over time, a little slower than it was found."""
 
     curve: Curve
@@ -111,24 +111,24 @@ def fastest(
         np.inf if angular_jerk is None else number(angular_jerk, "angular_jerk", "rad/s^3", above=0.0),
     )
     callback(progress, "progress")
-    moves = moves_of(path)
-    timed: list[_Timed | None] = []
-    for k, move in enumerate(moves):
-        timed.append(None if move.curve is None else _quickest(inner, move, move.curve, limits))
+    segments = segments_of(path)
+    timed: list[_TimedSegment | None] = []
+    for k, segment in enumerate(segments):
+        timed.append(None if segment.curve is None else _fastest_segment(inner, segment, segment.curve, limits))
         if progress is not None:
-            progress(k + 1, len(moves))
+            progress(k + 1, len(segments))
     bounded = bool(np.isfinite(limits).any())
     for again in range(_TRIES):
-        new = _assembled(path, step, moves, timed, bounded)
+        new = _joined_path(path, step, segments, timed, bounded)
         plan = inverse(inner, new)
         slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
-            ratio = _exceeding(plan)  # what stretches falls with the cube of the time, the rest in proportion
+            ratio = _speed_excess(plan)  # what stretches falls with the cube of the time, the rest in proportion
             slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
         if slower == 1.0:
             return new
         timed = [None if one is None else replace(one, slower=one.slower * slower) for one in timed]
-    raise _unheld(f"of {len(moves)} moves", plan)
+    raise _infeasible_error(f"of {len(segments)} moves", plan)
 
 
 def _with_margin(robot: Robot, margin: float) -> Robot:
@@ -140,33 +140,35 @@ def _with_margin(robot: Robot, margin: float) -> Robot:
     return robot.replace(tension_min=low, tension_max=high)
 
 
-def _quickest(robot: Robot, move: Move, curve: Curve, limits: tuple[float, float]) -> _Timed:
+def _fastest_segment(
+    robot: Robot, segment: RestToRestSegment, curve: Curve, limits: tuple[float, float]
+) -> _TimedSegment:
     """One move, as fast as the robot's limits allow, checked."""
     place = np.linspace(0.0, 1.0, _PLACES)
     jet = curve.at(place)
     rest = inverse(robot, jet.pose)
     if not rest.feasible.all():
-        raise _unheld(f"from {move.begin:g} s to {move.end:g} s at rest", rest)
-    balances, speeds = Balances.at(robot, jet, rest), _speeds(robot, curve, place, rest)
+        raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s at rest", rest)
+    balances, speeds = ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
     bounds, least = speeds(place), np.inf
     for _ in range(_ROUNDS):
-        profile = fastest_profile(place, balances.half_planes().joined(bounds))
+        profile = fastest_speed_profile(place, balances.half_planes().joined(bounds))
         if profile is None:
-            raise _unheld(f"from {move.begin:g} s to {move.end:g} s in motion", rest)
+            raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s in motion", rest)
         before, least = least, profile.duration
         if abs(least - before) <= _SETTLED * least:
             break
-        balances = balances.near(profile.motion)
+        balances = balances.near_motion(profile.motion)
     motion: Profile | JerkProfile | None = profile
     if np.isfinite(limits).any():
-        motion = fastest_course(curve, robot, speeds, limits, least)
+        motion = fastest_jerk_profile(curve, robot, speeds, limits, least)
         if motion is None:
-            raise _unheld(f"from {move.begin:g} s to {move.end:g} s in motion", rest)
+            raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s in motion", rest)
     assert motion is not None
-    return _checked(robot, _Timed(curve, motion), limits)
+    return _checked(robot, _TimedSegment(curve, motion), limits)
 
 
-def _checked(robot: Robot, timed: _Timed, limits: tuple[float, float]) -> _Timed:
+def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) -> _TimedSegment:
     """A move that keeps its limits between the places too, if need be a little slower."""
     for again in range(_TRIES):
         pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
@@ -178,10 +180,10 @@ def _checked(robot: Robot, timed: _Timed, limits: tuple[float, float]) -> _Timed
         if not plan.feasible.all():  # at rest the limits hold, and what moves needs is the less the slower
             slower = max(slower, 1.0 + _SLOWER * 4.0**again)
         timed = replace(timed, slower=timed.slower * slower)
-    raise _unheld("in motion", plan)
+    raise _infeasible_error("in motion", plan)
 
 
-def _unheld(item: str, plan: Plan) -> InvalidValueError:
+def _infeasible_error(item: str, plan: Plan) -> InvalidValueError:
     k = int(np.argmin(plan.feasible))
     where = ", ".join(f"{x:.4g}" for x in plan.state.pose.position[k])
     status = PoseStatus(plan.status[k]).name.lower().replace("_", " ")
@@ -198,7 +200,7 @@ def _has_speed_limits(robot: Robot) -> bool:
     return robot.winches is not None and robot.winches.speed_limit is not None
 
 
-def _speeds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
+def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
     """What the speed limits of winches leave of the squared speed, from how fast the chords change."""
     if not _has_speed_limits(robot):
         return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
@@ -226,7 +228,7 @@ def _fastest_rates(robot: Robot, length: Array) -> Array:
     return rates
 
 
-def _exceeding(plan: Plan) -> float:
+def _speed_excess(plan: Plan) -> float:
     """How much too fast the winches are somewhere: 1 where they are not."""
     assert plan.length_rate is not None
     limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
@@ -234,17 +236,21 @@ def _exceeding(plan: Plan) -> float:
     return ratio * (1.0 + _SLOWER) if ratio > 1.0 else 1.0
 
 
-def _assembled(path: Path, step: float, moves: Sequence[Move], timed: Sequence[_Timed | None], bounded: bool) -> Path:
+def _joined_path(
+    path: Path, step: float, segments: Sequence[RestToRestSegment], timed: Sequence[_TimedSegment | None], bounded: bool
+) -> Path:
     """The moves one after the other, sampled."""
-    durations = [move.duration if one is None else one.duration for move, one in zip(moves, timed, strict=True)]
+    durations = [
+        segment.duration if one is None else one.duration for segment, one in zip(segments, timed, strict=True)
+    ]
     ends = np.cumsum(durations)
     rests = np.append(0.0, ends)
     time = time_grid(float(ends[-1]), 1.0 / step)
     position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
-    which = np.minimum(np.searchsorted(ends, time, side="right"), len(moves) - 1)
-    for k, (move, one) in enumerate(zip(moves, timed, strict=True)):
+    which = np.minimum(np.searchsorted(ends, time, side="right"), len(segments) - 1)
+    for k, (segment, one) in enumerate(zip(segments, timed, strict=True)):
         part = which == k
-        pose = path.pose[move.sample]
+        pose = path.pose[segment.sample]
         if one is not None:
             pose, rates[:, part] = one.at(time[part] - rests[k])
         position[part], quaternion[part] = pose.position, pose.quaternion

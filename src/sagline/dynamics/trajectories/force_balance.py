@@ -39,7 +39,7 @@ class HalfPlanes:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Balances:
+class ForceBalance:
     """The platform's balance at K places of a curve, on cables that pull as they do at tensions near by.
 
     J tau = needed - u w_u - x w_x, u the acceleration and x the square of the speed along the curve's parameter. What
@@ -66,15 +66,15 @@ class Balances:
     high: Array
 
     @classmethod
-    def at(cls, robot: Robot, jet: Jet, plan: Plan) -> Balances:
+    def at(cls, robot: Robot, jet: Jet, plan: Plan) -> ForceBalance:
         """The balance at places where a plan at rest is known."""
         nothing = np.zeros(plan.chord_tension.shape)
         freedoms = robot.degrees_of_freedom
         one = np.zeros((len(nothing), 1, freedoms))
         new = cls(robot, jet, np.zeros((2, len(nothing), 6)), one, one, nothing[:, :freedoms], nothing, nothing)
-        return new.moved(jet).pulled(plan, np.zeros((len(jet.pose), 2)))
+        return new.at_poses(jet).with_sag_of(plan, np.zeros((len(jet.pose), 2)))
 
-    def moved(self, jet: Jet) -> Balances:
+    def at_poses(self, jet: Jet) -> ForceBalance:
         """The same balance, with the same pulls, at places near by."""
         robot, (first, second, _) = self.robot, jet.rates
         by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
@@ -92,7 +92,7 @@ class Balances:
         total: Array = np.einsum("ck,cki->ki", motion.T, self.wrenches)
         return total
 
-    def pulled(self, plan: Plan, motion: Array) -> Balances:
+    def with_sag_of(self, plan: Plan, motion: Array) -> ForceBalance:
         """The same with the pulls of a plan for motions of shape (K, 2); poses without an answer keep theirs."""
         assert plan.needed is not None
         found, freedom = plan.feasible[:, None], self.robot.freedom.T
@@ -106,7 +106,7 @@ class Balances:
             high=np.where(found, self.robot.tension_max - below, self.high),
         )
 
-    def near(self, motion: Array) -> Balances:
+    def near_motion(self, motion: Array) -> ForceBalance:
         """The same with the pulls that cables have in motions of shape (K, 2), on the border perhaps, or a little off.
 
         On the border itself tensions are all but fixed, but rounding may leave none: they are those within limits a
@@ -116,7 +116,7 @@ class Balances:
         for by in _WIDER:
             low, high = np.maximum(self.robot.tension_min - by, 0.0), self.robot.tension_max + by
             wider = self.robot.replace(tension_min=low, tension_max=high)
-            found = found.pulled(inverse(wider, self.jet.pose, wrench=wrench), motion)
+            found = found.with_sag_of(inverse(wider, self.jet.pose, wrench=wrench), motion)
         return found
 
     def half_planes(self) -> HalfPlanes:
@@ -191,18 +191,13 @@ class Profile:
         return np.stack((place, speed + since * rate, rate, np.zeros_like(place)))
 
 
-def fastest_profile(place: Array, planes: HalfPlanes) -> Profile | None:
+def fastest_speed_profile(place: Array, planes: HalfPlanes) -> Profile | None:
     """The profile from rest to rest that is at each place as fast as any that stays within the bounds.
 
     Backward, from which squares of the speed the end can be reached; forward, the largest acceleration that stays
     among them. What holds at both ends of a step holds in it, but for the bounds' curvature.
 
-    Args:
-        place: Parameters, ascending, shape (K,).
-        planes: Bounds at each.
-
-    Returns:
-        Profile; None where there is none from rest to rest.
+    Shapes: place (K,).
 
     Source:
         Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018.

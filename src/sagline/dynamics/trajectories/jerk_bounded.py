@@ -9,7 +9,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from sagline.core.arrays import Array
-from sagline.dynamics.trajectories.force_balance import Balances, HalfPlanes
+from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes
 from sagline.dynamics.trajectories.segments import Curve
 from sagline.kinematics.inverse import inverse
 from sagline.robot.robot import Robot
@@ -38,7 +38,7 @@ class JerkProfile:
 
     def at(self, time: Array) -> Array:
         """Parameter and its first three derivatives by time, shape (4, N)."""
-        state = sums(len(self.jerk)) @ self.jerk  # at the knots
+        state = integration_matrices(len(self.jerk)) @ self.jerk  # at the knots
         scaled = np.clip(time / self.duration, 0.0, 1.0) * len(self.jerk)
         k = np.minimum(scaled.astype(np.intp), len(self.jerk) - 1)
         h = (scaled - k) / len(self.jerk)
@@ -53,7 +53,7 @@ class JerkProfile:
         return np.stack([value / self.duration**order for order, value in enumerate(values)])
 
 
-def sums(pieces: int) -> Array:
+def integration_matrices(pieces: int) -> Array:
     """Parameter, its rate and its second rate at the knots by the jerk of each piece, shape (3, P + 1, P)."""
     h = 1.0 / pieces
     since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h  # since each piece's begin
@@ -61,7 +61,7 @@ def sums(pieces: int) -> Array:
     return np.stack([(since**k - left**k) / f for k, f in ((3, 6.0), (2, 2.0), (1, 1.0))])
 
 
-def fastest_course(
+def fastest_jerk_profile(
     curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
 ) -> JerkProfile | None:
     """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk.
@@ -69,30 +69,22 @@ def fastest_course(
     Linear in the jerk and in the square of the time, but for where the platform is at each share of the time, the
     square of its speed and the time's third power: those are taken anew in rounds, each a linear program.
 
-    Args:
-        curve: Where it leads, for parameters from 0 to 1.
-        robot: The robot; its limits are those to keep.
-        speeds: Bounds on the square of the parameter's speed at parameters.
-        limits: Of the origin's jerk [m/s^3] and the angular jerk [rad/s^3], may be infinite.
-        least: A time in which no course can be faster [s].
-
-    Returns:
-        The profile; None where no round finds any.
+    Units: limits [m/s^3]; least [s].
     """
     from scipy.optimize import linprog  # takes longer to load than all the rest of dynamics
 
     course = _first(curve, limits, least)
-    state = sums(PIECES)
+    state = integration_matrices(PIECES)
     jet = curve.at(np.clip(state[0] @ course.jerk, 0.0, 1.0))
-    balances = Balances.at(robot, jet, inverse(robot, jet.pose))
+    balances = ForceBalance.at(robot, jet, inverse(robot, jet.pose))
     ends = np.hstack((state[:, -1], np.zeros((3, 1))))
     cost = np.append(np.zeros(PIECES), 1.0)
     for _ in range(_ROUNDS):
         place, speed, rate = state @ course.jerk
         square = course.duration**2
         jet = curve.at(np.clip(place, 0.0, 1.0))
-        balances = balances.moved(jet).near(np.stack((rate, speed**2), axis=1) / square)
-        planes = reduced(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
+        balances = balances.at_poses(jet).near_motion(np.stack((rate, speed**2), axis=1) / square)
+        planes = without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
         rows, bounds = zip(
             _within(planes, state, speed),
             (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # never back
@@ -117,7 +109,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfi
     """The profile of 5th degree, in a time in which it may keep the limits."""
     middle = (np.arange(PIECES) + 0.5) / PIECES
     jerk = 60.0 - 360.0 * middle + 360.0 * middle**2
-    state = sums(PIECES)
+    state = integration_matrices(PIECES)
     jerk -= state[:, -1].T @ np.linalg.solve(state[:, -1] @ state[:, -1].T, state[:, -1] @ jerk - (1.0, 0.0, 0.0))
     rates = curve.at(state[0] @ jerk).rates[0]
     extents = (np.linalg.norm(rates[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
@@ -141,11 +133,7 @@ def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) ->
 
     Along the way and across, and in its own direction, so that the rounds end with its size within the limit.
 
-    Args:
-        rates: R1 to R3 at the knots, shape (3, P + 1, 3).
-        state: As `sums` makes it.
-        course: Whose way and speeds are taken.
-        limit: Of its size.
+    Shapes: rates (3, P + 1, 3).
     """
     _, speed, rate = (values[:, None] for values in state @ course.jerk)
     first, second, third = rates
@@ -171,15 +159,8 @@ def _unit(vectors: Array) -> Array:
     return unit
 
 
-def reduced(planes: HalfPlanes) -> HalfPlanes:
-    """Half planes that contain the origin, without those that the border shows in none of some directions.
-
-    Args:
-        planes: Half planes with bounds that are not negative.
-
-    Returns:
-        HalfPlanes, r of the R of each place.
-    """
+def without_redundant(planes: HalfPlanes) -> HalfPlanes:
+    """Half planes that contain the origin, without those that the border shows in none of some directions."""
     normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)

@@ -34,11 +34,7 @@ class Jet(NamedTuple):
     def twists(self, motion: Array) -> Array:
         """Twist, its rate and its jerk of a motion along the curve, by the chain rule.
 
-        Args:
-            motion: Parameter and its first three derivatives by time, shape (4, N).
-
-        Returns:
-            Array of shape (3, N, 6).
+        Shapes: motion (4, N); returns (3, N, 6).
         """
         (first, second, third), (_, v, a, j) = self.rates, motion[:, :, None]
         return np.stack((first * v, second * v**2 + first * a, third * v**3 + 3.0 * second * v * a + first * j))
@@ -53,7 +49,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Line:
+class LineCurve:
     """A straight way with a turn about a fixed axis; its parameter is the share of both that is done.
 
     Attributes:
@@ -63,7 +59,7 @@ class Line:
     ends: Segments
 
     @classmethod
-    def between(cls, pose: Pose) -> Line:
+    def between(cls, pose: Pose) -> LineCurve:
         """The line from the first pose of a batch to the last."""
         return cls(Segments.between(pose[np.array([0, -1])], QUINTIC))
 
@@ -101,7 +97,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bent:
+class SplineCurve:
     """A curve through samples, by splines of 5th degree in position and quaternion over its own length.
 
     Attributes:
@@ -113,7 +109,7 @@ class Bent:
     quaternion: Any
 
     @classmethod
-    def through(cls, pose: Pose, parameter: Array) -> Bent:
+    def through(cls, pose: Pose, parameter: Array) -> SplineCurve:
         """The splines through poses at ascending parameters; where these are too near each other, through some."""
         from scipy.interpolate import make_interp_spline  # takes longer to load than all the rest of motion
 
@@ -147,16 +143,7 @@ class Bent:
 def lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
     """Length of the way at each sample, a radian counted as a meter, with its first two derivatives by time.
 
-    Args:
-        time: Times of the samples [s], shape (N,).
-        twist: Twists, shape (N, 6), not zero but for the first and the last.
-        twist_rate: Their rates, shape (N, 6).
-
-    Returns:
-        Array of shape (3, N); the length is good to the fourth order of the time step.
-
-    Raises:
-        InvalidValueError: If the platform stops in between: there it turns around.
+    Shapes: time (N,) [s]; twist (N, 6); twist_rate (N, 6); returns (3, N).
     """
     speed = np.linalg.norm(twist, axis=1)
     inside = speed[1:-1] <= _STOPPED * speed.max()
@@ -184,13 +171,7 @@ def _vector(a: Array, b: Array) -> Array:
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
     """The piecewise polynomial with given derivatives at both ends of every piece: of 7th degree for four of each.
 
-    Args:
-        knots: Strictly increasing, shape (n,), n >= 2.
-        values: Value and first K - 1 derivatives at the knots, shape (K, n).
-        at_end: How many of them hold at the end of the last piece, from the value on.
-
-    Returns:
-        scipy's PPoly, which goes on beyond the outermost knots.
+    Shapes: knots (n,); values (K, n).
     """
     from scipy.interpolate import PPoly  # takes longer to load than all the rest of motion
 
@@ -225,7 +206,7 @@ _SAME_TIME: Final = 1e-9  # of the path's duration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Move:
+class RestToRestSegment:
     """A motion from rest to rest.
 
     Attributes:
@@ -259,24 +240,15 @@ class Move:
         return values
 
 
-def moves_of(path: Path) -> tuple[Move, ...]:
+def segments_of(path: Path) -> tuple[RestToRestSegment, ...]:
     """The moves of a path, in order.
 
     Between rests the parameter runs through the samples with all derivatives that the path knows: a polynomial of
     7th degree from sample to sample, of 5th without jerk. Paths of `quintic_path` and `septic_path` are that exactly.
-
-    Args:
-        path: The path; where it does not know its rests, they are the samples that stand.
-
-    Returns:
-        Moves that follow on each other.
-
-    Raises:
-        InvalidValueError: If the path is in motion at an end, or turns around in the middle of a curve.
     """
     _check_ends(path)
     rests = path.rests if path.rests is not None else _standing(path)
-    return tuple(_move(path, float(first), float(last)) for first, last in pairwise(rests))
+    return tuple(_segment(path, float(first), float(last)) for first, last in pairwise(rests))
 
 
 def _check_ends(path: Path) -> None:
@@ -307,14 +279,14 @@ def _standing(path: Path) -> Array:
     return times
 
 
-def _move(path: Path, begin: float, end: float) -> Move:
+def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
     """The move between two rests; those that are no samples are reached by the polynomials beside them."""
     near = _SAME_TIME * max(path.duration, abs(begin))
     first, last = np.searchsorted(path.time, (begin - near, end + near))
     part = slice(int(first), int(last))
     time = path.time[part] - begin
     if not _speed(path.twist[part]).any():
-        return Move(begin, end, None, None, part.start)
+        return RestToRestSegment(begin, end, None, None, part.start)
     if time.size < 2:
         value = f"of {time.size} samples"
         raise InvalidValueError(
@@ -334,12 +306,12 @@ def _move(path: Path, begin: float, end: float) -> Move:
         if not standing and len(values) > 3:
             held[3, 0] = progress(0.0, 3)  # it rests, but its jerk need not be zero
         progress = piecewise(knots, held, at_end if over else 3)
-    return Move(begin, end, curve, progress, part.start)
+    return RestToRestSegment(begin, end, curve, progress, part.start)
 
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
     """A curve through samples, and its parameter with its derivatives at each, shape (K, n)."""
-    line = Line.between(pose)
+    line = LineCurve.between(pose)
     if line.moves:
         parameter, square = line.parameter(pose), float(line.direction @ line.direction)
         values = np.stack((parameter, *(rate @ line.direction / square for rate in rates)))
@@ -353,4 +325,4 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
             return line, values
     way = lengths(time, *rates[:2])
     way /= way[0, -1]
-    return Bent.through(pose, way[0]), way
+    return SplineCurve.through(pose, way[0]), way

@@ -16,7 +16,7 @@ from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
-from sagline.dynamics.trajectories.segments import Move, moves_of
+from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
 from sagline.motion.path import Path, checked_time
 from sagline.motion.rest_to_rest import time_grid
 from sagline.robot.pose import Pose
@@ -289,20 +289,20 @@ def shaped(path: Path, shaper: Shaper) -> Path:
     if fastest > 0.5 / step:
         limit = f"<= {0.5 / step:g} Hz, half the path's sample rate"
         raise InvalidValueError("the shaper's frequency", f"{fastest:g} Hz", limit, "Give the path a higher rate.")
-    moves = moves_of(path)
-    longer = np.array([move.duration + (0.0 if move.curve is None else shaper.duration) for move in moves])
+    segments = segments_of(path)
+    longer = np.array([segment.duration + (0.0 if segment.curve is None else shaper.duration) for segment in segments])
     ends = np.cumsum(longer)
     rests = np.append(0.0, ends)
     time = time_grid(float(ends[-1]), 1.0 / step)
     check_memory("the shaped path", _BYTES * time.size * shaper.time.size, "Shape a shorter path.")
     position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
-    which = np.minimum(np.searchsorted(ends, time, side="right"), len(moves) - 1)
-    for k, move in enumerate(moves):
+    which = np.minimum(np.searchsorted(ends, time, side="right"), len(segments) - 1)
+    for k, segment in enumerate(segments):
         part = which == k
-        pose = _held(path, move)
-        if move.curve is not None:
-            motion = convolved(move, shaper, time[part] - rests[k])
-            jet = move.curve.at(motion[0])
+        pose = _held(path, segment)
+        if segment.curve is not None:
+            motion = shaped_parameter(segment, shaper, time[part] - rests[k])
+            jet = segment.curve.at(motion[0])
             pose, rates[:, part] = jet.pose, jet.twists(motion)
         position[part], quaternion[part] = pose.position, pose.quaternion
     start = path.time[0]
@@ -310,31 +310,21 @@ def shaped(path: Path, shaper: Shaper) -> Path:
     return Path(time + start, Pose.from_quaternion(position, quaternion), rates[0], rates[1], kept, rests + start)
 
 
-def convolved(move: Move, shaper: Shaper, time: Array) -> Array:
+def shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) -> Array:
     """Parameter of a shaped move and its first three derivatives at times since its begin, shape (4, N)."""
     motion = np.zeros((4, time.size))
     for delay, share in zip(shaper.time, shaper.amplitude, strict=True):
-        motion += share * move.rates(time - delay)
+        motion += share * segment.rates(time - delay)
     return motion
 
 
-def _held(path: Path, move: Move) -> Pose:
+def _held(path: Path, segment: RestToRestSegment) -> Pose:
     """Where the platform is at the first sample of a move."""
-    return path.pose[move.sample]
+    return path.pose[segment.sample]
 
 
 def sample_time(path: Path) -> float:
-    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that.
-
-    Args:
-        path: The path.
-
-    Returns:
-        The time.
-
-    Raises:
-        InvalidValueError: If the path has one sample only.
-    """
+    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that."""
     if len(path) < 2:
         raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
     rate = 1.0 / float(np.median(np.diff(path.time)))

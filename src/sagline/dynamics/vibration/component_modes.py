@@ -18,11 +18,7 @@ from sagline.statics.strings import Strings
 
 @cache
 def lobatto() -> Lobatto:
-    """The nodes and what belongs to them.
-
-    Returns:
-        Lobatto, its arrays in rows by degree.
-    """
+    """The nodes and what belongs to them."""
     n = LARGEST_DEGREE + 1
     rule = Lobatto(np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n, n)), np.zeros((n, n, n)))
     for p in range(2, n):
@@ -142,13 +138,7 @@ class Motions(NamedTuple):
 def component_modes(strings: Strings, row: int, up_to: float) -> Components:
     """Motions of the cables of one state, right up to a frequency; those above complete what the cables can do.
 
-    Args:
-        strings: Of N states.
-        row: Which of them.
-        up_to: That frequency [Hz].
-
-    Returns:
-        Components.
+    Units: up_to [Hz].
     """
     omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
@@ -194,16 +184,10 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
     return still
 
 
-def field(components: Components, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
+def node_motion(components: Components, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
     """Motion of the nodes times the roots of their masses: in the planes and normal to them.
 
-    Args:
-        components: Of the cables.
-        ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
-        amplitudes: Of the components, shape (T, K).
-
-    Returns:
-        Shapes (t, 2 nodes, K) and (t, nodes, K).
+    Shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K).
     """
     plane, normal = (
         motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
@@ -214,20 +198,13 @@ def field(components: Components, ends: Array, amplitudes: Array) -> tuple[Array
 def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: int) -> Array:
     """Displacements of all cables at equally spaced material points, from frame to platform end.
 
-    Args:
-        components: Of the cables.
-        ends: As of `field`.
-        amplitudes: As of `field`.
-        count: How many points.
-
-    Returns:
-        World axes, shape (K, m, count, 3); zero for cables that are not taut.
+    Returns (K, m, count, 3).
     """
     mesh = components.mesh
     t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
     values = np.empty((t, count, n))
     interpolate(mesh.table, mesh.omega, lobatto(), mesh.points, values)
-    plane, normal = field(components, ends, amplitudes)
+    plane, normal = node_motion(components, ends, amplitudes)
     inside = plane.reshape(t, n, 2, k)
     behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
     slide = np.hypot(*behind.T)  # a frame end that gives way has one motion in the plane
@@ -241,29 +218,19 @@ def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: 
     return np.moveaxis(shapes, -1, 0)
 
 
-def stretch(components: Components, ends: Array, amplitudes: Array) -> Array:
+def stretch_energy(components: Components, ends: Array, amplitudes: Array) -> Array:
     """Twice the energy of stretch in each mode of unit modal mass.
 
-    Args:
-        components: Of the cables.
-        ends: As of `field`.
-        amplitudes: As of `field`.
-
-    Returns:
-        Of the taut cables, shape (t, K) [1/s^2].
+    Returns (t, K) [1/s^2].
     """
-    plane, _ = field(components, ends, amplitudes)
+    plane, _ = node_motion(components, ends, amplitudes)
     return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
 
 
-def stretch_of_motions(components: Components) -> Array:
+def stretch_stiffness(components: Components) -> Array:
     """Stiffness of stretch between displacements of the platform end at rest and the motions in the plane.
 
-    Args:
-        components: Of the cables.
-
-    Returns:
-        Symmetric, shape (t, 2 + k, 2 + k).
+    Returns (t, 2 + k, 2 + k).
     """
     motions = components.plane
     basis = np.concatenate((motions.rest, motions.shape), axis=2)

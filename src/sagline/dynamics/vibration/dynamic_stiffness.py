@@ -100,17 +100,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
 
 
 def one_state(state: Equilibrium) -> Equilibrium:
-    """A single equilibrium, as it is.
-
-    Args:
-        state: What was given.
-
-    Returns:
-        The state.
-
-    Raises:
-        InvalidValueError: If it is none, or a batch.
-    """
+    """A single equilibrium, as it is."""
     if instance(state, Equilibrium, "state").pose.shape:
         step = "Take the poses one by one, state[i]; frequency_map takes many."
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single equilibrium", step)
@@ -119,14 +109,7 @@ def one_state(state: Equilibrium) -> Equilibrium:
 
 
 def check_lengths(state: Equilibrium) -> None:
-    """Refuse a state at which nothing hangs.
-
-    Args:
-        state: A single equilibrium.
-
-    Raises:
-        InvalidValueError: If it has no lengths, as that of a pose that is not feasible.
-    """
+    """Refuse a state at which nothing hangs."""
     if np.isnan(state.unstrained_length).any():
         raise InvalidValueError(
             "state", "one without lengths", "a state that was solved", "See the status of the plan."
@@ -134,14 +117,7 @@ def check_lengths(state: Equilibrium) -> None:
 
 
 def check_model(state: Equilibrium) -> None:
-    """Refuse what has no vibrations of its own: shallow models' forces have no energy, straight cables no stretch.
-
-    Args:
-        state: An equilibrium.
-
-    Raises:
-        InvalidValueError: If its cables are neither exact nor elastic.
-    """
+    """Refuse what has no vibrations of its own: shallow models' forces have no energy, straight cables no stretch."""
     model = state.cables.model
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Solve the pose with Catenary(), the default."
@@ -151,16 +127,7 @@ def check_model(state: Equilibrium) -> None:
 def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
     """What is added to the stiffness at rest of the cables of one state.
 
-    Args:
-        strings: Of one state, with a leading axis 1.
-        frequency: [Hz], shape (F,).
-        damping: What takes energy out, or None.
-
-    Returns:
-        Shape (F, m, 3, 3) [N/m], world axes; NaN for cables that are not taut.
-
-    Raises:
-        InvalidValueError: If a frequency is too high.
+    Shapes: frequency (F,) [Hz]; returns (F, m, 3, 3) [N/m].
     """
     waves = waves_of(frequency, damping)
     kind = np.float64 if damping is None else np.complex128
@@ -180,13 +147,7 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
 def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
     """Refuse a frequency for which a cable has too many elements, or none that does.
 
-    Args:
-        counts: As kernels fill them, shape (1, F, m, 2).
-        frequency: [Hz], shape (F,).
-
-    Raises:
-        InvalidValueError: If there are too many.
-        SaglineError: If there is none.
+    Shapes: counts (1, F, m, 2); frequency (F,) [Hz].
     """
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:
@@ -200,12 +161,7 @@ def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
 def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
     """Stiffness in the planes of cables, and normal to them, in the world.
 
-    Args:
-        found: XX, XZ, ZZ, YY, shape (F, m, FOUND).
-        axes: Of the cables, shape (m, 3, 3).
-
-    Returns:
-        Shape (F, m, 3, 3).
+    Shapes: found (F, m, FOUND); axes (m, 3, 3); returns (F, m, 3, 3).
     """
     xx, xz, zz, yy = np.moveaxis(found, -1, 0)[..., None, None]
     level, normal, up = np.moveaxis(axes, 1, 0)
@@ -222,12 +178,7 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
 def waves_of(frequency: Array, damping: Damping | None) -> Complex:
     """Frequencies as kernels take them, with what takes energy out.
 
-    Args:
-        frequency: [Hz], shape (F,).
-        damping: What does, or None.
-
-    Returns:
-        Shape (1, F, WAVE_COLUMNS).
+    Shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS).
     """
     omega = 2.0 * np.pi * frequency
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)

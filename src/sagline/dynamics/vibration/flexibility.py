@@ -33,7 +33,7 @@ class Flexibility(NamedTuple):
     stretch: Array
 
 
-class _Hung(NamedTuple):
+class _CatenaryState(NamedTuple):
     """Cables in their planes, fields of shape (..., m).
 
     Attributes:
@@ -72,12 +72,7 @@ class _Hung(NamedTuple):
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
     """How the flexibility of hanging cables changes, from where they leave the frame to their platform ends.
 
-    Args:
-        state: A state of exact or weightless cables, single or N.
-        force: On their platform ends, world axes [N], shape (..., m, 3).
-
-    Returns:
-        The derivatives: zero for a cable without force, not finite for one that hangs folded.
+    Shapes: force (..., m, 3) [N].
     """
     cables = state.cables
     length = cables.unstrained_length
@@ -86,7 +81,7 @@ def flexibility(state: Equilibrium, force: Array) -> Flexibility:
     weight = gravity * np.broadcast_to(cables.cable.linear_density, length.shape)
     level, vertical = cables.horizontal_tension, cables.vertical_force
     below = vertical - weight * length
-    hung = _Hung(level, below, vertical, np.hypot(level, below), np.hypot(level, vertical), weight, length)
+    hung = _CatenaryState(level, below, vertical, np.hypot(level, below), np.hypot(level, vertical), weight, length)
     axes = _axes(force)
     slack = (hung.size_b == 0.0) & (weight == 0.0)
     with np.errstate(all="ignore"):
@@ -129,7 +124,7 @@ def _turning(h: Array, v: Array, size: Array) -> Array:
     return found
 
 
-def _by_force(hung: _Hung) -> Array:
+def _by_force(hung: _CatenaryState) -> Array:
     """Integral of dC/df, (..., 3, 3, 3)."""
     h, a, b, product = hung.h, hung.a, hung.b, hung.product
     sine_a, sine_b = a / hung.size_a, b / hung.size_b
@@ -150,7 +145,7 @@ def _by_force(hung: _Hung) -> Array:
     )
 
 
-def _turned(hung: _Hung) -> Array:
+def _turned(hung: _CatenaryState) -> Array:
     """Integral of h/N^3, (sine_b - sine_a)/(h w), written so that it does not cancel."""
     cosine = (hung.h**2 + hung.a * hung.b) / hung.product
     near = hung.length / hung.product * hung.h * (1.0 / hung.size_a + 1.0 / hung.size_b) / (1.0 + cosine)
@@ -158,7 +153,7 @@ def _turned(hung: _Hung) -> Array:
     return np.where(cosine > 0.0, near, far)
 
 
-def _by_weight(hung: _Hung) -> Array:
+def _by_weight(hung: _CatenaryState) -> Array:
     """Derivative by the weight a length at fixed force on the platform end, (..., 3, 3)."""
     h, product = hung.h, hung.product
     lifted = -hung.length * hung.slope / product
@@ -179,7 +174,7 @@ def _by_weight(hung: _Hung) -> Array:
     return _chosen(hung, -np.einsum("...p,...pab->...ab", below * hung.length[..., None] * _SHARES, even), steep)
 
 
-def _outer(hung: _Hung) -> Array:
+def _outer(hung: _CatenaryState) -> Array:
     """Integral of t t^T, (..., 3, 3)."""
     none, length = np.zeros_like(hung.h), hung.length
     turned = np.arctan2(hung.h * hung.weight * length, hung.h**2 + hung.a * hung.b)
@@ -191,7 +186,7 @@ def _outer(hung: _Hung) -> Array:
     return _chosen(hung, np.einsum("...p,...pab->...ab", length[..., None] * _SHARES, even), steep)
 
 
-def _points(hung: _Hung) -> tuple[Array, Array, Array, Array]:
+def _points(hung: _CatenaryState) -> tuple[Array, Array, Array, Array]:
     """Tension, horizontal and vertical force at points of integration, and the length below them, (..., P)."""
     below = (0.5 - _POINTS) * hung.length[..., None]
     v = hung.b[..., None] - hung.weight[..., None] * below
@@ -199,7 +194,7 @@ def _points(hung: _Hung) -> tuple[Array, Array, Array, Array]:
     return np.hypot(h, v), h, v, below
 
 
-def _chosen(hung: _Hung, even: Array, steep: Array) -> Array:
+def _chosen(hung: _CatenaryState, even: Array, steep: Array) -> Array:
     return np.where(hung.smooth[..., None, None], even, steep)
 
 

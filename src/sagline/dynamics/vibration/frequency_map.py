@@ -13,8 +13,16 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result, Saved
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model
-from sagline.dynamics.vibration.receptance import Answer, coupled, strongest, summed
-from sagline.dynamics.vibration.robot_modes import Found, Setting, cable_shares, loss, massless, modes_of, setting_of
+from sagline.dynamics.vibration.receptance import Receptance, coupled_receptance, modal_receptance, peak_receptance
+from sagline.dynamics.vibration.robot_modes import (
+    StateModes,
+    VibrationModel,
+    cable_shares,
+    damping_ratios,
+    massless_modes,
+    state_modes,
+    vibration_model,
+)
 from sagline.dynamics.vibration.vibration import VibrationStatus
 from sagline.kinematics.inverse import inverse
 from sagline.robot.equilibrium import Equilibrium
@@ -110,21 +118,21 @@ def frequency_map(
         raise InvalidValueError("poses", "a single pose", "a batch of them", "For one pose use vibration.")
     limit = number(up_to, "up_to", "Hz", above=0.0)
     known = optional(damping, Damping, "damping") or Damping()
-    told = callback(progress, "progress")
+    report = callback(progress, "progress")
     state = inverse(robot, poses, tension=tension).state
     check_model(state)
     status = np.full(len(poses), VibrationStatus.NO_LENGTHS, dtype=np.int8)
     found = np.full((len(_Row._fields), len(poses)), np.nan)
-    for part in blocks(len(poses), BLOCK, told):
+    for part in blocks(len(poses), BLOCK, report):
         own = state[part]
-        setting = setting_of(own)
+        model = vibration_model(own)
         for k in range(len(own)):
             index = part.start + k
-            status[index], lowest = _status(setting, k)
+            status[index], lowest = _status(model, k)
             if status[index] not in (VibrationStatus.SOLVED, VibrationStatus.FOLDED):
                 continue
             try:
-                found[:, index] = _row(own, setting, k, limit, known)
+                found[:, index] = _row(own, model, k, limit, known)
             except SaglineError as error:
                 raise _at_pose(index, error) from None
             found[1, index] = lowest
@@ -141,36 +149,36 @@ class _Row(NamedTuple):
     peak_frequency: float
 
 
-def _status(setting: Setting, row: int) -> tuple[VibrationStatus, float]:
+def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
     """And the lowest frequency on massless cables [Hz]."""
-    if np.isnan(setting.stiffness[row]).any():
+    if np.isnan(model.stiffness[row]).any():
         return VibrationStatus.NO_LENGTHS, np.nan
-    frequency, leaving = massless(setting, row)
+    frequency, leaving = massless_modes(model, row)
     if leaving.shape[1]:
         return VibrationStatus.UNSTABLE, np.nan
-    taut = setting.strings.taut[row].all()
+    taut = model.strings.taut[row].all()
     return VibrationStatus.SOLVED if taut else VibrationStatus.FOLDED, float(frequency[0])
 
 
-def _row(state: Equilibrium, setting: Setting, row: int, up_to: float, damping: Damping) -> _Row:
-    freedom = setting.freedom
-    rest = compliance_of(freedom, setting.stiffness[row])[:3, :3]
-    found = modes_of(setting, row, up_to)
+def _row(state: Equilibrium, model: VibrationModel, row: int, up_to: float, damping: Damping) -> _Row:
+    freedom = model.freedom
+    rest = compliance_of(freedom, model.stiffness[row])[:3, :3]
+    found = state_modes(model, row, up_to)
     if not found.number:
         return _Row(np.nan, np.nan, np.nan, float(np.linalg.norm(rest, 2)), 0.0)
     first = found.platform[:, 0]
-    answer = summed(found, rest, damping.modal_damping)
+    receptance = modal_receptance(found, rest, damping.modal_damping)
     if damping.loss_time > 0.0 or damping.air_damping > 0.0:
         slopes = cable_slopes(state[row])
-        answer = coupled(Answer(setting.at(row), slopes.matrix, slopes.blocks, damping), up_to)
-    peak, at = strongest(answer, found.frequency, _ratios(state, setting, row, found, damping), damping)
-    return _Row(float(found.frequency[0]), np.nan, float(first @ setting.mass[row] @ first), peak, at)
+        receptance = coupled_receptance(Receptance(model.at(row), slopes.matrix, slopes.blocks, damping), up_to)
+    peak, at = peak_receptance(receptance, found.frequency, _ratios(state, model, row, found, damping), damping)
+    return _Row(float(found.frequency[0]), np.nan, float(first @ model.mass[row] @ first), peak, at)
 
 
-def _ratios(state: Equilibrium, setting: Setting, row: int, found: Found, damping: Damping) -> Array:
-    shares = cable_shares(setting, row, found) if damping.air_damping > 0.0 else np.zeros((0, found.number))
+def _ratios(state: Equilibrium, model: VibrationModel, row: int, found: StateModes, damping: Damping) -> Array:
+    shares = cable_shares(model, row, found) if damping.air_damping > 0.0 else np.zeros((0, found.number))
     density = state.one_robot.cables.linear_density[: len(shares)]
-    return loss(density, found, shares, damping)
+    return damping_ratios(density, found, shares, damping)
 
 
 def _at_pose(index: int, error: SaglineError) -> SaglineError:

@@ -16,13 +16,13 @@ from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import check_lengths
 from sagline.dynamics.vibration.flexibility import Flexibility, flexibility
 from sagline.dynamics.vibration.mode_sensitivities import (
-    Rest,
-    Slopes,
-    Swings,
-    cables_of_state,
-    rest_of,
-    slopes_of,
-    swings_of,
+    ModeGroup,
+    SquareDerivatives,
+    StateSlopes,
+    mode_group,
+    square_derivatives,
+    state_slopes,
+    string_data,
 )
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium
@@ -105,7 +105,7 @@ def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> 
     found, flexible = modes(state), flexibility(state, rest.slopes.force)
     groups = list(_groups(found.frequency, together))
     swings = (_massless(rest, flexible, found.shape[:, k], _square(found.frequency[k])) for k in groups)
-    return _result(state, False, found.frequency, groups, [slopes_of(rest, one) for one in swings])
+    return _result(state, False, found.frequency, groups, [square_derivatives(rest, one) for one in swings])
 
 
 def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
@@ -113,12 +113,12 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
         told = f"one whose status is {vibration.status.name}"
         raise InvalidValueError("state", told, "a vibration that was solved", "Take the state itself, massless.")
     rest = _rest(vibration.state)
-    cables, groups = cables_of_state(rest), list(_groups(vibration.frequency, together))
-    slopes = [slopes_of(rest, swings_of(rest, cables, vibration.frequency[group])) for group in groups]
+    cables, groups = string_data(rest), list(_groups(vibration.frequency, together))
+    slopes = [square_derivatives(rest, mode_group(rest, cables, vibration.frequency[group])) for group in groups]
     return _result(vibration.state, True, vibration.frequency, groups, slopes)
 
 
-def _rest(state: Equilibrium) -> Rest:
+def _rest(state: Equilibrium) -> StateSlopes:
     if state.pose.shape:
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", "Take one of them: state[0].")
     model = state.cables.model
@@ -129,7 +129,7 @@ def _rest(state: Equilibrium) -> Rest:
         value, allowed = "one of cables with something behind them", "cables that hang from their frame anchors"
         raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
     check_lengths(state)
-    return rest_of(state)
+    return state_slopes(state)
 
 
 def _groups(frequency: Array, together: float) -> Iterator[Indices]:
@@ -145,12 +145,12 @@ def _square(frequency: Array) -> float:
     return float((2.0 * np.pi * frequency.mean()) ** 2)
 
 
-def _massless(rest: Rest, flexible: Flexibility, motion: Array, square: float) -> Swings:
+def _massless(rest: StateSlopes, flexible: Flexibility, motion: Array, square: float) -> ModeGroup:
     """Modes in which the force is the same all along a cable."""
     ends = motion[:3].T + np.cross(motion[3:].T, rest.slopes.levers[:, None])
     force = ends @ np.swapaxes(rest.slopes.blocks, -1, -2)
     data = np.stack((flexible.by_length, flexible.by_density, flexible.by_stiffness))
-    return Swings(
+    return ModeGroup(
         motion,
         square,
         force,
@@ -160,7 +160,7 @@ def _massless(rest: Rest, flexible: Flexibility, motion: Array, square: float) -
 
 
 def _result(
-    state: Equilibrium, cable_mass: bool, frequency: Array, groups: list[Indices], slopes: list[Slopes]
+    state: Equilibrium, cable_mass: bool, frequency: Array, groups: list[Indices], slopes: list[SquareDerivatives]
 ) -> FrequencySlopes:
     def rows(forms: list[Array], *shape: int) -> Array:
         parts = (_parting(form, frequency[group]) for form, group in zip(forms, groups, strict=True))

@@ -18,15 +18,10 @@ from sagline.statics.strings import Strings, strings_of
 _TINY = np.finfo(float).tiny
 
 
-def end_motions(state: Equilibrium, shape: Array) -> Array:
+def end_displacements(state: Equilibrium, shape: Array) -> Array:
     """Displacement of the platform ends in motions of the platform.
 
-    Args:
-        state: A single state.
-        shape: Motions (displacement of the center of mass, rotation vector), one a column, shape (6, n).
-
-    Returns:
-        Shape (m, 3, n).
+    Shapes: shape (6, n); returns (m, 3, n).
     """
     robot = state.one_robot
     levers = state.pose.transform(robot.platform_anchors) - state.pose.transform(robot.center_of_mass)
@@ -40,13 +35,7 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
     Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
     hanging and behind their exits; the rest is in what they sag and swivel.
 
-    Args:
-        state: A single state.
-        platform: Its modes.
-        loss_time: Eta of the stretch [s].
-
-    Returns:
-        Shape (n,).
+    Shapes: loss_time [s]; returns (n,).
 
     Source:
         docs/model.md, section 11.
@@ -58,21 +47,15 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
     taut = strings.taut[0]
     behind = _behind(strings)
     compliance = flexibility(state, slopes.force).stretch + behind[:, :, None] * behind[:, None, :]
-    force = slopes.blocks @ end_motions(state, platform.shape)
+    force = slopes.blocks @ end_displacements(state, platform.shape)
     energy = np.einsum("min,mij,mjn->n", force[taut], compliance[taut], force[taut])
     return np.asarray(0.5 * omega * loss_time * energy / omega**2)
 
 
-def following(state: Equilibrium, ends: Array, count: int) -> Array:
+def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> Array:
     """Displacement of the cables that follow their platform ends without inertia, to first order.
 
-    Args:
-        state: A single state.
-        ends: Displacement of the platform ends, shape (m, 3).
-        count: Points at equal steps of unstrained length, from where the cable leaves the frame to its platform end.
-
-    Returns:
-        Shape (m, count, 3); zero at a frame end that does not give way.
+    Shapes: ends (m, 3); returns (m, count, 3).
     """
     middles = (np.arange(count - 1) + 0.5) / (count - 1)
     tangent, sag, stretch = _along(state, middles)
@@ -172,7 +155,7 @@ def listed_modes(vibration: Vibration) -> list[ListedMode]:
     ]
 
 
-def successors(vibration: Vibration) -> Array:
+def mode_correlation(vibration: Vibration) -> Array:
     """For each massless mode the share of its motion that is found in each mode with cable mass, shape (n, K).
 
     A share is the square of the mass-weighted product of both motions of the platform; over all modes, those beyond

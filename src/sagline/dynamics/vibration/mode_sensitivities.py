@@ -14,7 +14,7 @@ from sagline.statics.slopes import CableSlopes, cable_slopes
 from sagline.statics.stiffness import mass_matrix, stiffness
 
 
-class Rest(NamedTuple):
+class StateSlopes(NamedTuple):
     """A state, and how it settles.
 
     Attributes:
@@ -34,7 +34,7 @@ class Rest(NamedTuple):
     mass: Array
 
 
-class Swings(NamedTuple):
+class ModeGroup(NamedTuple):
     """Some modes of one frequency, g of them: the forms of what cables change by, for each two of them.
 
     Attributes:
@@ -52,7 +52,7 @@ class Swings(NamedTuple):
     by_datum: Array
 
 
-class Slopes(NamedTuple):
+class SquareDerivatives(NamedTuple):
     """Forms whose eigenvalues are derivatives of the square of the frequency, each (..., g, g).
 
     Attributes:
@@ -70,17 +70,10 @@ class Slopes(NamedTuple):
     inertia: Array
 
 
-def rest_of(state: Equilibrium) -> Rest:
-    """What is needed of a state.
-
-    Args:
-        state: A single one, of exact or weightless cables.
-
-    Returns:
-        Rest.
-    """
+def state_slopes(state: Equilibrium) -> StateSlopes:
+    """What is needed of a state."""
     slopes, known = cable_slopes(state), stiffness(state)
-    return Rest(
+    return StateSlopes(
         state,
         slopes,
         np.stack((slopes.by_length, slopes.by_density, slopes.by_stiffness)),
@@ -90,16 +83,8 @@ def rest_of(state: Equilibrium) -> Rest:
     )
 
 
-def slopes_of(rest: Rest, swings: Swings) -> Slopes:
-    """How the square of a frequency follows everything, the platform settling in its new equilibrium.
-
-    Args:
-        rest: The state.
-        swings: The modes that have the frequency.
-
-    Returns:
-        Slopes.
-    """
+def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivatives:
+    """How the square of a frequency follows everything, the platform settling in its new equilibrium."""
     robot, pose = rest.state.one_robot, _by_pose(rest, swings)
     turns = rest.state.pose.matrix.T @ swings.motion[3:]
     spins = np.einsum("ia,jb->ijab", turns, turns)
@@ -107,7 +92,7 @@ def slopes_of(rest: Rest, swings: Swings) -> Slopes:
     own = -np.einsum("mabc,pmc->pmab", swings.by_force, rest.by_datum) - swings.by_datum
     own = own + lever_form(swings.motion[3:], rest.slopes.levers, rest.by_datum)
     sink = -robot.gravity * rest.compliance[:, 2]
-    return Slopes(
+    return SquareDerivatives(
         datum=own + np.einsum("kab,pkm->pmab", pose, rest.settling),
         pose=pose,
         wrench=np.einsum("kab,kj->jab", pose, rest.compliance),
@@ -116,7 +101,7 @@ def slopes_of(rest: Rest, swings: Swings) -> Slopes:
     )
 
 
-def _by_pose(rest: Rest, swings: Swings) -> Array:
+def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
     """By motions of the platform in its pattern at fixed lengths, (6, g, g)."""
     slopes, turns = rest.slopes, swings.motion[3:]
     unit = np.eye(6)
@@ -140,13 +125,7 @@ def _by_pose(rest: Rest, swings: Swings) -> Array:
 def lever_form(turns: Array, levers: Array, force: Array) -> Array:
     """What forces on levers resist to rotations: r T^T - r.T, in its symmetric part.
 
-    Args:
-        turns: Rotation vectors, one a column, shape (3, g).
-        levers: To the points of the forces, shape (..., 3).
-        force: On the cables there, shape (..., 3).
-
-    Returns:
-        For each two rotations, shape (..., g, g).
+    Shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g).
     """
     along, pulled = levers @ turns, force @ turns
     mixed = along[..., :, None] * pulled[..., None, :]
@@ -196,15 +175,8 @@ class Waves(NamedTuple):
     end: Array
 
 
-def cables_of_state(rest: Rest) -> tuple[Cable, ...]:
-    """The cables of a state, as strings.
-
-    Args:
-        rest: The state.
-
-    Returns:
-        One each.
-    """
+def string_data(rest: StateSlopes) -> tuple[Cable, ...]:
+    """The cables of a state, as strings."""
     cables = rest.state.cables
     gravity = 0.0 if cables.model.weightless else cables.gravity
     density, stiffness = (
@@ -216,16 +188,10 @@ def cables_of_state(rest: Rest) -> tuple[Cable, ...]:
     )
 
 
-def swings_of(rest: Rest, cables: tuple[Cable, ...], frequency: Array) -> Swings:
+def mode_group(rest: StateSlopes, cables: tuple[Cable, ...], frequency: Array) -> ModeGroup:
     """The modes of some neighboring frequencies that count as one.
 
-    Args:
-        rest: The state.
-        cables: Of it.
-        frequency: Of g modes [Hz], as `vibration` has them.
-
-    Returns:
-        Swings, with the mean frequency to the last digits.
+    Units: frequency [Hz].
     """
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
     omega *= 1.0 + _correction(rest, cables, omega, group)  # leaves CLOSE of the error
@@ -243,7 +209,7 @@ def swings_of(rest: Rest, cables: tuple[Cable, ...], frequency: Array) -> Swings
     return _forms(rest, cables, waves, motion @ units, pulls @ units, omega)
 
 
-def _correction(rest: Rest, cables: tuple[Cable, ...], omega: float, group: int) -> float:
+def _correction(rest: StateSlopes, cables: tuple[Cable, ...], omega: float, group: int) -> float:
     """By what share of it a frequency is off: where the equations have so many solutions, to first order."""
     matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
     near = omega * (1.0 + CLOSE)
@@ -254,7 +220,7 @@ def _correction(rest: Rest, cables: tuple[Cable, ...], omega: float, group: int)
     return float(-np.trace(np.linalg.solve(change, np.diag(values[-group:]))) / group)
 
 
-def _equations(rest: Rest, waves: list[Waves], omega: float, scale: Array | None = None) -> tuple[Array, Array]:
+def _equations(rest: StateSlopes, waves: list[Waves], omega: float, scale: Array | None = None) -> tuple[Array, Array]:
     """Balance of the free motions and ends that meet, (n + 3 m, n + 3 m), and what its columns were multiplied by."""
     freedom, levers = rest.state.one_robot.freedom, rest.slopes.levers
     n, unit = len(freedom), np.eye(6)
@@ -328,8 +294,8 @@ def _longest(cable: Cable, omega: float, start: Array, end: Array) -> Array:
 
 
 def _forms(
-    rest: Rest, cables: tuple[Cable, ...], waves: list[Waves], motion: Array, pulls: Array, omega: float
-) -> Swings:
+    rest: StateSlopes, cables: tuple[Cable, ...], waves: list[Waves], motion: Array, pulls: Array, omega: float
+) -> ModeGroup:
     gravity = 0.0 if rest.state.cables.model.weightless else rest.state.cables.gravity
     end_force, by_force, by_datum = [], [], []
     for cable, wave, pull in zip(cables, waves, pulls, strict=True):
@@ -345,7 +311,7 @@ def _forms(
         by_force.append(shared)
         by_datum.append((entered, gravity * heavier + omega**2 * swung, -softer / cable.stiffness**2))
     data = np.swapaxes(np.array(by_datum), 0, 1)
-    return Swings(motion, omega**2, np.array(end_force), np.array(by_force), data)
+    return ModeGroup(motion, omega**2, np.array(end_force), np.array(by_force), data)
 
 
 def _turned(force: Array, pulled: Array) -> Array:

@@ -9,9 +9,9 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.progress import blocks
-from sagline.dynamics.vibration.component_modes import Components, Motions, component_modes, stretch_of_motions
+from sagline.dynamics.vibration.component_modes import Components, Motions, component_modes, stretch_stiffness
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, moving_stiffness
-from sagline.dynamics.vibration.robot_modes import Found, Setting
+from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
 
 LOWEST: Final = 1.0  # Hz: modes up to there are taken at least
 TAKEN: Final = 1.6  # of the highest frequency: modes up to there are taken
@@ -19,7 +19,7 @@ COUPLED: Final = 1.5  # of the same: losses couple modes up to there, those beyo
 BLOCK: Final = 128  # frequencies at once
 
 
-class Held(NamedTuple):
+class FixedEndModes(NamedTuple):
     """The cables of one state with both ends held.
 
     Attributes:
@@ -31,7 +31,7 @@ class Held(NamedTuple):
     lost: Array | None
 
 
-class Answer(NamedTuple):
+class Receptance(NamedTuple):
     """What oscillating wrenches meet.
 
     Attributes:
@@ -41,29 +41,23 @@ class Answer(NamedTuple):
         damping: What takes energy out.
     """
 
-    setting: Setting
+    model: VibrationModel
     matrix: Array
     cables: Array
     damping: Damping
 
-    def held(self, up_to: float) -> Held:
+    def fixed_end_modes(self, up_to: float) -> FixedEndModes:
         """What the cables do by themselves.
 
-        Args:
-            up_to: Highest frequency that is asked for [Hz].
+        Units: up_to [Hz].
         """
-        components = component_modes(self.setting.strings, 0, max(TAKEN * up_to, LOWEST))
-        return Held(components, stretch_of_motions(components) if self.damping.loss_time > 0.0 else None)
+        components = component_modes(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
+        return FixedEndModes(components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None)
 
-    def by_modes(self, frequency: Array, held: Held) -> tuple[Complex, Complex]:
+    def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
         """The compliance by the modes of the cables, and that on massless cables.
 
-        Args:
-            frequency: [Hz], shape (F,).
-            held: The cables, for these frequencies.
-
-        Returns:
-            Two arrays of shape (F, 6, 6).
+        Shapes: frequency (F,) [Hz]; returns (F, 6, 6).
         """
         found = np.empty((2, frequency.size, 6, 6), dtype=np.complex128)
         for part in blocks(frequency.size, BLOCK):
@@ -72,16 +66,12 @@ class Answer(NamedTuple):
             found[1, part] = self._compliance(frequency[part], still)
         return found[0], found[1]
 
-    def exactly(self, frequency: Array) -> Complex:
+    def exact(self, frequency: Array) -> Complex:
         """The compliance by the exact stiffness of the cables.
 
-        Args:
-            frequency: [Hz], shape (F,).
-
-        Returns:
-            Shape (F, 6, 6).
+        Shapes: frequency (F,) [Hz]; returns (F, 6, 6).
         """
-        strings = self.setting.strings
+        strings = self.model.strings
         moving = moving_stiffness(strings, frequency, self.damping)
         moving -= 2j * self.damping.modal_damping * self.cables  # which the whole stiffness has already
         moving[:, ~strings.taut[0]] = 0.0
@@ -89,28 +79,28 @@ class Answer(NamedTuple):
 
     def _compliance(self, frequency: Array, moving: Complex) -> Complex:
         """Inverse of what a wrench meets, moving what the cables add to their stiffness, (F, m, 3, 3)."""
-        setting, omega = self.setting, 2.0 * np.pi * frequency[:, None, None]
-        ends, freedom = setting.ends[0], setting.freedom
+        model, omega = self.model, 2.0 * np.pi * frequency[:, None, None]
+        ends, freedom = model.ends[0], model.freedom
         on_platform = np.einsum("mai,fmab,mbj->fij", ends, moving, ends, optimize=True)
-        whole = (1.0 + 2j * self.damping.modal_damping) * self.matrix + on_platform - omega**2 * setting.mass[0]
+        whole = (1.0 + 2j * self.damping.modal_damping) * self.matrix + on_platform - omega**2 * model.mass[0]
         with np.errstate(all="ignore"):
             return np.asarray(freedom.T @ np.linalg.inv(freedom @ whole @ freedom.T) @ freedom)
 
     def _moving(self, components: Components, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
         """What vibrating cables add to their stiffness, with their mass and without, (F, m, 3, 3) each."""
-        mesh, setting = components.mesh, self.setting
+        mesh, model = components.mesh, self.model
         density = mesh.density[:, None, None]
         square = omega**2 - 1j * omega * self.damping.air_damping / density[:, 0]  # (t, F)
         loss = 1.0 + 2j * self.damping.modal_damping
-        moving = np.zeros((omega.size, setting.strings.taut.shape[1], 3, 3), dtype=np.complex128)
+        moving = np.zeros((omega.size, model.strings.taut.shape[1], 3, 3), dtype=np.complex128)
         still = np.zeros_like(moving)
         moving[:, mesh.taut] = -np.swapaxes(square, 0, 1)[..., None, None] * components.still[mesh.taut]
-        aside = _driven(components.normal, square, loss)
+        aside = _driven_stiffness(components.normal, square, loss)
         if lost is None:
-            inside = _driven(components.plane, square, loss)
+            inside = _driven_stiffness(components.plane, square, loss)
         else:
             scaled = np.asarray(1j * loss * self.damping.loss_time * omega, dtype=np.complex128)
-            inside, bare = _driven_with_stretch(components.plane, square, loss, lost, scaled)
+            inside, bare = _driven_stiffness_with_loss(components.plane, square, loss, lost, scaled)
             still[:, mesh.taut] = _in_world(bare, mesh.axes[:, ::2])
             inside += bare
         moving[:, mesh.taut] += _in_world(inside, mesh.axes[:, ::2]) + _in_world(aside, mesh.axes[:, 1:2])
@@ -122,14 +112,14 @@ def _in_world(own: Complex, axes: Array) -> Complex:
     return np.asarray(np.einsum("tai,tfab,tbj->ftij", axes, own, axes, optimize=True))
 
 
-def _driven(motions: Motions, square: Complex, loss: complex) -> Complex:
+def _driven_stiffness(motions: Motions, square: Complex, loss: complex) -> Complex:
     """What the motions add to the stiffness of the end that drives them, undamped but for all alike, (t, F, d, d)."""
     with np.errstate(all="ignore"):
         shares = square[..., None] ** 2 / (loss * motions.square[:, None] - square[..., None])
     return np.asarray(-np.einsum("tka,tfk,tkb->tfab", motions.drive, shares, motions.drive, optimize=True))
 
 
-def _driven_with_stretch(
+def _driven_stiffness_with_loss(
     motions: Motions, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
     """The same with what is lost in stretch, by motions and end (t, d + k, d + k); and what is lost at rest alone."""
@@ -146,7 +136,7 @@ def _driven_with_stretch(
     return -np.swapaxes(by_end, -1, -2) @ moved, factor * lost[:, None, :d, :d]
 
 
-Forced: TypeAlias = Callable[[Array], Complex]  # displacement by force (F, 3, 3) at frequencies (F,)
+ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacement by force (F, 3, 3) at frequencies (F,)
 
 LIKELY: Final = 0.4  # of the strongest answer at a mode: those near whose modes a stronger one is looked for
 ROUNDS: Final = 2  # of looking more closely
@@ -154,74 +144,58 @@ CLOSER: Final = 5  # frequencies between two
 WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # of half a peak, about a mode: where
 
 
-def summed(found: Found, rest: Array, ratio: float) -> Forced:
+def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
     """The answer by the modes of a robot all of whose stiffness loses alike, which does not couple them.
 
-    Args:
-        found: The modes; those beyond answer as at rest.
-        rest: Displacement of the center of mass by force at rest, shape (3, 3).
-        ratio: Damping ratio of every mode.
-
-    Returns:
-        The answer.
+    Shapes: rest (3, 3).
     """
     natural = (2.0 * np.pi * found.frequency) ** 2
     products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
     lossy = 1.0 + 2j * ratio
     beyond = (rest - (products @ (1.0 / natural)).reshape(3, 3)) / lossy
 
-    def answer(frequency: Array) -> Complex:
+    def receptance(frequency: Array) -> Complex:
         terms = 1.0 / (lossy * natural - (2.0 * np.pi * frequency[:, None]) ** 2)
         return np.asarray(beyond + (terms @ products.T).reshape(-1, 3, 3))
 
-    return answer
+    return receptance
 
 
-def coupled(answer: Answer, up_to: float) -> Forced:
+def coupled_receptance(receptance: Receptance, up_to: float) -> ForceReceptance:
     """The answer with losses that couple the modes.
 
-    Args:
-        answer: Of one state.
-        up_to: Highest frequency that is asked for [Hz].
-
-    Returns:
-        The answer.
+    Units: up_to [Hz].
     """
-    held = answer.held(up_to)
-    return lambda frequency: answer.by_modes(frequency, held)[0][:, :3, :3]
+    held = receptance.fixed_end_modes(up_to)
+    return lambda frequency: receptance.by_modes(frequency, held)[0][:, :3, :3]
 
 
-def strongest(answer: Forced, natural: Array, ratios: Array, damping: Damping) -> tuple[float, float]:
+def peak_receptance(
+    receptance: ForceReceptance, natural: Array, ratios: Array, damping: Damping
+) -> tuple[float, float]:
     """Largest displacement for a force in any direction, at rest or near a mode.
 
-    Args:
-        answer: To forces.
-        natural: Frequencies of the modes [Hz], shape (K,).
-        ratios: Their damping ratios, which tell how wide their peaks are, shape (K,).
-        damping: What takes energy out.
-
-    Returns:
-        The displacement for the force [m/N], infinite without damping; its frequency [Hz].
+    Shapes: natural (K,) [Hz]; ratios (K,); returns [m/N], [Hz].
     """
     if damping == Damping():
         return np.inf, float(natural[0])
     around = np.concatenate(([0.0], natural))
-    sizes = np.linalg.norm(answer(around), axis=(1, 2))
+    sizes = np.linalg.norm(receptance(around), axis=(1, 2))
     likely = np.flatnonzero(sizes[1:] >= LIKELY * sizes.max())
     near = natural[likely, None] * (1.0 + ratios[likely, None] * WIDTHS)
     frequency = np.unique(np.concatenate((around[:1], near.ravel())))
     for _ in range(ROUNDS):
-        found = answer(frequency)
+        found = receptance(frequency)
         norms = np.sqrt(np.linalg.eigvalsh(np.swapaxes(found.conj(), -1, -2) @ found)[:, -1])
         best = int(np.argmax(norms))
         if not 0 < best < norms.size - 1:
             return float(norms[best]), float(frequency[best])
         top, before, after = (frequency[best + k] for k in (0, -1, 1))
         frequency = np.concatenate((np.linspace(before, top, CLOSER), np.linspace(top, after, CLOSER)[1:]))
-    return _top(np.array((before, top, after)), norms[best - 1 : best + 2])
+    return _parabola_peak(np.array((before, top, after)), norms[best - 1 : best + 2])
 
 
-def _top(frequency: Array, norms: Array) -> tuple[float, float]:
+def _parabola_peak(frequency: Array, norms: Array) -> tuple[float, float]:
     """The top of a peak through three values: near it one over their square is a parabola."""
     (before, after), flat = np.diff(frequency), norms**-2.0
     left, right = np.diff(flat) / (before, after)

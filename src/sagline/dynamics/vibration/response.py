@@ -14,8 +14,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_lengths, one_state
-from sagline.dynamics.vibration.receptance import LOWEST, Answer
-from sagline.dynamics.vibration.robot_modes import check_number, massless, modes_below, setting_of
+from sagline.dynamics.vibration.receptance import LOWEST, Receptance
+from sagline.dynamics.vibration.robot_modes import check_mode_count, massless_modes, modes_below, vibration_model
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes
@@ -92,17 +92,17 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
         raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give one or more.")
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Take them in parts.")
     known = optional(damping, Damping, "damping") or Damping()
-    setting = setting_of(state)
+    model = vibration_model(state)
     check_lengths(state)
-    check_number(modes_below(setting, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
-    if massless(setting, 0)[1].shape[1]:
+    check_mode_count(modes_below(model, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
+    if massless_modes(model, 0)[1].shape[1]:
         step = "Simulate it; vibration() names the directions in which it leaves."
         raise InvalidValueError("state", "an unstable equilibrium", "a stable one, which has an answer", step)
     slopes = cable_slopes(state)
-    answer = Answer(setting, slopes.matrix, slopes.blocks, known)
-    compliance, still = answer.by_modes(given, answer.held(float(given.max())))
+    receptance = Receptance(model, slopes.matrix, slopes.blocks, known)
+    compliance, still = receptance.by_modes(given, receptance.fixed_end_modes(float(given.max())))
     some = np.unique(np.linspace(0, given.size - 1, CHECKS).round().astype(np.int64))
-    wanted = answer.exactly(given[some])
+    wanted = receptance.exact(given[some])
     off = np.linalg.norm(compliance[some] - wanted, axis=(1, 2)) / np.linalg.norm(wanted, axis=(1, 2))
     return FrequencyResponse(state, known, given, locked(compliance), locked(still), locked(given[some]), locked(off))
 
@@ -137,17 +137,6 @@ def response_curves(vibration: Vibration, force: str = "x", motion: str | None =
     """The platform's motion for a force at its center of mass, over frequency, up to where all modes are known.
 
     Both are of `frequency_response`; air damping, which only swinging cables feel, has no part in the massless one.
-
-    Args:
-        vibration: Of a stable state.
-        force: "x", "y", "z": a force along it; "about x", ...: a moment. World axes.
-        motion: In the same words, the displacement of the center of mass or the rotation; None for that of the force.
-
-    Returns:
-        The curves.
-
-    Raises:
-        InvalidValueError: If the vibration has no modes, or there is no such motion.
     """
     state = instance(vibration, Vibration, "vibration").state
     if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
@@ -156,23 +145,11 @@ def response_curves(vibration: Vibration, force: str = "x", motion: str | None =
     _places(force, motion)
     natural = np.concatenate((vibration.frequency, modes(state).frequency))
     found = frequency_response(state, _grid(natural, vibration.up_to), vibration.damping)
-    return drawn_curves(found, force, motion)
+    return curves_of_response(found, force, motion)
 
 
-def drawn_curves(response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """One element of what `frequency_response` found, as far as logarithmic axes can show it.
-
-    Args:
-        response: The response.
-        force: As of `response_curves`.
-        motion: As of `response_curves`.
-
-    Returns:
-        The curves, without what is at 0 Hz or has no end.
-
-    Raises:
-        InvalidValueError: If less than two frequencies are left, or there is no such motion.
-    """
+def curves_of_response(response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
+    """One element of what `frequency_response` found, as far as logarithmic axes can show it."""
     row, column = _places(force, motion)
     answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
     kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
@@ -181,7 +158,7 @@ def drawn_curves(response: FrequencyResponse, force: str = "x", motion: str | No
         step = "Give more, np.geomspace(0.5, 20.0, 500) for instance."
         raise InvalidValueError("frequency", f"{len(kept)} of them above 0 Hz", "two at least", step)
     static = abs(float(stiffness(response.state).compliance[row, column]))
-    with_mass, massless = (locked(answer[kept]) for answer in answers)
+    with_mass, massless = (locked(receptance[kept]) for receptance in answers)
     return ResponseCurves(locked(response.frequency[kept]), with_mass, massless, static, UNITS[row > 2, column > 2])
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.core.arrays import Array, Flags
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.dynamics.vibration.component_modes import Components, component_modes, stretch
+from sagline.dynamics.vibration.component_modes import Components, component_modes, stretch_energy
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_counts, in_world
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
@@ -25,7 +25,7 @@ LEVELS = 4  # pairs of moments of those above that are matched
 _TINY = 1e-300
 
 
-class Setting(NamedTuple):
+class VibrationModel(NamedTuple):
     """What N states are, for their vibrations.
 
     Attributes:
@@ -42,14 +42,14 @@ class Setting(NamedTuple):
     mass: Array
     freedom: Array
 
-    def at(self, row: int) -> Setting:
+    def at(self, row: int) -> VibrationModel:
         """One of them, with a leading axis 1."""
         part = slice(row, row + 1)
         strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
-        return Setting(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
+        return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
 
 
-class Reduced(NamedTuple):
+class ReducedModel(NamedTuple):
     """The eigenproblem of one state.
 
     Attributes:
@@ -71,11 +71,7 @@ class Reduced(NamedTuple):
     def amplitudes(self, vectors: Array) -> Array:
         """Amplitudes of the components beside their motion at rest.
 
-        Args:
-            vectors: Of the eigenproblem, shape (n + k, K).
-
-        Returns:
-            Shape (T, K).
+        Shapes: vectors (n + k, K); returns (T, K).
         """
         n = self.platform.shape[1]
         own = vectors[n:] - self.driven @ vectors[:n]
@@ -86,15 +82,8 @@ class Reduced(NamedTuple):
         return found
 
 
-def setting_of(state: Equilibrium) -> Setting:
-    """What is needed of an equilibrium.
-
-    Args:
-        state: Single or N of them; arrays have a leading axis in either case.
-
-    Returns:
-        Setting; its stiffness NaN where the state has no lengths.
-    """
+def vibration_model(state: Equilibrium) -> VibrationModel:
+    """What is needed of an equilibrium."""
     slopes = cable_slopes(state)
     matrix = slopes.matrix.reshape(-1, 6, 6)
     levers = slopes.levers.reshape(len(matrix), -1, 3)
@@ -103,7 +92,7 @@ def setting_of(state: Equilibrium) -> Setting:
     for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # u = q_1 + q_2 x r
         ends[..., a, 3 + b] = levers[..., c]
         ends[..., a, 3 + c] = -levers[..., b]
-    return Setting(
+    return VibrationModel(
         strings_of(state),
         ends,
         0.5 * (matrix + np.swapaxes(matrix, -1, -2)),
@@ -112,41 +101,35 @@ def setting_of(state: Equilibrium) -> Setting:
     )
 
 
-def reduced(setting: Setting, row: int, up_to: float) -> Reduced:
+def reduced_model(model: VibrationModel, row: int, up_to: float) -> ReducedModel:
     """The eigenproblem of one state for its modes below a frequency.
 
     The cables' modes a little above it are its unknowns; what those beyond answer to slow motions of the platform is
     kept in a few motions of all together, which match the first moments (Krylov). With amplitudes counted from the
     frame the mass is that of the platform, with what these leave of the cables' mass at rest, and one for each.
 
-    Args:
-        setting: Of N states.
-        row: Which of them.
-        up_to: The frequency [Hz].
-
-    Returns:
-        Reduced.
+    Units: up_to [Hz].
     """
-    components = component_modes(setting.strings, row, KEPT * up_to)
-    freedom, ends = setting.freedom, setting.ends[row]
+    components = component_modes(model.strings, row, KEPT * up_to)
+    freedom, ends = model.freedom, model.ends[row]
     drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
     kept = components.square < (2.0 * np.pi * KEPT * up_to) ** 2
     beyond, slow = _slow_motions(components.square[~kept], drives[~kept])
     square, count = components.square[kept], int(kept.sum())
     drives = np.concatenate((drives[kept], beyond.T @ drives[~kept]))
-    at_rest = freedom @ (setting.mass[row] + _on_platform(components.still, ends)) @ freedom.T
+    at_rest = freedom @ (model.mass[row] + _on_platform(components.still, ends)) @ freedom.T
     upper = np.linalg.inv(np.linalg.cholesky(at_rest - drives.T @ drives)).T
     driven = drives @ upper
     pulled = np.concatenate((square[:, None] * driven[:count], slow @ driven[count:]))
     n = len(freedom)
     matrix = np.zeros((n + len(driven), n + len(driven)))
-    stiffness = freedom @ setting.stiffness[row] @ freedom.T
+    stiffness = freedom @ model.stiffness[row] @ freedom.T
     matrix[:n, :n] = upper.T @ stiffness @ upper + driven.T @ pulled
     matrix[n:, :n] = -pulled
     matrix[:n, n:] = -pulled.T
     np.fill_diagonal(matrix[n : n + count, n : n + count], square)
     matrix[n + count :, n + count :] = slow
-    return Reduced(matrix, freedom.T @ upper, driven, kept, beyond, components)
+    return ReducedModel(matrix, freedom.T @ upper, driven, kept, beyond, components)
 
 
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
@@ -159,37 +142,24 @@ def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
     return basis, basis.T @ (square[:, None] * basis)
 
 
-def massless(setting: Setting, row: int) -> tuple[Array, Array]:
+def massless_modes(model: VibrationModel, row: int) -> tuple[Array, Array]:
     """Vibrations of the platform alone, and how it leaves an unstable equilibrium.
 
-    Args:
-        setting: Of N states.
-        row: Which of them.
-
-    Returns:
-        Frequencies as those of `modes` [Hz], shape (n,); motions in which the equilibrium is left, of unit modal mass,
-        one a column, shape (6, d).
+    Returns (n,) [Hz], (6, d).
     """
-    freedom = setting.freedom
-    upper = np.linalg.inv(np.linalg.cholesky(freedom @ setting.mass[row] @ freedom.T)).T
-    squares, vectors = np.linalg.eigh(upper.T @ freedom @ setting.stiffness[row] @ freedom.T @ upper)
+    freedom = model.freedom
+    upper = np.linalg.inv(np.linalg.cholesky(freedom @ model.mass[row] @ freedom.T)).T
+    squares, vectors = np.linalg.eigh(upper.T @ freedom @ model.stiffness[row] @ freedom.T @ upper)
     return natural_frequency(squares), freedom.T @ (upper @ vectors[:, squares < -UNSTABLE * np.abs(squares).max()])
 
 
-def dynamic_matrix(setting: Setting, row: int, moving: Array, omega: float) -> Array:
+def dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float) -> Array:
     """D: what a force on the free motions takes for a vibration, exactly.
 
-    Args:
-        setting: Of N states.
-        row: Which of them.
-        moving: What the cables' vibration adds to their stiffness, world axes, shape (m, 3, 3) [N/m].
-        omega: Angular frequency [rad/s].
-
-    Returns:
-        Shape (n, n).
+    Shapes: moving (m, 3, 3) [N/m]; omega [rad/s]; returns (n, n).
     """
-    matrix = setting.stiffness[row] + _on_platform(moving, setting.ends[row]) - omega**2 * setting.mass[row]
-    return np.asarray(setting.freedom @ matrix @ setting.freedom.T)
+    matrix = model.stiffness[row] + _on_platform(moving, model.ends[row]) - omega**2 * model.mass[row]
+    return np.asarray(model.freedom @ matrix @ model.freedom.T)
 
 
 def _on_platform(of_cables: Array, ends: Array) -> Array:
@@ -197,34 +167,25 @@ def _on_platform(of_cables: Array, ends: Array) -> Array:
     return np.asarray((np.swapaxes(ends, -1, -2) @ of_cables @ ends).sum(axis=0))
 
 
-def modes_below(setting: Setting, row: int, frequency: float) -> int:
+def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
     """Number of modes of the robot with its cables' mass below a frequency.
 
     By Wittrick and Williams: those that the taut cables have with both ends held, and the negative eigenvalues of what
     the platform then feels.
 
-    Args:
-        setting: Of N states.
-        row: Which of them.
-        frequency: [Hz], > 0.
-
-    Returns:
-        The number, which is no approximation.
-
-    Raises:
-        InvalidValueError: If the frequency is so high that a cable cannot be cut into its waves.
+    Units: frequency [Hz].
     """
-    taut = np.flatnonzero(setting.strings.taut[row])
+    taut = np.flatnonzero(model.strings.taut[row])
     given = np.array([frequency])
     found = np.empty((1, 1, taut.size, collocation.FOUND))
     counts = np.empty((1, 1, taut.size, 2), dtype=np.int64)
-    table = np.ascontiguousarray(setting.strings.table[row : row + 1, taut])
+    table = np.ascontiguousarray(model.strings.table[row : row + 1, taut])
     room = np.empty(collocation.ROOM)
     dynamic_stiffnesses(table, undamped(given[None]), COUNTING, room, found, counts)
     check_counts(counts, given)
-    moving = np.zeros((setting.strings.taut.shape[1], 3, 3))
-    moving[taut] = in_world(found[0], setting.strings.axes[row, taut])[0].real
-    return int(counts.sum()) + _negatives(dynamic_matrix(setting, row, moving, 2.0 * np.pi * frequency))
+    moving = np.zeros((model.strings.taut.shape[1], 3, 3))
+    moving[taut] = in_world(found[0], model.strings.axes[row, taut])[0].real
+    return int(counts.sum()) + _negatives(dynamic_matrix(model, row, moving, 2.0 * np.pi * frequency))
 
 
 def _negatives(matrix: Array) -> int:
@@ -237,7 +198,7 @@ BORDER: Final = 1e-6  # of a frequency, within which the count says on which sid
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class StateModes:
     """Modes of one state below a frequency.
 
     Attributes:
@@ -253,7 +214,7 @@ class Found:
     platform: Array
     ends: Array
     number: int
-    problem: Reduced
+    problem: ReducedModel
     vectors: Array
 
     @property
@@ -267,24 +228,14 @@ class Found:
         return self.problem.amplitudes(self.vectors)
 
 
-def modes_of(setting: Setting, row: int, up_to: float) -> Found:
+def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
     """Modes of one state below a frequency, as many as the exact count has.
 
-    Args:
-        setting: Of N states.
-        row: Which of them; a stable one.
-        up_to: The frequency [Hz].
-
-    Returns:
-        The modes.
-
-    Raises:
-        InvalidValueError: If there are too many.
-        SaglineError: If modes and count disagree.
+    Units: up_to [Hz].
     """
-    count = modes_below(setting, row, up_to)
-    check_number(count, up_to, "up_to")
-    problem = reduced(setting, row, up_to)
+    count = modes_below(model, row, up_to)
+    check_mode_count(count, up_to, "up_to")
+    problem = reduced_model(model, row, up_to)
     square, vectors = np.linalg.eigh(problem.matrix)
     frequency = np.sqrt(np.maximum(square, 0.0)) / (2.0 * np.pi)
     border = np.searchsorted(frequency, (up_to * (1.0 - BORDER), up_to * (1.0 + BORDER)))
@@ -292,38 +243,26 @@ def modes_of(setting: Setting, row: int, up_to: float) -> Found:
         text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
         raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
     if count and frequency[0] < SLOW * up_to:  # at rest the mass of the cables has no part: as many are exactly at 0 Hz
-        frequency[: np.count_nonzero(massless(setting, row)[0] == 0.0)] = 0.0
+        frequency[: np.count_nonzero(massless_modes(model, row)[0] == 0.0)] = 0.0
     vectors = vectors[:, :count]
     platform = problem.platform @ vectors[: problem.platform.shape[1]]
-    return Found(frequency[:count], platform, setting.ends[row] @ platform, count, problem, vectors)
+    return StateModes(frequency[:count], platform, model.ends[row] @ platform, count, problem, vectors)
 
 
-def check_number(count: int, frequency: float, item: str) -> None:
+def check_mode_count(count: int, frequency: float, item: str) -> None:
     """Refuse more modes than somebody wants to wait for.
 
-    Args:
-        count: How many lie below a frequency.
-        frequency: The frequency [Hz].
-        item: What a message calls it.
-
-    Raises:
-        InvalidValueError: If there are too many.
+    Units: frequency [Hz].
     """
     if count > MOST_MODES:
         value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
         raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
 
 
-def cable_shares(setting: Setting, row: int, found: Found) -> Array:
+def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
     """Share of each mode's kinetic energy that is each cable's.
 
-    Args:
-        setting: Of N states.
-        row: Which of them.
-        found: Its modes.
-
-    Returns:
-        Shape (m, K).
+    Returns (m, K).
     """
     parts, ends, own = found.components, found.ends, found.amplitudes
     shares = np.asarray((ends * (parts.still @ ends)).sum(axis=1))
@@ -332,23 +271,16 @@ def cable_shares(setting: Setting, row: int, found: Found) -> Array:
     return shares
 
 
-def loss(density: Array, found: Found, shares: Array, damping: Damping) -> Array:
+def damping_ratios(density: Array, found: StateModes, shares: Array, damping: Damping) -> Array:
     """Damping ratio of each mode, to first order: power lost over that of a critically damped one.
 
-    Args:
-        density: Of the cables [kg/m], shape (m,).
-        found: The modes.
-        shares: Their `cable_shares`.
-        damping: What takes energy out of them.
-
-    Returns:
-        Shape (K,); NaN for a mode without frequency where something is lost.
+    Shapes: density (m,) [kg/m]; returns (K,).
     """
     omega = 2.0 * np.pi * found.frequency
     lost = np.zeros(omega.size)
     if damping.air_damping > 0.0:
         lost += damping.air_damping * (shares / density[:, None]).sum(axis=0)
     if damping.loss_time > 0.0:
-        lost += damping.loss_time * stretch(found.components, found.ends, found.amplitudes).sum(axis=0)
+        lost += damping.loss_time * stretch_energy(found.components, found.ends, found.amplitudes).sum(axis=0)
     ratio = np.where(lost > 0.0, lost / (2.0 * np.where(omega > 0.0, omega, np.nan)), 0.0)
     return np.asarray(damping.modal_damping + ratio)

@@ -12,10 +12,16 @@ from sagline.core.arguments import brief, instance, optional
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
-from sagline.dynamics.trajectories.segments import Move, moves_of
+from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
 from sagline.dynamics.vibration.component_modes import cable_shapes
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, one_state
-from sagline.dynamics.vibration.robot_modes import cable_shares, loss, massless, modes_of, setting_of
+from sagline.dynamics.vibration.robot_modes import (
+    cable_shares,
+    damping_ratios,
+    massless_modes,
+    state_modes,
+    vibration_model,
+)
 from sagline.motion.path import Path
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
@@ -53,48 +59,31 @@ _INSTANTS: Final = 2000  # of a move, where its inertia is taken
 def most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
     """The frequencies that a path excites most: one, or two where the second is excited a third as much or more.
 
-    Args:
-        state: A single state.
-        frequency: Of its modes [Hz], shape (K,).
-        shape: Motions of the platform in them, of unit modal mass, one a column, shape (6, K).
-        path: A path from rest to rest; of several moves, the one that excites a mode most counts.
-
-    Returns:
-        Frequencies [Hz], shape (1,) or (2,), the most excited first.
-
-    Raises:
-        InvalidValueError: If no mode has a frequency, or the path is in motion at an end or does not move.
+    Shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz].
     """
-    moves = [move for move in moves_of(instance(path, Path, "path")) if move.curve is not None]
+    segments = [segment for segment in segments_of(instance(path, Path, "path")) if segment.curve is not None]
     known = np.flatnonzero(frequency > 0.0)
-    if not (moves and known.size):
-        item, value = ("path", "without motion") if not moves else ("modes", "without a frequency")
+    if not (segments and known.size):
+        item, value = ("path", "without motion") if not segments else ("modes", "without a frequency")
         raise InvalidValueError(item, value, "a motion, and modes that it can excite", "Take another path, or state.")
     if np.isnan(frequency).any():
         step = "Take another: its platform falls."
         raise InvalidValueError("modes", "of an unstable state", "of a stable one", step)
     frequency, shape = frequency[known], shape[:, known]
-    excited = np.max([excitation(state.one_robot, move, frequency, shape) for move in moves], axis=0)
+    excited = np.max([excitation(state.one_robot, segment, frequency, shape) for segment in segments], axis=0)
     order = np.argsort(-excited, kind="stable")[:2]
     return locked(frequency[order[excited[order] * _NEAR >= excited[order[0]]]])
 
 
-def excitation(robot: Robot, move: Move, frequency: Array, shape: Array) -> Array:
+def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape: Array) -> Array:
     """How much a move excites each mode, and the mode moves the platform.
 
-    Args:
-        robot: The robot.
-        move: From rest to rest.
-        frequency: Of the modes [Hz], shape (K,).
-        shape: Motions of the platform in them, of unit modal mass, one a column, shape (6, K).
-
-    Returns:
-        |phi . M d| |phi| |A(w)|/w of each, shape (K,).
+    Shapes: frequency (K,) [Hz]; shape (6, K); returns (K,).
     """
-    time = np.linspace(0.0, move.duration, _INSTANTS + 1)
-    assert move.curve is not None
-    motion = move.rates(time)
-    jet = move.curve.at(motion[0])
+    time = np.linspace(0.0, segment.duration, _INSTANTS + 1)
+    assert segment.curve is not None
+    motion = segment.rates(time)
+    jet = segment.curve.at(motion[0])
     twist, twist_rate, _ = jet.twists(motion)
     force = inertial_wrench(robot, jet.pose, twist, twist_rate) @ shape  # of each mode over time
     turning = 2.0 * np.pi * frequency
@@ -204,23 +193,23 @@ def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = Non
     one_state(state)
     limit = number(up_to, "up_to", "Hz", above=0.0)
     given = optional(damping, Damping, "damping") or Damping()
-    setting = setting_of(state)
-    slack = tuple(int(i) for i in np.flatnonzero(~setting.strings.taut[0]))
+    model = vibration_model(state)
+    slack = tuple(int(i) for i in np.flatnonzero(~model.strings.taut[0]))
     known: dict[str, Any] = {
         "state": state,
         "up_to": limit,
         "damping": given,
-        "massless_frequency": locked(np.full(len(setting.freedom), np.nan)),
+        "massless_frequency": locked(np.full(len(model.freedom), np.nan)),
         "slack_cables": slack,
     }
-    if np.isnan(setting.stiffness).any():
-        return _nothing(known | {"slack_cables": ()}, VibrationStatus.NO_LENGTHS, np.empty((6, 0)))
-    frequency, leaving = massless(setting, 0)
+    if np.isnan(model.stiffness).any():
+        return _without_modes(known | {"slack_cables": ()}, VibrationStatus.NO_LENGTHS, np.empty((6, 0)))
+    frequency, leaving = massless_modes(model, 0)
     known["massless_frequency"] = locked(frequency)
     if leaving.shape[1]:
-        return _nothing(known, VibrationStatus.UNSTABLE, leaving)
-    found = modes_of(setting, 0, limit)
-    shares = cable_shares(setting, 0, found)
+        return _without_modes(known, VibrationStatus.UNSTABLE, leaving)
+    found = state_modes(model, 0, limit)
+    shares = cable_shares(model, 0, found)
     return Vibration(
         **known,
         status=VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED,
@@ -229,13 +218,13 @@ def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = Non
         platform_share=locked(1.0 - shares.sum(axis=0)),
         cable_share=locked(shares),
         cable_shape=locked(cable_shapes(found.components, found.ends, found.amplitudes, POINTS)),
-        loss=locked(loss(state.one_robot.cables.linear_density, found, shares, given)),
+        loss=locked(damping_ratios(state.one_robot.cables.linear_density, found, shares, given)),
         count=found.number,
         negative_directions=locked(leaving),
     )
 
 
-def _nothing(known: dict[str, Any], status: VibrationStatus, leaving: Array) -> Vibration:
+def _without_modes(known: dict[str, Any], status: VibrationStatus, leaving: Array) -> Vibration:
     """The answer without modes."""
     cables = known["state"].cables.shape[-1]
     return Vibration(
