@@ -54,7 +54,7 @@ _ARRAYS = (
 
 @dataclass(frozen=True, slots=True)
 class CableModel:
-    """What a cable model is: a code and two parameters that the kernels understand.
+    """A cable model: a code and two parameters that the kernels understand.
 
     Attributes:
         code: Which equations the kernels use (`sagline.kernels.codes`).
@@ -211,7 +211,7 @@ class CableModel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CableState(Result):
-    """Where a cable's ends are, what it carries and how long it is: results of a cable model.
+    """Ends, forces and lengths of cables: results of a cable model.
 
     Every array has shape (...), one entry a cable. Forces act on the cable at its platform end. A batch is indexed
     along its first axis, by a number, a slice, or an array of numbers or booleans; slices share its memory.
@@ -303,7 +303,7 @@ class CableState(Result):
 
     @property
     def closure_residual(self) -> Array:
-        """By how much the state misses its own model's equations [m]."""
+        """Closure error of the state in its own model's equations [m]."""
         out = np.empty(self.unstrained_length.size)
         shape.closures(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)

@@ -1,1 +1,1 @@
-"""How the robot vibrates and moves: cables with mass, motion in time, paths that leave no vibration."""
+"""Vibration of robots whose cables have mass, motion in time, and trajectories without residual vibration."""

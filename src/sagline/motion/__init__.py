@@ -1,1 +1,1 @@
-"""Paths of the platform: where it is, how it moves, and when."""
+"""Paths of the platform: poses, velocities and accelerations over time."""

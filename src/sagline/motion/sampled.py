@@ -68,7 +68,7 @@ def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def _without_sign_changes(quaternion: Array) -> Array:
-    """The same rotations, each quaternion on the side of the one before (q and -q are one rotation)."""
+    """Continuous quaternions: each on the side of the one before (q and -q are one rotation)."""
     aligned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) >= 0.0
     sign = np.cumprod(np.concatenate(([1.0], np.where(aligned, 1.0, -1.0))))
     continuous: Array = quaternion * sign[:, None]

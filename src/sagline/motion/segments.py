@@ -123,7 +123,7 @@ class Segments:
 
     @property
     def moves(self) -> Flags:
-        """Whether each segment moves or turns, shape (S,)."""
+        """True for segments that move or turn, shape (S,)."""
         moves: Flags = np.linalg.norm(np.hstack((self.move, self.turn)), axis=1) > STILL
         return moves
 

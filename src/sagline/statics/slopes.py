@@ -29,7 +29,7 @@ _TINY = 1e-300
 
 
 class CableSlopes(NamedTuple):
-    """How every cable's force on its platform end changes, world axes.
+    """Derivatives of every cable's force on its platform end, world axes.
 
     Attributes:
         matrix: Derivative of the platform's unbalance by its motion, shape (..., 6, 6).
@@ -55,7 +55,7 @@ class CableSlopes(NamedTuple):
 
 
 def cable_slopes(state: Equilibrium) -> CableSlopes:
-    """How the cables' forces change with the platform's motion and with their own data."""
+    """Derivatives of the cables' forces by the platform's motion and by their own data."""
     shared, cables = first_of(state.robot), state.cables
     bodies, robots = body_table(state.robot), cable_table(state.robot)
     poses, lengths = pose_rows(state.pose), np.atleast_2d(kernel_length(state))
@@ -120,7 +120,7 @@ class TensionSlopes(NamedTuple):
 
 
 def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
-    """How the tensions at the frame ends change."""
+    """Derivatives of the tensions at the frame ends."""
     unit = np.eye(6)
     ends = unit[:, :3] + np.cross(unit[:, 3:], slopes.levers[..., None, :])
     forces = np.concatenate((ends @ np.swapaxes(slopes.blocks, -1, -2), slopes.by_length[..., None, :]), axis=-2)
@@ -133,7 +133,7 @@ def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
 
 
 def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array:
-    """Of cables that hang from their anchors, by the change of the force on each platform end, (..., m, 7, 3)."""
+    """Tension slopes of cables from anchors, by the change of the force on each platform end, (..., m, 7, 3)."""
     cables = state.cables
     at_frame, forces = slopes.force.copy(), forces.copy()
     at_frame[..., 2] -= cables.cable_weight
@@ -145,7 +145,7 @@ def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array
 
 
 def _leaving(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
-    """Of cables that leave pulleys, from H = T + T^2/(2 EA) - w z, which is one number from end to end.
+    """Tension slopes of cables from pulleys, by H = T + T^2/(2 EA) - w z, which is one number from end to end.
 
     Shapes: forces (..., m, 7, 3).
     """

@@ -85,7 +85,7 @@ class Modes(Result):
 
     @property
     def above_strings(self) -> Flags:
-        """Which modes lie above the lowest frequency at which any cable rings as a string, its ends held.
+        """True for modes above the lowest frequency at which any cable rings as a string, its ends held.
 
         Above it the platform's modes are no approximation to those of the robot, whose cables take part in them: see
         `vibration`. False for a motion that is not held, shape (..., n).

@@ -38,7 +38,7 @@ class Strings(NamedTuple):
 
 
 def strings_of(state: Equilibrium) -> Strings:
-    """What the cables of an equilibrium are as strings."""
+    """Data of the cables of an equilibrium as strings."""
     cables = state.cables
     m = cables.shape[-1]
     material = cables_of(state.robot)
@@ -67,7 +67,7 @@ def strings_of(state: Equilibrium) -> Strings:
 
 
 def strings_below(strings: Strings, frequency: Array) -> Indices:
-    """How many natural frequencies the cables have with both ends held, by the count of Wittrick and Williams.
+    """Number of natural frequencies of the cables with both ends held, by the count of Wittrick and Williams.
 
     Shapes: frequency (N, F) [Hz]; returns (N, F, m).
     """
@@ -111,7 +111,7 @@ def _axes(state: Equilibrium) -> Array:
 
 
 def taut_of(table: Array) -> Flags:
-    """Whether cables have linear vibrations: neither folded nor slack.
+    """True for cables that have linear vibrations: neither folded nor slack.
 
     Shapes: table (N, m, STRING_COLUMNS); returns (N, m).
     """

@@ -1,4 +1,4 @@
-"""How far a pose is from failing: in tension, and in load."""
+"""Margins of a pose: tension limits, and extra load."""
 
 from __future__ import annotations
 

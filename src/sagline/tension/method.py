@@ -1,4 +1,4 @@
-"""What every method of sharing the load has in common."""
+"""Interface of all tension distribution methods."""
 
 from __future__ import annotations
 

@@ -236,7 +236,7 @@ class ImprovedClosedForm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class Puncture(TensionMethod):
-    """Where the way from the minimum-norm solution to the (improved) closed form enters the limits.
+    """Entry into the limits on the line from the minimum-norm solution to the (improved) closed form.
 
     Low tensions at the price of a closed form; covers what `ImprovedClosedForm` covers. Choose it for low tensions on
     hardware that can afford no polygon.
@@ -281,7 +281,7 @@ class PolygonWalk(TensionMethod):
 
     @property
     def parameter(self) -> float:
-        """Which optimum."""
+        """Code of the optimum."""
         return _OPTIMA[self.optimum]
 
 

@@ -52,7 +52,7 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """Whether a method shares nearest to a reference in a linear variable: what is compiled first."""
+    """True if a method is nearest to a reference in a linear variable: compiled first."""
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 

@@ -13,7 +13,7 @@ from sagline.core.results import Result
 
 
 class Side(NamedTuple):
-    """Which limit a side of the polygon is.
+    """Limit that is a side of the polygon.
 
     Attributes:
         cable: Index of the cable.
@@ -56,7 +56,7 @@ class TensionPolygon(Result):
     offset: Array
 
     def coordinates(self, chord_tension: ArrayLike) -> Array:
-        """Where tensions of this pose lie in the polygon.
+        """Coordinates of tensions of this pose in the polygon.
 
         Args:
             chord_tension: Chord tensions that balance the pose [N], shape (..., m), as `Plan.chord_tension` has them.

@@ -103,7 +103,7 @@ STRETCH: Final = 1.1  # of the longest length that is asked for: room for winche
 
 
 class ChainRecords(Records):
-    """What the kernel writes down of N steps, the cables' shapes with it."""
+    """Records of N steps from the kernel, with the shapes of the cables."""
 
     def __init__(self, count: int, cables: int, points: int) -> None:
         """Room for so many steps."""
@@ -233,7 +233,7 @@ class ChainPlant(Plant):
 
 
 def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Damping, data: Array) -> Array:
-    """What chains at rest are, (m, CHAIN_COLUMNS)."""
+    """Data of chains at rest, (m, CHAIN_COLUMNS)."""
     state, material = given.state, given.robot.cables
     table = np.zeros((given.robot.cable_count, c.CHAIN_COLUMNS))
     table[:, c.EXIT_X : c.EXIT_Z + 1] = place[:, :, -1]

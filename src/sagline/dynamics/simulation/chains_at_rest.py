@@ -152,7 +152,7 @@ def _solve_chains(chains: LumpedCables, chord: Array, force: Array) -> Array:
 
 
 def _size(levers: Array) -> float:
-    """What makes an angle a length [m]: the longest lever, 1 where all cables meet in the center of mass."""
+    """Reference length [m] for rotations: the longest lever, 1 where all cables meet in the center of mass."""
     longest = float(np.linalg.norm(levers, axis=1).max())
     return longest if longest > 0.0 else 1.0
 

@@ -94,7 +94,7 @@ class TimeTable:
         return value, slope + (1.0 - 2.0 * x) * bend - x * (1.0 - x) * (begin + end)
 
     def with_instant(self, time: float) -> TimeTable:
-        """The same course with one more instant."""
+        """Time table with one more instant."""
         if time in self.time:
             return self
         k = int(np.searchsorted(self.time, time))
@@ -183,7 +183,7 @@ class InitialConditions:
 
 
 def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> InitialConditions:
-    """What `simulate` is given, checked.
+    """Checked initial conditions and inputs of `simulate`.
 
     Units: duration [s].
     """

@@ -31,7 +31,7 @@ SMALL: Final = 0.02  # of its length: what a cable may be let out
 
 
 class ModalModel(NamedTuple):
-    """How the modes of a state answer to lengths and to the wrench, both as changes u = (dL, dw), (m + 6,).
+    """Response of the modes of a state to changes u = (dL, dw) of lengths and wrench, (m + 6,).
 
     Attributes:
         found: The modes.
@@ -58,7 +58,7 @@ class ModalMotion(NamedTuple):
 
 
 def modal_model(state: Equilibrium, damping: Damping) -> ModalModel:
-    """How the modes of a state answer.
+    """Modal model of a state.
 
     Source:
         docs/model.md, section 11.

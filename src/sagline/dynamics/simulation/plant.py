@@ -30,7 +30,7 @@ NOTES: Final = 1000  # of what begins by itself, between two events
 
 
 class Records:
-    """What the kernel writes down of N steps.
+    """Records of N steps from the kernel.
 
     Attributes:
         states: Center of mass, quaternion of the principal axes, velocity, angular velocity, (N, 13).
@@ -119,7 +119,7 @@ class Plant:
     def arguments(
         self, rules: tuple[int, int, int, int, int], numbers: tuple[float, float, float, float], inputs: Any
     ) -> Any:
-        """What the kernel takes but for records and counts of steps; valid until a cable breaks or the mass changes."""
+        """Arguments of the kernel before records and step counts; valid until a cable breaks or the mass changes."""
         lengths, wrenches, winds = inputs
         wide = lengths.value.shape[1]
         needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
@@ -212,7 +212,7 @@ def principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
-    """What is said of a run whose energy has come or gone by itself.
+    """Error for a run whose energy grows or fades by itself.
 
     Units: step [s]; time [s].
     """

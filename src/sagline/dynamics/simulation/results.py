@@ -123,7 +123,7 @@ KINDS = {Break: "break", Stall: "stall", Brake: "brake", Drop: "drop", PickUp: "
 
 
 def event_cable(event: Event) -> int | None:
-    """Which cable or winch an event is of; None for the platform's, and for that of all winches."""
+    """Index of the cable or winch of an event; None for the platform's, and for that of all winches."""
     return event.cable if isinstance(event, Break) else getattr(event, "winch", None)
 
 
@@ -182,7 +182,7 @@ def _check_order(events: list[Event], robot: Robot) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EnergyBalance(Result):
-    """Where the energy of a simulation is [J]; each of shape (N,).
+    """Energy balance of a simulation [J]; each of shape (N,).
 
     Attributes:
         kinetic: Of platform, cables and drums.

@@ -63,7 +63,7 @@ class Run:
 
     @property
     def step(self) -> float:
-        """Of the integrator [s]."""
+        """Time step of the integrator [s]."""
         return self._numbers[0]
 
     def _time(self, step: int) -> float:
@@ -163,7 +163,7 @@ class Run:
             plant.with_mass(plant.inertia[0] + event.mass, at_rest=True)
 
     def _finish_event(self) -> None:
-        """Say of the last event how large tensions became after it; keep the largest of all."""
+        """Store the largest tension after the last event, and the largest of all."""
         np.maximum.at(self._largest, self.plant.cables, self.plant.now[d.PEAK])
         if self._marks:
             last = self._marks[-1]
@@ -217,5 +217,5 @@ class Run:
 
 
 def _energy(here: Records) -> float:
-    """Of the first record [J]."""
+    """Kinetic and potential energy of the first record [J]."""
     return float(here.energies[0, k.KINETIC] + here.energies[0, k.POTENTIAL])

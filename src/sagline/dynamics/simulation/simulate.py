@@ -177,7 +177,7 @@ def started_run(
 
 
 def set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
-    """What the drives are to follow: lengths; of drums lengths along the path of winding, and tensions."""
+    """Set points of the drives: lengths; of drums lengths along the path of winding, and tensions."""
     if kind != d.DRUMS:
         return given.lengths
     stretch, table = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
@@ -244,7 +244,7 @@ def time_step(
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:
-    """How much faster the platform may swing after loads are dropped."""
+    """Largest factor on the platform's frequency after loads are dropped."""
     least = now = mass
     for event in events:
         now += event.mass if isinstance(event, PickUp) else -event.mass if isinstance(event, Drop) else 0.0
@@ -268,7 +268,7 @@ def _every(record: Any, step: float) -> int:
 
 
 def _count(given: InitialConditions, step: float) -> int:
-    """How many steps there are."""
+    """Number of steps."""
     count = np.ceil((given.end - given.begin) / step - 1e-9)
     if not count <= MOST_STEPS:
         longest, advice = f"<= {MOST_STEPS * step:g} s, {MOST_STEPS:.0e} steps", "Simulate a shorter time."

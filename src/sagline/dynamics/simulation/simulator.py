@@ -49,7 +49,7 @@ MOST_SEED: Final = 2**128
 
 
 class Reading(NamedTuple):
-    """What sensors read, and what is true; the arrays are read-only, and the simulator's next step fills them anew.
+    """Sensor readings and true values; the arrays are read-only, and the simulator's next step fills them anew.
 
     Attributes:
         counts: Of the encoders, whole numbers as floats, shape (m,); None where data are missing that counts need.
@@ -180,12 +180,12 @@ class Simulator:
 
     @property
     def time(self) -> float:
-        """Since the start [s]."""
+        """Time since the start [s]."""
         return self._counters[k.STEPS] * self._step
 
     @property
     def reading(self) -> Reading:
-        """What was read last."""
+        """Last reading."""
         return self._reading
 
     def step(
@@ -234,7 +234,7 @@ class Simulator:
         copy_in(self._expected, tension, "tension", "N")
 
     def _refuse(self, with_tension: bool) -> NoReturn:
-        """Say what of what was asked for cannot be."""
+        """Raise the error of the first inadmissible set point."""
         lengths, tension, wrench = self._given
         checked(lengths, "unstrained_length", "m", above=0.0)
         check_lengths(self._plant.robot, TimeTable.constant(lengths))
@@ -244,7 +244,7 @@ class Simulator:
         raise AssertionError("a period that could not begin")
 
     def _count(self, dt: float) -> int:
-        """How many steps a period has."""
+        """Number of steps in a period."""
         period = dt if type(dt) is float and 0.0 < dt < MOST_STEPS else number(dt, "dt", "s", above=0.0)
         parts = period / self._step
         count = round(min(parts, 2.0 * MOST_STEPS))
@@ -349,7 +349,7 @@ class Simulator:
 
 
 def _at_rest(robot: Robot, start: Any) -> Equilibrium:
-    """Where a robot is at the start."""
+    """Equilibrium of the robot at the start."""
     if isinstance(start, Pose):
         return inverse(robot, start).state
     state = instance(start, Equilibrium, "start")

@@ -135,7 +135,7 @@ class Encoders:
 
     @staticmethod
     def are_on(robot: Robot) -> bool:
-        """Whether a robot's winches and cables have all that counts need."""
+        """True if a robot's winches and cables have all data that counts need."""
         winch = robot.winches
         known = winch is not None and all(getattr(winch, name) is not None for name in COUNTED)
         return known and robot.cables.diameter is not None

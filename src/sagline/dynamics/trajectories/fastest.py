@@ -46,7 +46,7 @@ class _TimedSegment:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration [s]."""
         return self.motion.duration * self.slower
 
     def at(self, time: Array) -> tuple[Pose, Array]:
@@ -201,7 +201,7 @@ def _has_speed_limits(robot: Robot) -> bool:
 
 
 def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
-    """What the speed limits of winches leave of the squared speed, from how fast the chords change."""
+    """Bounds on the squared speed by the speed limits of winches, from the rates of the chords."""
     if not _has_speed_limits(robot):
         return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
     fastest_cable = _fastest_rates(robot, rest.unstrained_length)
@@ -229,7 +229,7 @@ def _fastest_rates(robot: Robot, length: Array) -> Array:
 
 
 def _speed_excess(plan: Plan) -> float:
-    """How much too fast the winches are somewhere: 1 where they are not."""
+    """Largest ratio of a winch's speed to its limit, at least 1."""
     assert plan.length_rate is not None
     limits = _fastest_rates(plan.state.one_robot, plan.unstrained_length)
     ratio = float(np.nanmax(np.abs(plan.length_rate) / limits))

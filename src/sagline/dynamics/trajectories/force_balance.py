@@ -23,7 +23,7 @@ _WIDER: Final = (1.0, 0.03)  # N: limits that a pose on their border is solved w
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HalfPlanes:
-    """What holds at K places: rates @ (acceleration, square of the speed) <= bound, row by row.
+    """Half planes at K places: rates @ (acceleration, square of the speed) <= bound, row by row.
 
     Attributes:
         rates: Shape (K, R, 2).
@@ -34,7 +34,7 @@ class HalfPlanes:
     bound: Array
 
     def joined(self, other: HalfPlanes) -> HalfPlanes:
-        """What holds of both."""
+        """Half planes of both."""
         return HalfPlanes(np.hstack((self.rates, other.rates)), np.hstack((self.bound, other.bound)))
 
 
@@ -75,7 +75,7 @@ class ForceBalance:
         return new.at_poses(jet).with_sag_of(plan, np.zeros((len(jet.pose), 2)))
 
     def at_poses(self, jet: Jet) -> ForceBalance:
-        """The same balance, with the same pulls, at places near by."""
+        """Force balance at neighboring poses, with the same sag forces."""
         robot, (first, second, _) = self.robot, jet.rates
         by_rate = inertial_wrench(robot, jet.pose, np.zeros_like(first), first)
         by_speed = inertial_wrench(robot, jet.pose, first, second)
@@ -93,7 +93,7 @@ class ForceBalance:
         return total
 
     def with_sag_of(self, plan: Plan, motion: Array) -> ForceBalance:
-        """The same with the pulls of a plan for motions of shape (K, 2); poses without an answer keep theirs."""
+        """Force balance with the sag forces of a plan for motions (K, 2); infeasible poses keep theirs."""
         assert plan.needed is not None
         found, freedom = plan.feasible[:, None], self.robot.freedom.T
         # a limit at the frame end is one of the chord tension that differs from it as it does here
@@ -107,7 +107,7 @@ class ForceBalance:
         )
 
     def near_motion(self, motion: Array) -> ForceBalance:
-        """The same with the pulls that cables have in motions of shape (K, 2), on the border perhaps, or a little off.
+        """Force balance with the sag forces at motions (K, 2), on the border of the limits or a little outside.
 
         On the border itself tensions are all but fixed, but rounding may leave none: they are those within limits a
         little wider, the narrowest that have an answer.
@@ -168,7 +168,7 @@ class Profile:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration [s]."""
         return float(self.time[-1])
 
     @property

@@ -65,7 +65,7 @@ class LineCurve:
 
     @property
     def moves(self) -> bool:
-        """Whether it leads anywhere."""
+        """True if the line has a length or a rotation."""
         return bool(self.ends.moves[0])
 
     @property
@@ -225,7 +225,7 @@ class RestToRestSegment:
 
     @property
     def duration(self) -> float:
-        """How long it takes [s]."""
+        """Duration [s]."""
         return self.end - self.begin
 
     def rates(self, time: Array) -> Array:

@@ -70,7 +70,7 @@ class Shaper(Result):
 
     @property
     def duration(self) -> float:
-        """How much later a shaped motion ends [s]."""
+        """Delay of the end of a shaped motion [s]."""
         return float(self.time[-1])
 
     def __mul__(self, other: Shaper) -> Shaper:
@@ -319,7 +319,7 @@ def shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) ->
 
 
 def _held(path: Path, segment: RestToRestSegment) -> Pose:
-    """Where the platform is at the first sample of a move."""
+    """Pose of the platform at the first sample of a segment."""
     return path.pose[segment.sample]
 
 

@@ -113,7 +113,7 @@ class Mesh(NamedTuple):
 
     @property
     def density(self) -> Array:
-        """Of the cables [kg/m], shape (t,)."""
+        """Linear density of the cables [kg/m], shape (t,)."""
         return np.asarray(self.table[:, columns.DENSITY])
 
 
@@ -167,7 +167,7 @@ def component_modes(strings: Strings, row: int, up_to: float) -> Components:
 
 
 def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> Motions:
-    """Of the unknowns from the first that moves to the last that does in any cable."""
+    """Fixed-end modes in one plane, of the unknowns that move in any cable."""
     last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
     square, own = np.linalg.eigh(matrix[:, first:last, first:last])
     shape = np.zeros((*matrix.shape[:2], last - first))

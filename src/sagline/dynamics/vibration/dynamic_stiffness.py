@@ -21,7 +21,7 @@ from sagline.statics.strings import Strings, strings_of
 
 @dataclass(frozen=True, slots=True)
 class Damping:
-    """What takes energy out of a vibration; none unless told otherwise.
+    """Damping of a vibration; none by default.
 
     Attributes:
         loss_time: Eta of the cables' stretch [s], >= 0: at the angular frequency omega EA becomes EA (1 + i omega eta)
@@ -125,7 +125,7 @@ def check_model(state: Equilibrium) -> None:
 
 
 def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
-    """What is added to the stiffness at rest of the cables of one state.
+    """Dynamic stiffness of the cables of one state, less their stiffness at rest.
 
     Shapes: frequency (F,) [Hz]; returns (F, m, 3, 3) [N/m].
     """
@@ -191,5 +191,5 @@ def waves_of(frequency: Array, damping: Damping | None) -> Complex:
 
 
 def _loss(damping: Damping | None) -> complex:
-    """What the modal damping makes of all stiffness."""
+    """Complex factor of all stiffness by the modal damping."""
     return 1.0 if damping is None else 1.0 + 2j * damping.modal_damping

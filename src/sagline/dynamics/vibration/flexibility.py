@@ -65,12 +65,12 @@ class _CatenaryState(NamedTuple):
 
     @property
     def smooth(self) -> Flags:
-        """Whether the force hardly changes along the cable."""
+        """True where the force hardly changes along the cable."""
         return self.weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
 
 
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
-    """How the flexibility of hanging cables changes, from where they leave the frame to their platform ends.
+    """Derivatives of the flexibility of hanging cables, from where they leave the frame to their platform ends.
 
     Shapes: force (..., m, 3) [N].
     """

@@ -150,7 +150,7 @@ class _Row(NamedTuple):
 
 
 def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
-    """And the lowest frequency on massless cables [Hz]."""
+    """Status of a pose, and the lowest frequency on massless cables [Hz]."""
     if np.isnan(model.stiffness[row]).any():
         return VibrationStatus.NO_LENGTHS, np.nan
     frequency, leaving = massless_modes(model, row)

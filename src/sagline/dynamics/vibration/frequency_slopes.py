@@ -69,7 +69,7 @@ class FrequencySlopes(Result):
 
 
 def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> FrequencySlopes:
-    """How every natural frequency follows what the robot is made of and how it is held; all analytic.
+    """Sensitivities of every natural frequency to the robot's data, its pose and the wrench; all analytic.
 
     Args:
         state: An equilibrium, a single one, for the massless frequencies, those of `modes`; or a vibration, for those

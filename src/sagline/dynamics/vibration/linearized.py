@@ -68,7 +68,7 @@ class Linearized(Result):
         return locked(np.linalg.eigvals(self.A).astype(complex))
 
     def state_space(self) -> StateSpace:
-        """The same as SciPy's, for its simulations, responses and controller design.
+        """The system as SciPy's, for its simulations, responses and controller design.
 
         Returns:
             A `scipy.signal.StateSpace`.
@@ -88,7 +88,7 @@ class _Matrices(NamedTuple):
 
 
 class _Loss(NamedTuple):
-    """What a loss of the cables' stretch adds.
+    """Terms of a loss in the cables' stretch.
 
     Attributes:
         by_motion: Wrench of the cables against a velocity of the platform, shape (6, 6).
@@ -231,7 +231,7 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
 
 
 def _loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> _Loss:
-    """What a loss of the stretch does, to first order: K(omega) = K + i omega eta K S K, S the part that is stretch."""
+    """Loss of the stretch to first order: K(omega) = K + i omega eta K S K, S the part that is stretch."""
     m = state.one_robot.cable_count
     if not loss_time:
         return _Loss(np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m))

@@ -120,12 +120,12 @@ class ListedMode(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What it is asked for by: "1", "massless 1"."""
+        """Name for selection: "1", "massless 1"."""
         return f"{self.number}" if self.kind == WITH_MASS else f"{MASSLESS} {self.number}"
 
     @property
     def swings(self) -> str:
-        """What has the largest part in it, in words."""
+        """Part with the largest share of the kinetic energy, in words."""
         if self.cable is None or self.platform_share >= self.cable_share:
             return "platform"
         return f"cable {self.cable}"

@@ -71,7 +71,7 @@ class SquareDerivatives(NamedTuple):
 
 
 def state_slopes(state: Equilibrium) -> StateSlopes:
-    """What is needed of a state."""
+    """Slopes, compliance and mass of a state."""
     slopes, known = cable_slopes(state), stiffness(state)
     return StateSlopes(
         state,
@@ -84,7 +84,7 @@ def state_slopes(state: Equilibrium) -> StateSlopes:
 
 
 def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivatives:
-    """How the square of a frequency follows everything, the platform settling in its new equilibrium."""
+    """Derivatives of the square of a frequency, the platform settling in its new equilibrium."""
     robot, pose = rest.state.one_robot, _by_pose(rest, swings)
     turns = rest.state.pose.matrix.T @ swings.motion[3:]
     spins = np.einsum("ia,jb->ijab", turns, turns)
@@ -123,7 +123,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
 
 
 def lever_form(turns: Array, levers: Array, force: Array) -> Array:
-    """What forces on levers resist to rotations: r T^T - r.T, in its symmetric part.
+    """Geometric stiffness of forces on levers against rotations: r T^T - r.T, in its symmetric part.
 
     Shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g).
     """
@@ -156,7 +156,7 @@ class Cable(NamedTuple):
 
 
 class Waves(NamedTuple):
-    """What a cable does for each component of the force on its frame end, at points along it.
+    """Displacement and force along a cable for each component of the force on its frame end.
 
     Attributes:
         force: In the cable at rest, shape (P, 3) [N].
@@ -210,7 +210,7 @@ def mode_group(rest: StateSlopes, cables: tuple[Cable, ...], frequency: Array) -
 
 
 def _correction(rest: StateSlopes, cables: tuple[Cable, ...], omega: float, group: int) -> float:
-    """By what share of it a frequency is off: where the equations have so many solutions, to first order."""
+    """Relative error of a frequency, to first order, by the singular values of the equations."""
     matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
     near = omega * (1.0 + CLOSE)
     other, _ = _equations(rest, [_waves(cable, near) for cable in cables], near, scale)
@@ -241,7 +241,7 @@ def _equations(rest: StateSlopes, waves: list[Waves], omega: float, scale: Array
 
 
 def _waves(cable: Cable, omega: float) -> Waves:
-    """What the cable does for unit forces on its frame end, by collocation at Gauss points of its elements."""
+    """Waves of a cable for unit forces on its frame end, by collocation at Gauss points of its elements."""
     edges = _edges(cable, omega)
     size = np.diff(edges)
     place = edges[:-1, None] + size[:, None] * NODES  # (e, STAGES)

@@ -32,7 +32,7 @@ class FixedEndModes(NamedTuple):
 
 
 class Receptance(NamedTuple):
-    """What oscillating wrenches meet.
+    """Receptance of the platform.
 
     Attributes:
         setting: Of one state, with a leading axis 1.
@@ -47,7 +47,7 @@ class Receptance(NamedTuple):
     damping: Damping
 
     def fixed_end_modes(self, up_to: float) -> FixedEndModes:
-        """What the cables do by themselves.
+        """Fixed-end modes of the cables.
 
         Units: up_to [Hz].
         """
@@ -87,7 +87,7 @@ class Receptance(NamedTuple):
             return np.asarray(freedom.T @ np.linalg.inv(freedom @ whole @ freedom.T) @ freedom)
 
     def _moving(self, components: Components, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
-        """What vibrating cables add to their stiffness, with their mass and without, (F, m, 3, 3) each."""
+        """Stiffness that vibrating cables add, with their mass and without, (F, m, 3, 3) each."""
         mesh, model = components.mesh, self.model
         density = mesh.density[:, None, None]
         square = omega**2 - 1j * omega * self.damping.air_damping / density[:, 0]  # (t, F)
@@ -113,7 +113,7 @@ def _in_world(own: Complex, axes: Array) -> Complex:
 
 
 def _driven_stiffness(motions: Motions, square: Complex, loss: complex) -> Complex:
-    """What the motions add to the stiffness of the end that drives them, undamped but for all alike, (t, F, d, d)."""
+    """Stiffness that fixed-end modes add to the platform end, undamped or all damped alike, (t, F, d, d)."""
     with np.errstate(all="ignore"):
         shares = square[..., None] ** 2 / (loss * motions.square[:, None] - square[..., None])
     return np.asarray(-np.einsum("tka,tfk,tkb->tfab", motions.drive, shares, motions.drive, optimize=True))
@@ -122,7 +122,7 @@ def _driven_stiffness(motions: Motions, square: Complex, loss: complex) -> Compl
 def _driven_stiffness_with_loss(
     motions: Motions, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
-    """The same with what is lost in stretch, by motions and end (t, d + k, d + k); and what is lost at rest alone."""
+    """The same with the loss in stretch, by modes and end (t, d + k, d + k), and the loss at rest alone."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
     alone = loss * motions.square[:, None] - square[..., None]

@@ -26,7 +26,7 @@ _TINY = 1e-300
 
 
 class VibrationModel(NamedTuple):
-    """What N states are, for their vibrations.
+    """Stiffness, mass and cables of N states, for their vibrations.
 
     Attributes:
         strings: Their cables.
@@ -83,7 +83,7 @@ class ReducedModel(NamedTuple):
 
 
 def vibration_model(state: Equilibrium) -> VibrationModel:
-    """What is needed of an equilibrium."""
+    """Vibration model of one or N equilibria; arrays have a leading axis in either case."""
     slopes = cable_slopes(state)
     matrix = slopes.matrix.reshape(-1, 6, 6)
     levers = slopes.levers.reshape(len(matrix), -1, 3)
@@ -219,12 +219,12 @@ class StateModes:
 
     @property
     def components(self) -> Components:
-        """Of the cables."""
+        """Fixed-end modes of the cables."""
         return self.problem.components
 
     @cached_property
     def amplitudes(self) -> Array:
-        """Of the cables' components beside their motion at rest, shape (T, K)."""
+        """Amplitudes of the fixed-end modes beside their motion at rest, shape (T, K)."""
         return self.problem.amplitudes(self.vectors)
 
 

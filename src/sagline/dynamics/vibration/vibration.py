@@ -30,7 +30,7 @@ from sagline.statics.stiffness import Modes
 
 
 class VibrationStatus(IntEnum):
-    """Whether a state has linear vibrations."""
+    """Status of a vibration: the kind of equilibrium and of its cables."""
 
     SOLVED = 0
     UNSTABLE = 1
@@ -39,7 +39,7 @@ class VibrationStatus(IntEnum):
 
     @property
     def text(self) -> str:
-        """What it means, and what to do."""
+        """Meaning, and the next step."""
         return _TEXTS[self]
 
 
@@ -76,7 +76,7 @@ def most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path)
 
 
 def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape: Array) -> Array:
-    """How much a move excites each mode, and the mode moves the platform.
+    """Excitation of each mode by a segment, times the platform's motion in the mode.
 
     Shapes: frequency (K,) [Hz]; shape (6, K); returns (K,).
     """
@@ -135,7 +135,7 @@ class Vibration(Result):
 
     @property
     def complete(self) -> bool:
-        """Whether none is missing: as many modes as the exact count has."""
+        """True if no mode is missing: as many modes as the exact count has."""
         return self.status is VibrationStatus.SOLVED and self.count == self.frequency.size
 
     def to_shape(self, path: Path) -> Array:
