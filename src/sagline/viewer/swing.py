@@ -11,11 +11,17 @@ from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.dynamics.simulation.chain_plant import wave_frequency
-from sagline.dynamics.simulation.initial_conditions import beginning
+from sagline.dynamics.simulation.initial_conditions import initial_conditions
 from sagline.dynamics.simulation.results import Break, Simulation
-from sagline.dynamics.simulation.simulate import run_of
+from sagline.dynamics.simulation.simulate import started_run
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.dynamics.vibration.mode_list import WITH_MASS, ListedMode, end_motions, following, listed_modes
+from sagline.dynamics.vibration.mode_list import (
+    WITH_MASS,
+    ListedMode,
+    end_displacements,
+    listed_modes,
+    quasi_static_displacements,
+)
 from sagline.dynamics.vibration.vibration import Vibration, vibration
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
@@ -36,12 +42,12 @@ def vibrating(state: Equilibrium, up_to: float) -> Vibration:
 
 def cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Simulation]:
     """Simulation of the break of a cable, the other lengths kept; each part is longer and begins as the one before."""
-    given = beginning(state, None, None, DURATION)
+    given = initial_conditions(state, None, None, DURATION)
     elements = NODES if cable_mass == "lumped" else 0
     losses = LOSSES
     if elements:  # waves in stiff cables are not to take smaller steps for their losses than for themselves
         losses = Damping(loss_time=min(LOSSES.loss_time, 2.0 / wave_frequency(given, elements)))
-    run = run_of(given, elements, events=(Break(cable=cable, time=0.0),), damping=losses)
+    run = started_run(given, elements, events=(Break(cable=cable, time=0.0),), damping=losses)
     for part in PARTS:
         yield run.until(part)
 
@@ -80,7 +86,7 @@ class Swing:
             shape, cables = vibration.shape[:, k], lines.resampled(vibration.cable_shape[k], lines.POINTS)
         else:
             shape = modes(state).shape[:, k]
-            cables = following(state, end_motions(state, shape[:, None])[..., 0], lines.POINTS)
+            cables = quasi_static_displacements(state, end_displacements(state, shape[:, None])[..., 0], lines.POINTS)
         wraps, free = _at_rest(state)
         farthest = max(float(np.linalg.norm(cables, axis=-1).max()), float(np.linalg.norm(shape[:3])))
         scale = DRAWN * solids.size_of(state.one_robot) / farthest
