@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.evidence import Cycle
-from sagline.control.fault import Reaction
+from sagline.control.evidence import Cycle, Reaction
 from sagline.control.faults import FAULT_TABLE, FAULTS, faults_of
 from sagline.control.link import GroupFault, GroupStatus, Mode, Sample, WinchState
 from sagline.core.arrays import Array

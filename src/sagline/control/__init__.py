@@ -2,7 +2,7 @@
 
 from sagline.control.checks import Motion
 from sagline.control.controller import Controller
-from sagline.control.evidence import Cycle
+from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import (
     Execution,
     ExecutionStatus,
@@ -11,7 +11,6 @@ from sagline.control.execution import (
     planned_position,
     position_error,
 )
-from sagline.control.fault import Fault, Reaction
 from sagline.control.faults import FAULT_TABLE, FaultRow, faults_of
 from sagline.control.link import Command, Link, Missing, Mode, Sample
 from sagline.control.null_space import Gains, NullSpace, gains_along, null_space, parity

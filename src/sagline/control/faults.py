@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
-from sagline.control.evidence import Evidence
-from sagline.control.fault import Fault
-from sagline.control.faults_cells import CellDead, CellOff, CellStuck
+from sagline.control.evidence import Evidence, Fault
+from sagline.control.faults_cables import CableBroken, CellDead, CellOff, CellStuck, OverTension, Slack
 from sagline.control.faults_drives import CorrectionAtLimit, EncoderJump, FollowingError, NotFollowing, ServoSaturated
 from sagline.control.faults_link import (
     BlockDiscarded,
@@ -19,7 +18,6 @@ from sagline.control.faults_link import (
     OwnerLost,
     RecordingStopped,
 )
-from sagline.control.faults_tension import CableBroken, OverTension, Slack
 from sagline.control.link import PERIOD
 from sagline.control.null_space import cell_errors
 from sagline.control.tension_loop import TensionSettings

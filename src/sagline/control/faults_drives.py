@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from sagline.control.connecting import BEHIND
-from sagline.control.evidence import Cycle, Evidence
+from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
 from sagline.control.extrema import finite, largest
-from sagline.control.fault import Fault, Reaction
 from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
 from sagline.core.arrays import Array
 

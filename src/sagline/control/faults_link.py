@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.control.evidence import Cycle, Evidence
-from sagline.control.fault import Fault, Reaction
+from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
 from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState, fault_text
 from sagline.core.arrays import Flags
 

@@ -16,9 +16,8 @@ from sagline.cables.models import Catenary
 from sagline.control.checks import Motion
 from sagline.control.connecting import FRESH, Claim, Trouble, trouble
 from sagline.control.estimator import Estimator
-from sagline.control.evidence import Cycle
+from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
-from sagline.control.fault import Fault, Reaction
 from sagline.control.faults import faults_of
 from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog
