@@ -33,7 +33,7 @@ class Timed(Spy):
 def cycles() -> Iterator[Row]:
     """Home and the ten poses without standing, cycle by cycle: what of each is the controller's."""
     control, machine = rig(imperfect(zero=2e-3))
-    link = control._link = Timed(machine.link())
+    link = control._context.link = Timed(machine.link())
     path = sl.quintic_path([HOME.position, *table2().desired], speed=0.2)
     begin = time.perf_counter()
     motion = control.plan(path)

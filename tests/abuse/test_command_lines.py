@@ -18,7 +18,7 @@ from typer.testing import CliRunner, Result
 import sagline as sl
 from sagline.cli.examples import example_files
 from sagline.cli.main import app
-from sagline.plc.addresses import addresses_of, groups_at
+from sagline.plc.wire import addresses_of, groups_at
 from sagline.present.page import Chapter
 from tests.abuse.command_lines import LINES, Case, cases, commands
 from tests.effort import least_seconds

@@ -112,7 +112,7 @@ BEGINNINGS: list[Callable[[Controller], object]] = [
 def test_nothing_moves_while_a_group_does_not_agree(begin: Callable[[Controller], object]) -> None:
     control, _ = rig()
     assert control.sample is not None
-    control.sample = control.sample._replace(age=np.array([0.01, 0.01, 0.05, 0.01]))
+    control._context.sample = control.sample._replace(age=np.array([0.01, 0.01, 0.05, 0.01]))
     with pytest.raises(RefusedError, match=r"group 2: .*0\.05 s"):
         begin(control)
     assert state_of(control) is State.IDLE

@@ -61,7 +61,7 @@ def test_a_jog_ends_where_tensions_are_no_numbers_or_old(change: Any, ruled: boo
     assert moves(control)
     changed(control, change)
     if not ruled:  # whatever the rules for faults say
-        control._faults, control._degrading = (), []
+        control._context.faults, control._context.degrading = (), []
     for _ in range(2):
         control.cycle()
     assert not moves(control)
@@ -108,6 +108,6 @@ def test_cells_are_as_good_as_the_robot_says() -> None:
     assert (deviation.tolist(), bias.tolist()) == ([3.0] * 8, [4.0] * 8)
     assert Homing(noisy, HOME, sl.Catenary(), sl.Closest()).sigma == pytest.approx(5.0, rel=1e-12)
     link: Any = sl.twin.Machine(noisy, start=HOME, seed=1).link()
-    seen = Controller(noisy, link, seed=2)._faults[0].seen
+    seen = Controller(noisy, link, seed=2)._context.faults[0].seen
     assert seen.noise == 3.0
     assert seen.sigma == pytest.approx(5.0, rel=1e-12)

@@ -75,9 +75,9 @@ def link_that_bursts(control: Any, once: bool) -> None:
 
 
 BURSTS: list[tuple[Any, bool]] = [
-    (lambda control: setattr(control._estimator._solver, "step_into", burst), True),
-    (lambda control: setattr(control._course, "step", burst), True),
-    (lambda control: setattr(control._faults[0], "look", burst), True),
+    (lambda control: setattr(control._context.estimator._solver, "step_into", burst), True),
+    (lambda control: setattr(control._loop.active.course, "step", burst), True),
+    (lambda control: setattr(control._context.faults[0], "look", burst), True),
     (lambda control: link_that_bursts(control, once=True), True),
     (lambda control: link_that_bursts(control, once=False), False),
 ]
@@ -96,15 +96,15 @@ def test_what_is_raised_in_a_cycle_holds_the_winches_and_is_raised_again(break_i
     assert state_of(control) is State.FAULT
     assert gc.isenabled()
     assert gc.get_freeze_count() == 0
-    assert control._sender.command is not None
-    assert control._sender.command.mode is Mode.HOLD
+    assert control._context.sender.command is not None
+    assert control._context.sender.command.mode is Mode.HOLD
     fault = next(event for event in control.events if event.name == "cycle broken off")
     assert fault.kind is EventKind.FAULT
     assert "ArithmeticError: no" in fault.text
     assert control.execution is not None
     assert control.execution.status is ExecutionStatus.FAULT
     if sends:  # the PLCs have it already: they stand after a ramp, though nobody calls the next cycle
-        assert spy_of(control).commands[-1] is control._sender.command
+        assert spy_of(control).commands[-1] is control._context.sender.command
         for _ in range(22):
             machine.advance()
         for group in range(4):
@@ -156,14 +156,14 @@ def test_a_place_that_is_lost_on_the_way_stops_it() -> None:
     control.start(control.path_to(at(0.2, 0.0, 1.5)))
     for _ in range(50):
         control.cycle()
-    solver: Any = control._estimator._solver
+    solver: Any = control._context.estimator._solver
 
     class Lost:
         def step_into(self, length: Array, place: Array, turn: Array, wrench: Array | None) -> ForwardStatus:
             solver.step_into(length, place, turn, wrench)
             return ForwardStatus.NOT_CONVERGED
 
-    control._estimator._solver = Lost()  # type: ignore[assignment]
+    control._context.estimator._solver = Lost()  # type: ignore[assignment]
     control.cycle()
     assert state_of(control) is State.STOPPING
     done = control.wait()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control import preloading
+from sagline.control import real_time
 from sagline.control.controller import Controller
 from sagline.control.execution import ExecutionStatus
 from sagline.control.link import Mode
@@ -40,7 +40,7 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> tuple[threading.Event, list[bool]]:
         assert go.wait(10.0)
         return found(*arguments)
 
-    monkeypatch.setattr("sagline.control.loop.standing_at", standing_at)
+    monkeypatch.setattr("sagline.control.context.standing_at", standing_at)
     return go, where
 
 
@@ -93,10 +93,10 @@ def test_what_the_tension_loop_added_is_not_taken_for_a_way_of_the_platform() ->
     control, _ = rig()
     off = np.zeros(8)
     off[0] = 1e-3
-    control._correction = off
+    control._context.correction = off
     assert control.sample is not None
     true = sl.inverse(prototype(), at(0.01, -0.02, 1.49))
-    control._locate(control.sample._replace(length=true.unstrained_length - control.zero + off), None)
+    control._context.locate(control.sample._replace(length=true.unstrained_length - control.zero + off), None)
     assert np.abs(control.estimate.position - [0.01, -0.02, 1.49]).max() < 1e-8
 
 
@@ -135,7 +135,7 @@ def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.Monke
     tried = list[str]()
 
     def trying(name: str) -> Any:
-        good = getattr(preloading, name)
+        good = getattr(real_time, name)
 
         def part(*arguments: Any) -> Any:
             tried.append(name)
@@ -145,7 +145,7 @@ def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.Monke
 
     names = ["standing_at", "motion_along", "winch_jog", "PlatformJog"]
     for name in names:
-        monkeypatch.setattr(preloading, name, trying(name))
+        monkeypatch.setattr(real_time, name, trying(name))
     nowhere = prototype().replace(tension_min=2000.0, tension_max=2100.0)  # no pose has such tensions
-    preloading.load_all(nowhere, 0.01, sl.Catenary(), sl.Closest())
+    real_time.load_all(nowhere, 0.01, sl.Catenary(), sl.Closest())
     assert tried == names

@@ -71,7 +71,7 @@ def tour(true: sl.Robot, speed: float, stand: float, count: int = 10, loop: Tens
 
 def acts(control: Controller) -> bool:
     """Whether the tension loop acts."""
-    return control._loop is not None and control._loop.acting
+    return control._context.tension_loop is not None and control._context.tension_loop.acting
 
 
 def _stop(control: Controller, machine: Machine, motion: Motion, stand: float) -> tuple[Array, float, float]:
@@ -83,5 +83,5 @@ def _stop(control: Controller, machine: Machine, motion: Motion, stand: float) -
             tensions.append(machine.reading.tension.copy())
     assert motion.gains is not None
     seen = motion.gains.rows[-1].visible @ (np.mean(tensions, axis=0) - motion.tension[-1])
-    largest = float(np.abs(control._correction).max())
+    largest = float(np.abs(control._context.correction).max())
     return np.mean(places, axis=0), float(np.sqrt(np.mean(seen**2))), largest

@@ -1,4 +1,4 @@
-"""The controller: what an operator, or a program, asks of the loop."""
+"""The controller: requests of an operator, or of a program, to the control loop."""
 
 from __future__ import annotations
 
@@ -10,20 +10,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
+from sagline.control.active_states import Connecting, Following, Holding, HomingState, Off, idle_at
 from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
-from sagline.control.connecting import Claim, Trouble
+from sagline.control.connecting import Trouble
+from sagline.control.context import Context
 from sagline.control.execution import Execution
-from sagline.control.homing import Homing, HomingJog, tension_limits
+from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog, checked_displacement, checked_winch, winch_jog
-from sagline.control.link import Link
+from sagline.control.link import Link, Sample
 from sagline.control.loop import Loop
-from sagline.control.real_time import Pace, aside, interrupt_calls
-from sagline.control.recording import EventKind, Recorder
-from sagline.control.set_points import Along, SetPoint, Standing
+from sagline.control.real_time import Pace, in_background, interrupt_calls, load_all
+from sagline.control.recording import Event, EventKind, Recorder
+from sagline.control.set_points import Along, Course, SetPoint, Standing
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance
-from sagline.core.arrays import number
+from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
@@ -31,26 +33,19 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-SETTLING: Final = 3.0  # s that homing looks, at most
+SETTLING: Final = 3.0  # s, at most, in which homing compares tensions
 SPEED: Final = 0.1  # m/s, of go_to
 TURNING: Final = 0.2  # rad/s
 SPEEDING_UP: Final = 0.5  # s, to full speed at least: a short way is a slow one
 T = TypeVar("T")
 
 
-class Controller(Loop):
+class Controller:
     """Drives a robot through a `Link`.
 
-    It knows what samples say, and nothing else; each `cycle` sends one command, which was checked. The methods that
-    begin something (`start`, `begin_homing`, `start_jog`, `claim`) return at once, and `cycle` is to be called each
-    period; those that wait (`execute`, `go_to`, `home`, `jog`, `connect`) call it themselves, until nothing moves.
-
-    Attributes:
-        state: What it does.
-        robot: As it is planned for.
-        sample: What the machine said last; None before anything.
-        zero: What homing added to the lengths that are read [m], shape (m,).
-        homed: Whether the platform's place is known.
+    All it knows comes from samples; each `cycle` sends one checked command. The methods that begin something (`start`,
+    `begin_homing`, `start_jog`, `claim`) return at once, and `cycle` is to be called each period; those that wait
+    (`execute`, `go_to`, `home`, `jog`, `connect`) call it themselves, until nothing moves.
     """
 
     def __init__(
@@ -74,9 +69,9 @@ class Controller(Loop):
             pace: Real time; None: every cycle begins when the one before is over, on the clock of a machine that
                 waits for it.
             model: Of the cables; the default is exact.
-            tension: How the load is shared; the default is `Closest`.
-            loop: How the tension loop works. A robot without redundancy has none.
-            record: One who looks on.
+            tension: Tension distribution method; the default is `Closest`.
+            loop: Settings of the tension loop. A robot without redundancy has none.
+            record: Receives every cycle and event.
             shadow: Whether it reads only: nothing is ever sent, and the state stays OFF.
             seed: Of its id and of random waiting; None: the system's, so that no two controllers are alike.
 
@@ -95,16 +90,90 @@ class Controller(Loop):
             >>> print(done.status.name, done.position[-1].round(3))
             DONE [0.1 0.  1.5]
         """
-        super().__init__(robot, link, pace, model, tension, loop, record, bool(shadow), seed)
+        self._context = c = Context(robot, link, pace, model, tension, loop, record, bool(shadow), seed)
+        self._loop = Loop(c)
+        if pace is not None:
+            load_all(robot, c.period, c.model, c.method)
+
+    @property
+    def state(self) -> State:
+        """State of the controller."""
+        return self._context.state
+
+    @property
+    def robot(self) -> Robot:
+        """The robot as it is planned for."""
+        return self._context.robot
+
+    @property
+    def period(self) -> float:
+        """Period of a cycle [s]."""
+        return self._context.period
+
+    @property
+    def sample(self) -> Sample | None:
+        """The newest sample of the machine; None before the first."""
+        return self._context.sample
+
+    @property
+    def zero(self) -> Array:
+        """Lengths that homing found are to be added to those that are read [m], shape (m,)."""
+        return self._context.zero
+
+    @property
+    def homed(self) -> bool:
+        """Whether the pose of the platform is known."""
+        return self._context.homed
+
+    @property
+    def owner(self) -> int:
+        """The controller's id."""
+        return self._context.owner
+
+    @property
+    def degraded(self) -> bool:
+        """Whether tensions are not to be believed: the tension loop keeps its correction, and learns nothing."""
+        return self._context.degraded
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """All events so far."""
+        return tuple(self._context.journal.events)
+
+    def events_from(self, first: int) -> list[Event]:
+        """The events from one of them on.
+
+        Args:
+            first: Number of events that are known already.
+        """
+        return self._context.journal.events[first:]
+
+    @property
+    def pace(self) -> Pace | None:
+        """Real time; None on a lockstep clock."""
+        return self._context.pace
+
+    @property
+    def clock(self) -> tuple[float, float] | None:
+        """Time on the path, and its duration [s]; None where no path is followed."""
+        course = self._loop.active.course
+        if not isinstance(course, Along):
+            return None
+        return course.clock, self.period * (len(course.motion) - 1)
+
+    @property
+    def execution(self) -> Execution | None:
+        """The last motion, or its cycles so far; None before the first."""
+        return self._context.execution()
 
     @property
     def estimate(self) -> Pose:
-        """Where the platform is by the encoders.
+        """Pose of the platform by the encoders.
 
         Raises:
-            RefusedError: If that is not known.
+            RefusedError: If it is not known.
         """
-        pose = self._estimator.pose
+        pose = self._context.estimator.pose
         if pose is None:
             raise RefusedError("the estimate", "the platform's place is not known", "Home first: home(pose).")
         return pose
@@ -112,7 +181,14 @@ class Controller(Loop):
     @property
     def moving(self) -> bool:
         """Whether set points change."""
-        return self.state in MOTION and not (self.state is State.HOMING and self._course is None)
+        return self.state in MOTION and not (self.state is State.HOMING and self._loop.active.course is None)
+
+    def cycle(self) -> None:
+        """Do one cycle: send and take, estimate, look for faults, and prepare the next command.
+
+        An exception within stops the winches: it becomes an event, a command to hold is sent, and it is raised again.
+        """
+        self._loop.cycle()
 
     # connecting and homing
 
@@ -122,30 +198,30 @@ class Controller(Loop):
         Raises:
             RefusedError: If it is connected already, or reads only.
         """
-        if self._shadow:
+        if self._context.shadow:
             raise RefusedError("connecting", "this controller only reads", "Make one without shadow.")
         check_transition(self.state, State.CONNECTING, "connecting")
-        self._enter(State.CONNECTING, "claims the groups")
-        self._refused = None
-        self._claim = Claim(self.owner, self._link.groups, self.period, self._random)
+        self._loop.active = Connecting(self._context)
 
     def connect(self) -> None:
         """Connect, and wait until all groups agree.
 
         Raises:
-            RefusedError: If they do not; it says why.
+            RefusedError: If they do not; with the reason.
         """
         self.claim()
+        connecting = self._loop.active
         with interrupt_calls(self.stop):
             while self.state is State.CONNECTING:
                 self.cycle()
-            self._let_go()
+            self._wait_until_left()
         if self.state is not State.READY:
             step = "Check the machine and who else controls it, then try again."
-            raise (self._refused or Trouble(self._reason, step)).refusal("connecting")
+            refused = connecting.claim.refused if isinstance(connecting, Connecting) else None
+            raise (refused or Trouble(self._context.run.reason, step)).refusal("connecting")
 
     def begin_homing(self, pose: Pose) -> None:
-        """Say where the platform is held, and look whether the tensions agree.
+        """Name the pose in which the platform is held, and begin to compare tensions.
 
         Args:
             pose: A single pose.
@@ -153,19 +229,23 @@ class Controller(Loop):
         Raises:
             RefusedError: If the robot is not ready, or the pose has no tensions within the limits.
         """
-        if self.state is not State.HOMING:
+        c, active = self._context, self._loop.active
+        if not isinstance(active, HomingState):
             check_transition(self.state, State.HOMING, "homing")
-        elif self._course is not None:
+        elif active.course is not None:
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
         place = instance(pose, Pose, "pose")
-        self._homing = self._beside(lambda: Homing(self.robot, place, self._model, self._method))
-        self.zero, self.homed = np.zeros(self.robot.cable_count), False
-        self._new_loop()
-        if self.state is not State.HOMING:
-            self._enter(State.HOMING, "the operator named the pose")
+        homing = self._during_cycles(lambda: Homing(c.robot, place, c.model, c.method))
+        c.zero, c.homed = np.zeros(c.robot.cable_count), False
+        c.reset_tension_loop()
+        active = self._loop.active
+        if isinstance(active, HomingState):
+            active.homing = homing
+        else:
+            self._loop.active = HomingState(c, homing)
 
     def home(self, pose: Pose) -> None:
-        """Say where the platform is held, and wait until the tensions agree.
+        """Name the pose in which the platform is held, and wait until the tensions agree.
 
         Args:
             pose: A single pose.
@@ -179,10 +259,11 @@ class Controller(Loop):
                 self.cycle()
                 if self.state is not State.HOMING:
                     break
-        if self.state is State.HOMING and self._homing is not None:
-            raise self._homing.refusal()
+        if isinstance(self._loop.active, HomingState):
+            raise self._loop.active.homing.refusal()
         if self.state is not State.IDLE:
-            raise RefusedError("homing", f"it ended in {self.state.name}: {self._reason}", "Read the events.")
+            reason = f"it ended in {self.state.name}: {self._context.run.reason}"
+            raise RefusedError("homing", reason, "Read the events.")
 
     # moving
 
@@ -193,20 +274,20 @@ class Controller(Loop):
             path: From rest to rest, with a sample at every tick.
 
         Returns:
-            What `start` and `execute` take too.
+            A motion for `start` and `execute`.
 
         Raises:
-            RefusedError: If a check fails; it says which, where, and the next step.
+            RefusedError: If a check fails; with the check, the place, and the next step.
         """
-        given = instance(path, Path, "path")
-        arguments = self.robot, given, self.period, self._model, self._method, self._held
-        return self._beside(lambda: motion_along(*arguments))
+        c, given = self._context, instance(path, Path, "path")
+        arguments = c.robot, given, c.period, c.model, c.method, c.previous_plan
+        return self._during_cycles(lambda: motion_along(*arguments))
 
     def start(self, path: Path | Motion) -> None:
         """Begin to follow a path.
 
         Args:
-            path: From rest to rest, with a sample at every tick, from where the platform is; or a motion that was
+            path: From rest to rest, with a sample at every tick, from the pose of the platform; or a motion that was
                 planned before.
 
         Raises:
@@ -215,13 +296,17 @@ class Controller(Loop):
         check_transition(self.state, State.MOVING, "the path")
         motion = path if isinstance(path, Motion) else self.plan(path)
         check_transition(self.state, State.MOVING, "the path")
-        self._check_agreement("the path")
+        self._context.check_agreement("the path")
         check_motion(motion, self.robot, self.period)
         check_start(self.robot, self.estimate, motion.state.pose[0])
-        lead = self._stood("the path").length - motion.length[0]
+        lead = self._set_point("the path").length - motion.length[0]
         check_lead("the path", lead)
-        course = Along(motion, self.period, lead)
-        self._begin(State.MOVING, course, motion, f"a path of {self.period * (len(motion) - 1):.2f} s")
+        self._begin(
+            State.MOVING,
+            Along(motion, self.period, lead),
+            motion,
+            f"a path of {self.period * (len(motion) - 1):.2f} s",
+        )
 
     def execute(self, path: Path | Motion) -> Execution:
         """Follow a path to its end.
@@ -230,7 +315,7 @@ class Controller(Loop):
             path: As of `start`.
 
         Returns:
-            What became of it: a fault is its status, not an error.
+            The execution: a fault is its status, not an error.
 
         Raises:
             RefusedError: As `start`.
@@ -239,10 +324,10 @@ class Controller(Loop):
         return self.wait()
 
     def path_to(self, pose: Pose, speed: float = SPEED, angular_speed: float = TURNING) -> Path:
-        """The straight way from where the platform is.
+        """The straight path from the pose of the platform.
 
         Args:
-            pose: Where to, a single pose.
+            pose: At its end, a single pose.
             speed: Largest of the origin [m/s], > 0.
             angular_speed: Largest of the platform [rad/s], > 0.
 
@@ -269,84 +354,69 @@ class Controller(Loop):
         """Go straight to a pose.
 
         Args:
-            pose: Where to, a single pose.
+            pose: At the end, a single pose.
             speed: Largest of the origin [m/s], > 0.
             angular_speed: Largest of the platform [rad/s], > 0.
 
         Returns:
-            What became of it.
+            The execution.
 
         Raises:
             RefusedError: As `start`.
         """
         check_transition(self.state, State.MOVING, "the way")
-        return self.execute(self._beside(lambda: self.path_to(pose, speed, angular_speed)))
+        return self.execute(self._during_cycles(lambda: self.path_to(pose, speed, angular_speed)))
 
     def start_jog(self, winch: int, by: float) -> None:
         """Begin to jog one winch.
 
         Args:
-            winch: Which, from 0.
-            by: How far [m], positive where it lets cable out.
+            winch: Its number, from 0.
+            by: Change of length [m], positive where cable is let out.
 
         Raises:
             RefusedError: If the robot is neither idle nor being homed, or a tension would leave its limits.
         """
-        chosen, far = checked_winch(self.robot, winch, by)
-        if self.state is State.HOMING:
-            self._jog_in_homing(chosen, far)
+        c = self._context
+        chosen, far = checked_winch(c.robot, winch, by)
+        if isinstance(self._loop.active, HomingState):
+            self._loop.active.jog(chosen, far)
             return
         check_transition(self.state, State.JOGGING, "the jog")
-        self._check_agreement("the jog")
-        here, length = self._here(), self._stood("the jog").length
-        motion = self._beside(lambda: winch_jog(self.robot, length, here, chosen, far, self.period, self._model))
+        c.check_agreement("the jog")
+        here, length = self._here(), self._set_point("the jog").length
+        motion = self._during_cycles(lambda: winch_jog(c.robot, length, here, chosen, far, c.period, c.model))
         check_transition(self.state, State.JOGGING, "the jog")
-        course = Along(motion, self.period, np.zeros(len(length)))
+        course = Along(motion, c.period, np.zeros(len(length)))
         self._begin(State.JOGGING, course, motion, f"winch {chosen} by {1e3 * far:+g} mm")
-
-    def _jog_in_homing(self, winch: int, by: float) -> None:
-        """Jog one winch while the others have no power, and tensions alone are watched."""
-        if self._homing is None or self.sample is None or self._course is not None:
-            raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
-        self._most_tension = tension_limits(self._homing, self.sample)
-        begin = SetPoint(
-            self.sample.length, np.zeros(len(self.zero)), self._unknown, self._sender.tension, None, None, np.nan, False
-        )
-        self._course = HomingJog(begin, winch, by, self.period)
-        self._say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
-
-    def _here(self) -> Pose:
-        """Where the platform stands: where it was meant to go, which the estimate agrees with but for its noise."""
-        pose = self._course.pose if isinstance(self._course, Standing) else None
-        return self.estimate if pose is None else pose
 
     def jog(self, winch: int, by: float) -> None:
         """Jog one winch, and wait for its end.
 
         Args:
-            winch: Which, from 0.
-            by: How far [m], positive where it lets cable out.
+            winch: Its number, from 0.
+            by: Change of length [m], positive where cable is let out.
 
         Raises:
             RefusedError: As `start_jog`.
         """
         self.start_jog(winch, by)
-        self._rest()
+        self._wait_until_rest()
 
     def start_jog_platform(self, by: ArrayLike) -> None:
         """Begin to jog the platform along a straight line, each pose solved when it is due.
 
         Args:
-            by: Displacement [m], and rotation vector [rad] or not, world axes, shape (3,) or (6,).
+            by: Displacement [m], and optionally a rotation vector [rad], world axes, shape (3,) or (6,).
 
         Raises:
             RefusedError: If the robot is not idle, or the pose at the end has no tensions within the limits.
         """
-        far = checked_displacement(by)
+        c, far = self._context, checked_displacement(by)
         check_transition(self.state, State.JOGGING, "the jog")
-        self._check_agreement("the jog")
-        here, point = self._here(), self._stood("the jog")
-        course = self._beside(lambda: PlatformJog(self.robot, point, here, far, self.period, self._model, self._method))
+        c.check_agreement("the jog")
+        here, point = self._here(), self._set_point("the jog")
+        course = self._during_cycles(lambda: PlatformJog(c.robot, point, here, far, c.period, c.model, c.method))
         check_transition(self.state, State.JOGGING, "the jog")
         self._begin(State.JOGGING, course, None, "the platform")
 
@@ -360,31 +430,22 @@ class Controller(Loop):
             RefusedError: As `start_jog_platform`.
         """
         self.start_jog_platform(by)
-        self._rest()
+        self._wait_until_rest()
 
     def wait(self) -> Execution:
         """Go on until nothing moves; Ctrl-C stops the robot, and interrupts then.
 
         Returns:
-            What became of the motion.
+            The execution of the motion.
 
         Raises:
             RefusedError: If nothing has moved yet.
         """
-        self._rest()
+        self._wait_until_rest()
         done = self.execution
         if done is None:
             raise RefusedError("waiting", "nothing has moved yet", "Begin with start(path).")
         return done
-
-    def _rest(self) -> None:
-        """Go on until nothing moves."""
-        try:
-            with interrupt_calls(self.stop):
-                while self.moving:
-                    self.cycle()
-        finally:
-            self._garbage.go_on()
 
     def pause(self) -> None:
         """Slow down on the path, and stand; `resume` goes on.
@@ -393,11 +454,12 @@ class Controller(Loop):
             RefusedError: If no path is being followed.
         """
         check_transition(self.state, State.PAUSING, "pausing")
-        course = self._course
-        if not isinstance(course, Along):
+        active = self._loop.active
+        if not isinstance(active.course, Along):
             raise RefusedError("pausing", "no path is being followed", "Stop instead: stop().")
-        course.pause()
-        self._enter(State.PAUSING, f"at {course.clock:.2f} s of the path")
+        active.course.pause()
+        text = f"at {active.course.clock:.2f} s of the path"
+        self._loop.active = Following(self._context, State.PAUSING, text, active.point, active.course)
 
     def resume(self) -> None:
         """Go on where `pause` stopped.
@@ -406,58 +468,43 @@ class Controller(Loop):
             RefusedError: If there is nothing to go on with, or the platform is elsewhere.
         """
         check_transition(self.state, State.MOVING, "resuming")
-        if self._paused is None:
+        run = self._context.run
+        if run.paused is None:
             raise RefusedError("resuming", "no path was paused here", "Begin one with start(path).")
-        self._check_agreement("resuming")
-        check_start(self.robot, self.estimate, self._paused.pose)
-        course, self._paused = self._paused, None
+        self._context.check_agreement("resuming")
+        check_start(self.robot, self.estimate, run.paused.pose)
+        course, run.paused = run.paused, None
         course.resume()
-        self._course = course
-        self._go(State.MOVING, f"goes on at {course.clock:.2f} s of the path")
-
-    def _beside(self, work: Callable[[], T]) -> T:
-        """Do what may take longer than a cycle; in real time the cycles go on beside it, or the PLCs would hold."""
-        if self._pace is None or self.state is State.OFF:
-            return work()
-        with interrupt_calls(self.stop):
-            return self._wait_for(aside(work, threaded=True))
-
-    def _wait_for(self, begun: Future[T]) -> T:
-        """Go on until work is done."""
-        while not begun.done():
-            self.cycle()
-        return begun.result()
+        self._follow(State.MOVING, course, f"goes on at {course.clock:.2f} s of the path")
 
     def stop(self) -> None:
         """Lead all rates to zero, from the next cycle on; where nothing moves, nothing happens."""
-        self._stop_asked = True
+        self._loop.stop_requested = True
 
     def acknowledge(self) -> None:
-        """Say that what was wrong is mended: from FAULT to READY, and to IDLE where the place is still known.
+        """Confirm that a fault is repaired: from FAULT to READY, and to IDLE where the place is still known.
 
         Where the robot is idle and degraded, the load cells are believed again.
 
         Raises:
-            RefusedError: If the state is another one, or not all groups agree yet; it says which, and why.
+            RefusedError: If the state is another one, or not all groups agree yet; with the reason.
         """
-        what = "acknowledging"
+        c, what = self._context, "acknowledging"
         if self.state is State.IDLE and self.degraded:
-            self._clear_faults()
-            self._say(EventKind.NOTE, "acknowledged", "the load cells are believed again")
+            c.clear_faults()
+            c.say(EventKind.NOTE, "acknowledged", "the load cells are believed again")
             return
         if self.state is not State.FAULT:
             raise RefusedError(what, f"the state is {self.state.name}", "There is nothing to acknowledge.")
-        sample = self._check_agreement(what)
-        begun = self._stand_at(sample.length + self.zero - self._correction) if self.homed else None
+        sample = c.check_agreement(what)
+        begun = c.find_equilibrium(sample.length + c.zero - c.correction) if c.homed else None
         found = None if begun is None else self._wait_for(begun)
-        self._check_agreement(what)  # after the cycles beside it
+        c.check_agreement(what)  # after the cycles beside it
         check_transition(self.state, State.READY, what)
-        self._clear_faults()
-        self._enter(State.READY, "the operator acknowledged")
-        if found is not None and self.homed:
-            self.homed = self._stands(found)
-            if self.homed:
-                self._enter(State.IDLE, "the place is still known")
+        c.clear_faults()
+        self._loop.active = Holding(c, State.READY, "the operator acknowledged")
+        if found is not None and c.homed:
+            self._loop.active = idle_at(c, found, "the place is still known") or self._loop.active
 
     def off(self) -> None:
         """Give all grants back, and wait until they are; the brakes fall.
@@ -467,11 +514,56 @@ class Controller(Loop):
         """
         if self.state is not State.OFF:
             check_transition(self.state, State.OFF, "switching off")
-            self._leave("the operator")
+            self._loop.active = Off(self._context, "the operator")
             self.cycle()
-        self._let_go()
+        self._wait_until_left()
 
-    def _let_go(self) -> None:
-        """While it is off, send what gives the grants back, until they are."""
-        while self.state is State.OFF and self._sender.command is not None:
+    # shared by the methods above
+
+    def _begin(self, state: State, course: Course, motion: Motion | None, text: str) -> None:
+        """Begin to follow a course, and its record."""
+        self._context.begin_run(motion)
+        self._follow(state, course, text)
+
+    def _follow(self, state: State, course: Course, text: str) -> None:
+        point = self._set_point(text)._replace(done=False)
+        self._context.continue_run()
+        self._loop.active = Following(self._context, state, text, point, course)
+
+    def _set_point(self, what: str) -> SetPoint:
+        """The set point at rest, from which a motion begins."""
+        point = self._loop.active.point
+        if point is None:
+            raise RefusedError(what, "there is no set point to begin from", "Home first: home(pose).")
+        return point
+
+    def _here(self) -> Pose:
+        """The planned pose of the platform at rest, with which the estimate agrees except for noise."""
+        course = self._loop.active.course
+        pose = course.pose if isinstance(course, Standing) else None
+        return self.estimate if pose is None else pose
+
+    def _during_cycles(self, work: Callable[[], T]) -> T:
+        """Result of long work; in real time cycles go on meanwhile, or the PLCs would hold."""
+        if self.pace is None or self.state is State.OFF:
+            return work()
+        with interrupt_calls(self.stop):
+            return self._wait_for(in_background(work, threaded=True))
+
+    def _wait_for(self, begun: Future[T]) -> T:
+        while not begun.done():
+            self.cycle()
+        return begun.result()
+
+    def _wait_until_rest(self) -> None:
+        try:
+            with interrupt_calls(self.stop):
+                while self.moving:
+                    self.cycle()
+        finally:
+            self._context.garbage.go_on()
+
+    def _wait_until_left(self) -> None:
+        """Cycles until all grants are given back, in OFF."""
+        while self.state is State.OFF and self._context.sender.command is not None:
             self.cycle()

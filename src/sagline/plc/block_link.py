@@ -13,9 +13,8 @@ import numpy as np
 from sagline.control.link import HEARTBEAT, OWNER_TIMEOUT, PERIOD, Command, Missing, Sample, Sent, newer, sent_to
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
-from sagline.plc.addresses import Address, groups_at
 from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal, claim_block, command_blocks, sample_of
-from sagline.plc.wire import LinkError, Wire, WireError
+from sagline.plc.wire import Address, LinkError, Wire, WireError, groups_at
 from sagline.robot.robot import Robot
 
 RETRY: Final = 0.2  # s between attempts to connect

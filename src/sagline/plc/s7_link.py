@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
-from sagline.plc.addresses import addresses_of
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import LOAD, Block, Refusal
-from sagline.plc.wire import ANSWER, WireError, needed, refused
+from sagline.plc.wire import ANSWER, WireError, addresses_of, needed, refused
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:

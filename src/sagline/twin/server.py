@@ -17,9 +17,8 @@ from sagline.control.real_time import Pace
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.plc.addresses import LAST_PORT
 from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row, winch_rows
-from sagline.plc.wire import needed
+from sagline.plc.wire import LAST_PORT, needed
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.block_servers import LOOPBACK, BlockServers

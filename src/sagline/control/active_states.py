@@ -1,0 +1,354 @@
+"""One class for each kind of state: how the next command is prepared, and which state follows."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from concurrent.futures import Future
+from typing import Final
+
+import numpy as np
+
+from sagline.control.connecting import FRESH, Claim
+from sagline.control.context import Context
+from sagline.control.execution import ExecutionStatus
+from sagline.control.homing import Homing, HomingJog, tension_limits
+from sagline.control.jogging import PlatformJog
+from sagline.control.link import Missing, Mode, Sample
+from sagline.control.recording import EventKind
+from sagline.control.set_points import Along, Course, Ramp, SetPoint, Standing
+from sagline.control.states import RefusedError, State
+from sagline.core.arrays import Array
+from sagline.kinematics.status import ForwardStatus
+
+LEAVING: Final = 0.3  # s, at most, until all grants are given back
+LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
+POSE_LOST: Final = "it is not known where the platform is; home again"
+
+
+class ActiveState(ABC):
+    """The state of a controller as an object; `context.state` has its name.
+
+    Attributes:
+        context: Shared by all states.
+        point: Set point of the command that goes out next; None where the drives rest.
+        course: Source of the set points; None where nothing is followed.
+    """
+
+    def __init__(self, context: Context, point: SetPoint | None = None, course: Course | None = None) -> None:
+        """Take over set points from the state before."""
+        self.context, self.point, self.course = context, point, course
+        self._equilibrium: Future[Standing | ForwardStatus] | None = None
+
+    @abstractmethod
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """Prepare the command of the next cycle; the state from now on."""
+
+    def stop(self) -> ActiveState:
+        """The state after a stop by the operator."""
+        return self
+
+    def fail(self, line: str) -> ActiveState:
+        """The state after a fault that stops the motion."""
+        return Stopping(self, State.FAULT, ExecutionStatus.FAULT, line)
+
+    def rest(self, mode: Mode, *, enabled: bool) -> None:
+        """Command drives that rest."""
+        self.point = None
+        self.context.sender.rest(mode, enabled=enabled, claims=self.context.state is State.CONNECTING)
+
+    def follow(self, course: Course) -> None:
+        """Command the next set point, with the correction of the tension loop."""
+        c = self.context
+        due, point = self.point, course.step()
+        row, sample = point.row, c.sample
+        if c.tension_loop is not None and row is not None and sample is not None and c.state in LOOP_ON:
+            planned = point.tension if due is None else due.tension
+            leads = point.leading or (due is not None and due.leading)  # tensions differ because they are meant to
+            c.correction = c.tension_loop.step(sample.tension, planned, row, frozen=c.degraded or leads)
+        length = point.length + c.correction
+        length -= c.zero
+        self.point = point
+        c.sender.follow(length, point.rate, point.drum_tension, point.enable)
+
+    def settle(self, length: Array, status: ExecutionStatus, reason: str) -> ActiveState | None:
+        """IDLE at lengths [m], once the pose there is known, until then this state; None where there is no pose."""
+        c = self.context
+        if self._equilibrium is None:
+            self._equilibrium = c.find_equilibrium(length)
+        if not self._equilibrium.done():
+            return self
+        c.end_run(status, reason)
+        return idle_at(c, self._equilibrium.result(), reason)
+
+
+class Off(ActiveState):
+    """OFF: all grants are given back, then nothing is sent."""
+
+    def __init__(self, context: Context, reason: str = "") -> None:
+        """Begin to give the grants back; without a reason there are none yet."""
+        super().__init__(context)
+        self._cycles = 0
+        if reason:
+            self._cycles = round(LEAVING / context.period)
+            context.end_run(ExecutionStatus.STOPPED, reason)
+            context.run.paused, context.homed = None, False
+            context.sender.stand_at(context.sample)
+            context.enter(State.OFF, reason)
+
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """Give the grants back."""
+        self.leave(self.context.sample)
+        return self
+
+    def leave(self, sample: Sample | None) -> None:
+        """Command to leave, as long as a group is ours."""
+        self._cycles = max(self._cycles - 1, 0)
+        if self._cycles and (sample is None or bool((sample.owner == self.context.owner).any())):
+            self.rest(Mode.LEAVE, enabled=False)
+        else:
+            self.point = None
+            self.context.sender.nothing()
+
+
+class Connecting(ActiveState):
+    """CONNECTING: the groups are claimed.
+
+    Attributes:
+        claim: Of all groups.
+    """
+
+    def __init__(self, context: Context) -> None:
+        """Begin to claim."""
+        context.enter(State.CONNECTING, "claims the groups")
+        super().__init__(context)
+        self.claim = Claim(context.owner, context.link.groups, context.period, context.random)
+
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """READY where all groups agree, OFF where they do not."""
+        c, claim = self.context, self.claim
+        claim.look(answer, c.sender.counter)
+        c.sender.stand_at(c.sample)
+        if claim.ready:
+            c.clear_faults()
+            return Holding(c, State.READY, "all groups agree").next(answer)
+        if claim.refused is not None:
+            return Off(c, claim.refused.reason).next(answer)
+        if claim.mode is None:
+            c.sender.nothing()
+        else:
+            self.rest(claim.mode, enabled=False)
+        return self
+
+    def stop(self) -> ActiveState:
+        """OFF."""
+        return Off(self.context, "the operator stopped")
+
+
+class Holding(ActiveState):
+    """READY or FAULT: the drives hold."""
+
+    def __init__(self, context: Context, state: State, reason: str) -> None:
+        """Enter one of both."""
+        context.enter(state, reason)
+        super().__init__(context)
+
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """Hold."""
+        self.rest(Mode.HOLD, enabled=True)
+        return self
+
+    def fail(self, line: str) -> ActiveState:
+        """FAULT, by way of STOPPING."""
+        return self if self.context.state is State.FAULT else super().fail(line)
+
+
+class Emergency(ActiveState):
+    """EMERGENCY: drums locked."""
+
+    def __init__(self, before: ActiveState, line: str) -> None:
+        """Lock the drums; the pose is no longer known."""
+        c = before.context
+        c.end_run(ExecutionStatus.EMERGENCY, line)
+        c.homed = False
+        c.enter(State.EMERGENCY, line)
+        super().__init__(c, course=before.course)
+
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """Lock."""
+        self.rest(Mode.LOCK, enabled=False)
+        return self
+
+    def fail(self, line: str) -> ActiveState:
+        """No change."""
+        return self
+
+
+class HomingState(ActiveState):
+    """HOMING: single winches are jogged until the tensions agree with the plan.
+
+    Attributes:
+        homing: The pose named by the operator, and what samples say of it.
+    """
+
+    def __init__(self, context: Context, homing: Homing) -> None:
+        """Begin at rest."""
+        context.enter(State.HOMING, "the operator named the pose")
+        super().__init__(context)
+        self.homing = homing
+        self._largest_tension = np.full(len(context.zero), np.inf)  # during a jog [N]
+
+    def jog(self, winch: int, by: float) -> None:
+        """Begin to jog one winch [m] while the others have no power and only tensions are watched."""
+        c = self.context
+        if c.sample is None or self.course is not None:
+            raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
+        self._largest_tension = tension_limits(self.homing, c.sample)
+        begin = SetPoint(c.sample.length, np.zeros(len(c.zero)), c.unknown, c.sender.tension, None, None, np.nan, False)
+        self.course = HomingJog(begin, winch, by, c.period)
+        c.say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
+
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """Go on with the jog, or compare tensions at rest; IDLE where they agree."""
+        c, sample, homing = self.context, self.context.sample, self.homing
+        if sample is None:
+            pass
+        elif self.course is not None:
+            line = self._ends_jog(sample)
+            if line:
+                c.say(EventKind.NOTE, "jog", f"the jog ended: {line}")
+            elif self.point is None or not self.point.done:
+                self.follow(self.course)
+                return self
+            self.course = None
+            c.sender.stand_at(sample)
+            homing.rest()
+        elif homing.look(sample):
+            c.zero, c.homed = homing.zero, True
+            c.estimator.begin_at(homing.state.pose)
+            c.previous_plan = homing.plan
+            largest = 1e3 * float(np.abs(c.zero).max())
+            reason = f"the tensions agree; lengths set to the plan's, by up to {largest:.2f} mm"
+            return Following(c, State.IDLE, reason, None, homing.standing).next(answer)
+        self.rest(Mode.HOLD, enabled=True)
+        return self
+
+    def _ends_jog(self, sample: Sample) -> str:
+        """Reason to end a jog, "" to go on."""
+        c = self.context
+        stale = ~(sample.age <= FRESH * c.period)
+        if stale.any():
+            g = int(np.argmax(stale))
+            return f"group {g} is silent for {sample.age[g]:.2g} s. Check its PLC and the network"
+        if c.degraded:
+            return "a load cell is not to be believed. Check the cells, then home again"
+        limit = self._largest_tension
+        if (sample.tension <= limit).all():
+            return ""
+        i = int(np.argmax(~(sample.tension <= limit)))
+        return f"cable {i} has {sample.tension[i]:.1f} N; allowed: {limit[i]:.1f} N"
+
+    def stop(self) -> ActiveState:
+        """STOPPING, then READY."""
+        return Stopping(self, State.READY, ExecutionStatus.STOPPED, "the operator stopped")
+
+
+class Following(ActiveState):
+    """IDLE, MOVING, JOGGING or PAUSING: set points of a course, one in each cycle."""
+
+    def __init__(self, context: Context, state: State, text: str, point: SetPoint | None, course: Course) -> None:
+        """Enter one of them at the set point that was sent last."""
+        context.enter(state, text)
+        super().__init__(context, point, course)
+        self._source = course
+
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """The next set point; at the end of the course IDLE."""
+        point = self.point
+        if self.context.state is not State.IDLE and point is not None and point.done:
+            after = self._finish(point)
+            if after is not self:
+                return after.next(answer)
+        self.follow(self._source)
+        return self
+
+    def stop(self) -> ActiveState:
+        """STOPPING, then IDLE."""
+        if self.context.state is State.IDLE:
+            return self
+        return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, "the operator stopped")
+
+    def _finish(self, point: SetPoint) -> ActiveState:
+        """The state after the last set point was sent."""
+        c, course = self.context, self.course
+        if isinstance(course, PlatformJog) and course.failed and course.stops_hard:
+            return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, course.failed)
+        if isinstance(course, Along) and course.motion.plan is not None:
+            if course.at_end:
+                c.end_run(ExecutionStatus.DONE, "the end of the plan")
+                c.previous_plan = course.motion.plan
+            else:
+                c.end_run(ExecutionStatus.PAUSED, "paused; resume goes on")
+                c.run.paused = course
+            return Following(c, State.IDLE, c.run.reason, point, Standing(point, course.pose))
+        after = self.settle(point.length, ExecutionStatus.DONE, "the jog ended")
+        return after or Stopping(self, State.FAULT, ExecutionStatus.FAULT, POSE_LOST)
+
+
+class Stopping(ActiveState):
+    """STOPPING: all rates go to zero together, from the set point that was sent last.
+
+    Attributes:
+        after: State at the end of the ramp.
+    """
+
+    def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:
+        """Begin the ramp; status and reason are those of the motion."""
+        c, point, course = before.context, before.point, before.course
+        if point is not None:
+            point = point._replace(done=False)
+            course = Ramp(point, c.period)
+        c.run.status, c.run.reason, c.run.paused = status, reason, None
+        c.enter(State.STOPPING, reason)
+        super().__init__(c, point, course)
+        self.after = after
+
+    def next(self, answer: Sample | Missing) -> ActiveState:
+        """The next set point of the ramp; at its end IDLE, READY or FAULT."""
+        if self.point is None or self.point.done:
+            after = self._finish()
+            if after is not self:
+                return after.next(answer)
+        if self.course is not None:
+            self.follow(self.course)
+        return self
+
+    def fail(self, line: str) -> ActiveState:
+        """FAULT after the ramp."""
+        self._end_in_fault(line)
+        return self
+
+    def _end_in_fault(self, line: str) -> None:
+        run = self.context.run
+        self.after, run.status, run.reason = State.FAULT, ExecutionStatus.FAULT, line
+
+    def _finish(self) -> ActiveState:
+        """The state after the ramp."""
+        c, point = self.context, self.point
+        if self.after is State.IDLE and point is not None:
+            after = self.settle(point.length, c.run.status, c.run.reason)
+            if after is not None:
+                return after
+            self._end_in_fault(POSE_LOST)
+        c.end_run(c.run.status, c.run.reason)
+        c.sender.stand_at(c.sample, None if point is None else point.drum_tension)
+        return Holding(c, self.after, c.run.reason)
+
+
+def idle_at(context: Context, found: Standing | ForwardStatus, reason: str) -> Following | None:
+    """IDLE at an equilibrium; None, and no known pose, where there was none."""
+    context.previous_plan = None
+    if isinstance(found, Standing):
+        return Following(context, State.IDLE, reason, found.step(), found)
+    context.say(EventKind.NOTE, "estimate", f"no place for these lengths: {found.text}")
+    context.homed = False
+    return None

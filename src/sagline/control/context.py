@@ -1,0 +1,271 @@
+"""Shared context of the controller's states: link, commands, estimate, fault rules, events, and the running motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from functools import partial
+from math import nan
+from typing import Final
+
+import numpy as np
+
+from sagline.cables.model import CableModel
+from sagline.cables.models import Catenary
+from sagline.control.checks import Motion
+from sagline.control.connecting import trouble
+from sagline.control.estimator import Estimator
+from sagline.control.evidence import Cycle, Fault, Reaction
+from sagline.control.execution import Execution, ExecutionStatus, execution_of
+from sagline.control.faults import faults_of
+from sagline.control.link import PERIOD, Link, Sample
+from sagline.control.real_time import Garbage, Pace, in_background
+from sagline.control.recording import Event, EventKind, Journal, Recorded, Recorder, Tape
+from sagline.control.sender import Sender
+from sagline.control.set_points import Along, Standing, standing_at
+from sagline.control.states import MOTION, RefusedError, State, check_transition
+from sagline.control.tension_loop import TensionLoop, TensionSettings
+from sagline.core.arguments import brief, instance, optional, whole_number
+from sagline.core.arrays import Array, number
+from sagline.core.errors import InvalidValueError
+from sagline.kinematics.status import ForwardStatus
+from sagline.kinematics.plan import Plan
+from sagline.robot.drum import drum_lever
+from sagline.robot.robot import Robot
+from sagline.tension.method import TensionMethod
+from sagline.tension.methods import Closest
+
+MOST_SEED: Final = 2**128
+SAME: Final = 1e-9  # of a period
+MARGIN: Final = 500  # cycles on the tape besides those of the plan: ramps, pauses
+
+
+class Run:
+    """The motion that is executed now or was executed last, and its record.
+
+    Attributes:
+        motion: As planned; None for a platform jog, or before the first.
+        paused: Path that can be resumed.
+        status: How it ended; RUNNING before its end.
+        reason: One line on that.
+        first_event: Number of events before its beginning.
+        tape: Its cycles.
+        recording: Whether cycles are added to the tape.
+        announced: Whether the recorder knows the plan, but not yet its end.
+    """
+
+    def __init__(self) -> None:
+        """No motion yet."""
+        self.motion: Motion | None = None
+        self.paused: Along | None = None
+        self.status, self.reason = ExecutionStatus.RUNNING, ""
+        self.first_event = 0
+        self.tape: Tape | None = None
+        self.recording = self.announced = False
+
+
+class Context:
+    """Data and services that the states of a controller share.
+
+    Attributes:
+        state: Of the controller.
+        sample: The newest; None before the first.
+        zero: Added to lengths of samples since homing [m], shape (m,).
+        homed: Whether the pose of the platform is known.
+        run: The motion that is executed.
+        previous_plan: Plan at whose end the platform stands, which the next one continues; None elsewhere.
+        correction: Of the tension loop, added to the lengths of the plan [m], shape (m,).
+        number: Of the cycle, from 0.
+        time: On the link's clock [s].
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        link: Link,
+        pace: Pace | None,
+        model: CableModel | None,
+        method: TensionMethod | None,
+        settings: TensionSettings | None,
+        record: Recorder | None,
+        shadow: bool,
+        seed: int | None,
+    ) -> None:
+        """Check the arguments, which are those of `Controller`; nothing is sent."""
+        self.robot = instance(robot, Robot, "robot")
+        m = robot.cable_count
+        _check_link(link)
+        drum_lever(robot, np.ones(m))  # raises where data of the winches are missing
+        if sorted(winch for group in link.groups for winch in group) != list(range(m)):
+            count = sum(map(len, link.groups))
+            raise InvalidValueError("link", f"of {count} winches", f"{m}, as {robot.name} has", "Check its addresses.")
+        self.link, self.pace = link, optional(pace, Pace, "pace")
+        self.period = PERIOD if pace is None else pace.period
+        _check_period(link, self.period)
+        self.model = optional(model, CableModel, "model") or Catenary()
+        self.method = optional(method, TensionMethod, "tension") or Closest()
+        self.settings = optional(settings, TensionSettings, "loop") or TensionSettings()
+        self.shadow = shadow
+        self.random = np.random.default_rng(None if seed is None else whole_number(seed, "seed", 0, MOST_SEED))
+        self.sender = Sender(m, self.random)
+        self.estimator = Estimator(robot, self.model)
+        self.journal = Journal(record)
+        self.garbage = Garbage()
+        self.state = State.OFF
+        self.sample: Sample | None = None
+        self.zero, self.homed = np.zeros(m), False
+        self.unknown = np.full(m, nan)
+        self.number, self.time = 0, 0.0
+        self.run = Run()
+        self.previous_plan: Plan | None = None
+        self.clear_faults()
+        self.reset_tension_loop()
+
+    @property
+    def owner(self) -> int:
+        """The controller's id."""
+        return self.sender.owner
+
+    # events
+
+    def say(self, kind: EventKind, name: str, text: str) -> None:
+        """Add an event."""
+        if line := self.journal.add(Event(self.time, self.number, kind, name, self.state, text)):
+            self.say(EventKind.FAULT, "recording stopped", line)
+
+    def tell(self, what: Callable[[Recorder], object]) -> None:
+        """Call a method of the recorder, if there is one."""
+        if line := self.journal.tell(what):
+            self.say(EventKind.FAULT, "recording stopped", line)
+
+    def enter(self, state: State, text: str) -> None:
+        """Change the state, as the table allows."""
+        check_transition(self.state, state, state.name)
+        self.state = state
+        self.say(EventKind.STATE, state.name, text)
+
+    # samples, faults and estimate
+
+    def check_agreement(self, what: str) -> Sample:
+        """The newest sample; refuses a request that needs all groups, where one of them does not agree."""
+        if self.sample is None:
+            raise RefusedError(what, "no group has answered", "Connect first.")
+        why = trouble(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
+        if why is not None:
+            raise why.refusal(what)
+        return self.sample
+
+    def locate(self, sample: Sample, wrench: Array | None) -> str:
+        """Estimate the pose; a line for the operator where it has just been lost, "" otherwise.
+
+        The correction of the tension loop counts as an error of the encoders.
+        """
+        length = sample.length + self.zero
+        length -= self.correction
+        lost = self.estimator.locate(length, wrench)
+        if lost is None:
+            return ""
+        line = f"the platform's place is lost: {lost.text}. Look where it is, acknowledge, and home again."
+        self.say(EventKind.FAULT, "estimate", line)
+        return line
+
+    def find_faults(self, cycle: Cycle) -> tuple[Reaction, str]:
+        """The strongest reaction that the rules ask for in a cycle, and the line of its first fault."""
+        reaction, first, homing = Reaction.EVENT, "", False
+        for fault in self.faults:
+            line = fault.look(cycle)
+            if line is None:
+                continue
+            self.say(EventKind.FAULT, fault.name, line)
+            homing |= fault.homing
+            if fault.reaction > reaction:
+                reaction, first = fault.reaction, line
+        self.degraded = any([fault.present for fault in self.degrading])  # noqa: C419 a third of the time
+        if homing:
+            self.homed = False
+        return reaction, first
+
+    def clear_faults(self) -> None:
+        """Start with a fresh set of rules."""
+        self.faults: tuple[Fault, ...] = faults_of(
+            self.robot, self.period, groups=self.link.groups, largest_correction=self.settings.largest
+        )
+        self.degraded = False
+        self.degrading: list[Fault] = [fault for fault in self.faults if fault.reaction is Reaction.DEGRADED]
+
+    def reset_tension_loop(self) -> None:
+        """Start a tension loop without correction; none for a robot without redundancy."""
+        m, n = self.robot.cable_count, self.robot.degrees_of_freedom
+        self.tension_loop = TensionLoop(m, self.settings, self.period) if m > n else None
+        self.correction = np.zeros(m)
+
+    def find_equilibrium(self, length: Array) -> Future[Standing | ForwardStatus]:
+        """Begin to compute where the platform rests with these lengths [m], shape (m,)."""
+        work = partial(standing_at, self.robot, length, self.estimator.pose, self.model)
+        return in_background(work, self.pace is not None)
+
+    # the running motion
+
+    def begin_run(self, motion: Motion | None) -> None:
+        """Begin the record of a motion."""
+        run = self.run
+        run.motion, run.paused = motion, None
+        count = MARGIN + (0 if motion is None else len(motion))
+        run.tape = Tape(self.robot.cable_count, len(self.link.groups), count)
+        run.first_event = len(self.journal.events)
+        if run.announced:
+            self._announce_end()  # of a plan that was paused
+        plan = None if motion is None else motion.plan
+        if self.journal.watched and plan is not None:
+            run.announced = True
+            self.tell(lambda record: record.begins(plan))
+
+    def continue_run(self) -> None:
+        """Record from here on, without garbage collection."""
+        run = self.run
+        run.recording, run.status, run.reason = True, ExecutionStatus.RUNNING, ExecutionStatus.RUNNING.text
+        self.garbage.stop()
+
+    def end_run(self, status: ExecutionStatus, reason: str) -> None:
+        """Note how the motion ended; collect garbage again."""
+        self.run.status, self.run.reason = status, reason
+        self.garbage.go_on()
+
+    def keep(self, cycle: Recorded) -> None:
+        """Hand a cycle to the tape and the recorder."""
+        run = self.run
+        if run.recording and run.tape is not None:
+            run.tape.add(cycle)
+            run.recording = self.state in MOTION
+        self.tell(lambda record: record.cycle(cycle))
+        if run.announced and not run.recording and run.paused is None:
+            self._announce_end()
+
+    def _announce_end(self) -> None:
+        self.run.announced = False
+        self.tell(lambda record: record.ends(self.run.status, self.run.reason))
+
+    def execution(self) -> Execution | None:
+        """Record of the last motion so far; None before the first."""
+        run = self.run
+        if run.tape is None:
+            return None
+        plan, events = None if run.motion is None else run.motion.plan, tuple(self.journal.events[run.first_event :])
+        return execution_of(run.tape, self.robot, plan, run.status, run.reason, self.period, self.zero, events)
+
+
+def _check_link(link: object) -> None:
+    """Refuse an object that is no link."""
+    has = all(hasattr(link, name) for name in ("groups", "period")) and callable(getattr(link, "exchange", None))
+    if isinstance(link, type) or not has:
+        step = "Take that of a machine, machine.link(), or make one: sl.plc.S7Link(addresses, robot)."
+        raise InvalidValueError("link", brief(link), "a Link", step)
+
+
+def _check_period(link: Link, period: float) -> None:
+    """Refuse PLCs that would reach each set point sooner or later than it is meant."""
+    own = number(link.period, "link.period", "s", above=0.0)
+    if abs(own - period) > SAME * period:
+        step = f"Give the machine period={period:g}, or the controller pace=Pace({own:g})."
+        allowed = f"{1e3 * period:g} ms, the controller's"
+        raise InvalidValueError("link", f"of PLCs with a period of {1e3 * own:g} ms", allowed, step)
