@@ -1,4 +1,4 @@
-"""What is checked of a path before its first set point goes out, and the set points that follow from it."""
+"""Planned motions, and the checks before their first set point is sent."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ AT_REST: Final = 1e-3  # m/s and rad/s: a path that begins or ends faster would 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A plan that was checked whole, one row a cycle: what set points are taken from.
+    """A checked plan with one row for each cycle, from which set points are taken.
 
     Attributes:
         period: Of a cycle, and between two rows [s].
@@ -61,7 +61,7 @@ class Motion:
 
     @property
     def robot(self) -> Robot:
-        """As it is planned for."""
+        """The robot as it is planned for."""
         return self.state.one_robot
 
 
@@ -73,24 +73,7 @@ def motion_along(
     method: TensionMethod,
     previous: Plan | None = None,
 ) -> Motion:
-    """Plan a path and check all of it.
-
-    Args:
-        robot: The robot as the controller knows it.
-        path: From rest to rest, with a sample at every tick.
-        period: Of a cycle [s].
-        model: Of the cables.
-        method: How the load is shared.
-        previous: The plan that is held now, which `Closest` goes on from.
-
-    Returns:
-        The motion.
-
-    Raises:
-        RefusedError: If the path has no samples at the ticks, does not begin and end at rest, a pose has no tensions
-            within the limits, or a winch would have to be too fast or too strong; it says where, and the next step.
-        InvalidValueError: If data of the winches are missing.
-    """
+    """Plan a path and check all of it; period [s]."""
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)
@@ -116,16 +99,7 @@ def motion_along(
 
 
 def check_motion(motion: Motion, robot: Robot, period: float) -> None:
-    """Refuse a motion that was planned for another controller.
-
-    Args:
-        motion: What is to be followed.
-        robot: The controller's.
-        period: Of its cycles [s].
-
-    Raises:
-        RefusedError: If its rows are not a cycle apart, or it is another robot's.
-    """
+    """Refuse a motion that was planned for another robot or period [s]."""
     step = "Plan it with this controller: control.plan(path)."
     if abs(motion.period - period) > ON_TICK * period:
         reason = f"it was planned for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
@@ -137,12 +111,7 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
 def check_lead(what: str, lead: Array) -> None:
     """Refuse a way that begins with other lengths, where the tensions differ too much from its plan.
 
-    Args:
-        what: What was asked for.
-        lead: By how much the lengths that are held are off its first ones [m], shape (m,).
-
-    Raises:
-        RefusedError: If one is off by more than 5 mm.
+    Units: lead [m] (m,).
     """
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
@@ -153,16 +122,7 @@ def check_lead(what: str, lead: Array) -> None:
 
 
 def check_start(robot: Robot, here: Pose, start: Pose) -> None:
-    """Refuse a motion that begins elsewhere.
-
-    Args:
-        robot: The robot.
-        here: Where the platform is.
-        start: Where the motion begins.
-
-    Raises:
-        RefusedError: If a platform anchor or the origin would jump by more than 2 mm.
-    """
+    """Refuse a motion that begins elsewhere."""
     points = np.vstack((np.zeros(3), robot.platform_anchors))
     jump = float(np.linalg.norm(start.transform(points) - here.transform(points), axis=1).max())
     if not jump <= START:
@@ -172,7 +132,7 @@ def check_start(robot: Robot, here: Pose, start: Pose) -> None:
 
 
 def _at_ticks(path: Path, period: float) -> Path:
-    """The samples of a path at the ticks, and its end held until the next one."""
+    """Samples of a path at the ticks; its end is held until the next tick."""
     time = path.time - path.time[0]
     count = int(np.floor(time[-1] / period + ON_TICK)) + 1
     ticks = np.asarray(period * np.arange(count), dtype=np.float64)
@@ -215,7 +175,7 @@ def _check_feasible(plan: Plan, path: Path) -> None:
 
 
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
-    """Refuse what a winch cannot do, where its limits are known."""
+    """Refuse speeds and torques beyond the known limits of the winches."""
     winches = robot.winches
     lever = drum_lever(robot, length)  # what is missing is told here
     if winches is None:

@@ -1,4 +1,4 @@
-"""Whether all groups agree, and claiming them: all of them, or none."""
+"""Agreement of the groups, and the claim of their grants: all of them, or none."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _AGAIN: Final = "Try again; if it stays so, check the PLC's program."
 
 
 class Trouble(NamedTuple):
-    """Why groups do not agree.
+    """Reason why groups do not agree.
 
     Attributes:
         reason: Which groups, and why, in words.
@@ -47,27 +47,19 @@ class Trouble(NamedTuple):
     lasting: bool = False
 
     def refusal(self, what: str) -> RefusedError:
-        """Of what was asked for."""
+        """Error for a request."""
         return RefusedError(what, self.reason, self.next_step)
 
 
 def trouble(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
 ) -> Trouble | None:
-    """Why not all groups agree: the cause that explains most, and the groups that have it.
+    """Reason why not all groups agree, the most general one first; None where all do.
 
     A group agrees where its sample is fresh, its grant is ours, its drives are ready, without fault and not locked, and
     it has taken one of the last commands.
 
-    Args:
-        sample: What the machine said last.
-        owner: The controller's id.
-        counter: Of the last command that was sent.
-        groups: The winches of each group.
-        period: Of a cycle [s].
-
-    Returns:
-        None where all of them agree.
+    Units: period [s].
     """
     status, other = sample.status, sample.owner
     faulty = (sample.winch_fault != 0) | (sample.state == int(WinchState.FAULT))
@@ -95,7 +87,7 @@ def trouble(
 
 
 class Claim:
-    """What is sent while a controller connects.
+    """Claim of the grants of all groups.
 
     Attributes:
         mode: Of the next command; None: nothing is sent.
@@ -106,14 +98,7 @@ class Claim:
     def __init__(
         self, owner: int, groups: tuple[tuple[int, ...], ...], period: float, random: np.random.Generator
     ) -> None:
-        """Begin to claim.
-
-        Args:
-            owner: The controller's id.
-            groups: The winches of each group.
-            period: Of a cycle [s].
-            random: For waiting.
-        """
+        """Begin to claim; period [s]."""
         self._owner, self._groups, self._period, self._random = owner, groups, period, random
         self._silent = self._cycles = self._agreed = 0
         self._waiting = 0
@@ -123,12 +108,7 @@ class Claim:
         self.refused: Trouble | None = None
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
-        """Judge an answer, and decide what goes out next.
-
-        Args:
-            answer: What came back.
-            counter: Of the last command that was sent.
-        """
+        """Judge an answer, and decide on the next command."""
         if isinstance(answer, Missing):
             self._silent += 1
             if self._silent * self._period >= SILENT:
@@ -153,7 +133,7 @@ class Claim:
         return self._cycles * self._period >= CLAIMING
 
     def _give_back(self) -> None:
-        """Somebody else may have what is missing, and wait for what is here."""
+        """Leave for a random time: another controller may have the missing grants, and wait for ours."""
         self._tries += 1
         self.mode = Mode.LEAVE
         longest = LONGEST_WAIT / self._period

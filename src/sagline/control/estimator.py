@@ -1,4 +1,4 @@
-"""Where the platform is by the encoders, from sample to sample."""
+"""Estimate of the pose by the encoders."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.robot.robot import Robot
 
 
 class Estimator:
-    """Follows the platform by the lengths that are read.
+    """Forward kinematics of each sample, started at the pose before.
 
     Attributes:
         position: Of the platform's origin [m], shape (3,); NaN where it was never known.
@@ -22,43 +22,26 @@ class Estimator:
     """
 
     def __init__(self, robot: Robot, model: CableModel) -> None:
-        """Nothing is known.
-
-        Args:
-            robot: As it is planned for.
-            model: Of the cables.
-        """
+        """Begin without a pose."""
         self._solver = ForwardSolver(robot, model)
         self.forget()
 
     @property
     def pose(self) -> Pose | None:
-        """Where the platform is; None where that is not known."""
+        """Pose of the platform; None where it is not known."""
         return Pose.from_quaternion(self.position, self.quaternion) if self.status in STABLE else None
 
     def forget(self) -> None:
-        """Know nothing any more."""
+        """Forget the pose."""
         self.position, self.quaternion, self.status = np.full(3, np.nan), np.full(4, np.nan), -1
 
     def begin_at(self, pose: Pose) -> None:
-        """Know where it is.
-
-        Args:
-            pose: There.
-        """
+        """Start at a known pose."""
         self._solver.reset(pose)
         self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
 
     def locate(self, length: Array, wrench: Array | None) -> ForwardStatus | None:
-        """Follow it to where these lengths hold it.
-
-        Args:
-            length: Unstrained [m], shape (m,).
-            wrench: On the platform, shape (6,); None for none.
-
-        Returns:
-            Why its place has been lost just now; None where it has not.
-        """
+        """Solve for the pose; the status where it has just been lost. length [m] (m,), wrench (6,) or None."""
         position, quaternion = np.empty(3), np.empty(4)
         status = self._solver.step_into(length, position, quaternion, wrench)
         lost = status not in STABLE and self.status in STABLE

@@ -1,4 +1,4 @@
-"""Evidence that the fault rules share, from all cycles so far, and what a rule is."""
+"""Evidence that the fault rules share, and the base class of a rule."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOVING: Final = 1e-3  # m/s: a set point that changes faster is in motion
 
 
 class Cycle(NamedTuple):
-    """One cycle, after the sample came in and before the next command goes out.
+    """One cycle, after its sample and before the next command.
 
     Attributes:
         sample: What the machine said last.
@@ -58,7 +58,7 @@ _TRIPPED: Final = int(WinchState.FAULT)
 
 
 class Evidence:
-    """The tensions of this cycle, and what is known of the machine; shared by one set of faults.
+    """Tensions of this cycle and data of the machine, shared by one set of rules.
 
     Attributes:
         group_of: Group of each winch, shape (m,).
@@ -98,15 +98,7 @@ class Evidence:
         cell: tuple[float, float],
         largest: float,
     ) -> None:
-        """Begin with nothing seen.
-
-        Args:
-            robot: The robot as it is planned for.
-            period: Of a cycle [s].
-            groups: Winches of each group; None: two neighbors each.
-            cell: Standard deviation of a reading, and the bias that a good cell may have [N].
-            largest: Correction of a length beyond which something is wrong [m].
-        """
+        """Begin without evidence; period [s], cell: deviation and bias [N], largest correction [m]."""
         m, winch = robot.cable_count, robot.winches
         self.group_of = np.zeros(m, dtype=np.int64)
         for g, members in enumerate(groups_of(m) if groups is None else groups):
@@ -141,7 +133,7 @@ class Evidence:
         self.faulted = self.tripped = False
 
     def _set_up_motors(self, robot: Robot) -> None:
-        """How a motor's torque tells of the tension, where drum and gear are known."""
+        """Factors from motor torque to cable tension, where drum and gear are known."""
         winch, m = robot.winches, robot.cable_count
         self._pull_of_torque: Array | None = None
         self._friction = np.zeros(m)
@@ -150,7 +142,7 @@ class Evidence:
             self._friction = np.broadcast_to(winch.friction, (m,))
 
     def at(self, cycle: Cycle) -> None:
-        """Look at a cycle that is a new one: first at what most rules need one comparison with."""
+        """Update the evidence with a new cycle."""
         self.cycle, sample = cycle, cycle.sample
         self._read(cycle)
         self.oldest = ends(sample.age)[1]
@@ -166,22 +158,22 @@ class Evidence:
         self._compare(cycle)
 
     def disbelieve(self, cells: Flags) -> None:
-        """Go by some cells no more, shape (m,)."""
+        """Ignore some cells from here on, shape (m,)."""
         self.believed &= ~cells
         self._all_believed = False
 
     def stop(self) -> None:
-        """A fault stops the motion: what follows is mostly its consequence, until the winches stand."""
+        """Note that a fault stops the motion: later faults are mostly its consequences, until the winches stand."""
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:
-        """See whether the winches stand, by their set points; those who send none see it by the rates that are new."""
+        """Check whether the winches stand, by their set points; where none are sent, by new rates."""
         moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
         self._still = 0 if moves else self._still + 1
         self.stopped = self._still <= self._settled
 
     def _read(self, cycle: Cycle) -> None:
-        """Take the readings, but of cells that are not to be believed."""
+        """Take the readings, except of cells that are ignored."""
         self.tension = tension = cycle.sample.tension
         self.least, self.most = ends(tension)
         self.plain = self._all_believed and math.isfinite(self.least) and math.isfinite(self.most)
@@ -192,7 +184,7 @@ class Evidence:
 
     @property
     def fresh(self) -> Flags:
-        """Which winches' data are new in this cycle, shape (m,)."""
+        """Winches whose data are new in this cycle, shape (m,)."""
         before = None if self.cycle is None else self.cycle.before
         if self.cycle is None or before is None:
             return np.ones(len(self.group_of), dtype=bool)
@@ -231,18 +223,18 @@ class Evidence:
         self._filtered += change
 
     def pull(self, cycle: Cycle) -> Array:
-        """What each motor holds at the cable [N], to its friction; NaN where drums are not known, shape (m,)."""
+        """Cable tension by the motor torque [N], up to friction; NaN where drums are not known, shape (m,)."""
         torque = cycle.sample.torque
         return np.full(torque.shape, np.nan) if self._pull_of_torque is None else self._pull_of_torque * torque
 
     def pulling(self, cycle: Cycle) -> Flags:
-        """Which cables pull by the torque of their motors, whatever the cells say, shape (m,)."""
+        """Cables under tension by the torque of their motors, shape (m,)."""
         found: Flags = self.pull(cycle) > np.maximum(PULLING * cycle.tension, 2.0 * self._friction)
         return found
 
 
 class Reaction(IntEnum):
-    """What follows from a fault; of several at a time the largest counts."""
+    """Reaction to a fault; of several at a time the largest counts."""
 
     EVENT = 0  # it is told and recorded, and nothing else
     DEGRADED = 1  # the tension loop keeps what it has added; the motion goes on
@@ -251,7 +243,7 @@ class Reaction(IntEnum):
 
 
 class Fault(ABC):
-    """One rule. A fresh set of them, from `faults_of`, remembers nothing: make one when the operator clears a fault.
+    """One rule. `faults_of` makes a fresh set without memory, for use after the operator has cleared a fault.
 
     Attributes:
         name: What an event calls it.
@@ -315,7 +307,7 @@ class Fault(ABC):
         return self._said(line) if begins else None
 
     def _said(self, line: str) -> str | None:
-        """The line, unless there was one a moment ago."""
+        """Suppress repeats within `quiet` seconds."""
         if not self.quiet:
             return line
         if self._spoke * self.seen.period <= self.quiet:
@@ -327,4 +319,4 @@ class Fault(ABC):
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """The operator's line in every cycle in which the rule holds; of one that lasts, where an item is new."""
+        """The operator's line in every cycle in which the rule holds; of a lasting fault, where an item is new."""

@@ -29,7 +29,7 @@ from sagline.robot.robot import Robot
 
 
 class ExecutionStatus(Status):
-    """How the execution of a plan ended."""
+    """End of the execution of a plan."""
 
     DONE = 0, "the plan was gone through to its end"
     PAUSED = 1, "the platform stands on its way; resume() goes on"
@@ -42,7 +42,7 @@ class ExecutionStatus(Status):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples(Result):
-    """What the machine said, N samples one below the other; names and units as of `Sample`.
+    """N samples of a machine; names and units as of `Sample`.
 
     Where a cycle had no sample, floats are NaN and whole numbers 0.
 
@@ -103,7 +103,7 @@ class Samples(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Execution(Result, Saved):
-    """What became of a plan on the machine, in N cycles of m winches.
+    """Execution of a plan on a machine, in N cycles of m winches.
 
     The command of a cycle is what was sent in it; the sample came back in the same cycle, so that it knows nothing of
     that command yet.
@@ -186,18 +186,7 @@ def execution_of(
     zero: Array,
     events: tuple[Event, ...],
 ) -> Execution:
-    """The execution that a tape holds.
-
-    Args:
-        tape: Its cycles.
-        robot: As `Execution` has it; so are the others.
-        plan: What was to be done.
-        status: How it ended.
-        reason: One line on that.
-        period: Of a cycle [s].
-        zero: Of homing [m], shape (m,).
-        events: What happened.
-    """
+    """The execution that a tape holds; period [s], zero [m] (m,)."""
 
     def column(name: str) -> Array:
         return locked(tape.column(name))
@@ -242,7 +231,7 @@ def _samples(tape: Tape) -> Samples:
 
 
 def planned_position(execution: Execution) -> Array:
-    """Where the platform's origin was to be.
+    """Planned position of the platform's origin.
 
     Args:
         execution: N cycles.
@@ -275,7 +264,7 @@ def position_error(execution: Execution) -> Array:
 
 
 def null_space_error(execution: Execution, filter_time: float | None = None) -> Array:
-    """The part of the tension errors that lengths can mend without moving the platform, as the tension loop sees it.
+    """Tension errors in the null space of the structure matrix, as the tension loop sees them.
 
     Args:
         execution: N cycles.

@@ -1,4 +1,4 @@
-"""All faults as one table, and a fresh set of the rules for a robot."""
+"""Table of all faults, and a fresh set of rules for a robot."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ FAULTS: Final[tuple[type[Fault], ...]] = (
 
 
 class FaultRow(NamedTuple):
-    """One fault, as the docs list it.
+    """One fault, as the documentation lists it.
 
     Attributes:
         name: What an event calls it.
@@ -100,7 +100,7 @@ def faults_of(
     cell_bias: float | None = None,
     largest_correction: float = LARGEST_CORRECTION,
 ) -> tuple[Fault, ...]:
-    """A fresh set of rules, which remember nothing: one for each time that a controller leaves OFF, FAULT or homing.
+    """A fresh set of rules without memory: one for each time that a controller leaves OFF, FAULT or homing.
 
     Args:
         robot: As it is planned for.
@@ -140,7 +140,7 @@ def faults_of(
 
 
 def _check_groups(groups: object, cable_count: int) -> None:
-    """Refuse what does not have every winch once."""
+    """Refuse groups that do not have every winch once."""
     try:
         winches = sorted(winch for group in groups for winch in group)  # type: ignore[attr-defined]
         fits = winches == list(range(cable_count))

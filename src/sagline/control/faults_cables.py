@@ -18,7 +18,7 @@ SUDDEN: Final = 0.5  # of the planned tension: what a cable had that broke, one 
 
 
 class OverTension(Fault):
-    """A cable pulls too hard."""
+    """Cable tension too large."""
 
     name = "over-tension"
     rule = f"T_A above its upper limit in 1 sample, or above {NEAR:g} of it in {NEAR_SAMPLES}"
@@ -32,7 +32,7 @@ class OverTension(Fault):
         self._least, self._for = float(self._near.min()), np.zeros(seen.limit.size, dtype=np.int64)
 
     def found(self, cycle: Cycle) -> str | None:
-        """The tightest, by its limit."""
+        """The cable with the largest tension relative to its limit."""
         seen, tension = self.seen, self.seen.tension
         if not seen.most > self._least:
             self._for.fill(0)
@@ -51,7 +51,7 @@ class OverTension(Fault):
 
 
 class CableBroken(Fault):
-    """A cable is gone: with the others the platform can be held nowhere near."""
+    """Broken cable: the other tensions change at the same time."""
 
     name = "cable broken"
     rule = (
@@ -64,7 +64,7 @@ class CableBroken(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first cable that is newly found broken."""
+        """The first cable that has just broken."""
         seen = self.seen
         if not (seen.any_low and seen.compared):
             return None
@@ -86,7 +86,7 @@ class CableBroken(Fault):
 
 
 class Slack(Fault):
-    """A cable hangs that the plan wants taut."""
+    """Slack cable that is taut in the plan."""
 
     name = "slack"
     rule = (
@@ -119,7 +119,7 @@ _STEP: Final = "The tension loop rests. Check cell, plug and amplifier when the 
 
 
 class CellDead(Fault):
-    """A cell reads what cannot be."""
+    """Load cell with an impossible reading."""
 
     name = "cell zero or saturated"
     rule = (
@@ -136,7 +136,7 @@ class CellDead(Fault):
         self._least, self._most = -SIGMAS * seen.sigma, float(seen.full_scale.min())
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first cell that is newly found dead."""
+        """The first cell with a new impossible reading."""
         seen, tension = self.seen, cycle.sample.tension
         if seen.plain and seen.least >= self._least and seen.most < self._most and not seen.any_low:
             return None
@@ -154,7 +154,7 @@ class CellDead(Fault):
 
 
 class CellStuck(Fault):
-    """A cell always reads the same."""
+    """Load cell with a constant reading."""
 
     name = "cell stuck"
     rule = f"the same reading in {STUCK_SAMPLES} samples in motion"
@@ -168,7 +168,7 @@ class CellStuck(Fault):
         self._for = np.zeros(seen.limit.size, dtype=np.int64)
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first cell that is newly found stuck."""
+        """The first cell that is newly stuck."""
         seen = self.seen
         if cycle.before is None:
             return None
@@ -190,7 +190,7 @@ class CellStuck(Fault):
 
 
 class CellOff(Fault):
-    """A cell is at odds with the others: the platform would not be in balance."""
+    """Load cell that contradicts the force balance of the platform."""
 
     name = "cell wrong"
     rule = f"parity of the cells > {SIGMAS:g} sigma names it for {ODD_TIME:g} s, whatever the load weighs"
@@ -199,14 +199,14 @@ class CellOff(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with no cell at odds."""
+        """Begin with no cell suspected."""
         super().__init__(seen)
         self._for = np.zeros(seen.limit.size, dtype=np.int64)
         self._samples = round(ODD_TIME / seen.period)
         self._quiet = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The cell, the first time; with one in doubt the others have nothing to be held against."""
+        """The wrong cell, once; with one cell in doubt the others cannot be compared."""
         seen = self.seen
         error = self._error(cycle)
         limit = SIGMAS * seen.sigma
@@ -230,7 +230,7 @@ class CellOff(Fault):
         )
 
     def _error(self, cycle: Cycle) -> Array | None:
-        """What the balance says of each cell [N], (m,), where there is something to say."""
+        """Error of each cell by parity [N], (m,); None where parity is not available."""
         seen = self.seen
         if cycle.gains is None or not seen.compared or seen.any_low or not all(seen.believed.tolist()):
             return None

@@ -1,4 +1,4 @@
-"""Faults of encoders and drives, and of what the tension loop asks of them."""
+"""Faults of encoders, drives, and the correction of the tension loop."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LONGEST: Final = 1.0  # s between two samples of a PLC; more is its clock that b
 
 
 class EncoderJump(Fault):
-    """Length and speed of a drum do not agree."""
+    """Encoder whose length and rate do not agree."""
 
     name = "encoder jump"
     rule = (
@@ -45,7 +45,7 @@ class EncoderJump(Fault):
         self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # for how many cycles each group's commands were
 
     def found(self, cycle: Cycle) -> str | None:
-        """The largest jump, or what is no number."""
+        """The largest jump, or a reading that is not finite."""
         sample, before = cycle.sample, cycle.before
         known, self._numbers = self._numbers, finite(sample.length) and finite(sample.rate)
         if before is not None:
@@ -60,7 +60,7 @@ class EncoderJump(Fault):
         return self._jump(cycle, sample, before) if known and before is not None else None
 
     def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
-        """The rate at the end is that of the jump itself, where a drive takes it from its encoder."""
+        """The largest jump against the rate before it; the rate after it may contain the jump."""
         passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
         change = sample.length - before.length
         jump = change - before.rate * passed
@@ -88,7 +88,7 @@ class EncoderJump(Fault):
 
 
 class FollowingError(Fault):
-    """A drum is not where it was sent."""
+    """Drum too far from its set point."""
 
     name = "following error"
     rule = f"|set point - length| > {1e3 * FOLLOWING:g} mm, set points being those that the PLC has taken and follows"
@@ -102,7 +102,7 @@ class FollowingError(Fault):
         self._sent: deque[Command] = deque(maxlen=REMEMBERED)
 
     def found(self, cycle: Cycle) -> str | None:
-        """The drum furthest away."""
+        """The drum furthest from its set point."""
         command, length = cycle.command, cycle.sample.length
         if command is None or command.mode != _FOLLOW:
             self._sent.clear()
@@ -121,7 +121,7 @@ class FollowingError(Fault):
         )
 
     def _away(self, cycle: Cycle) -> Array:
-        """How far each drum is from the way between the command its PLC took last and the one before, (m,).
+        """Distance of each drum from the interval between the last two commands its PLC took [m], (m,).
 
         A command that is still on its way does not count, nor do drives that may not move.
         """
@@ -142,7 +142,7 @@ class FollowingError(Fault):
 
 
 class NotFollowing(Fault):
-    """A group stays behind the others, and does not say so."""
+    """Group that takes no commands, or does not follow them."""
 
     name = "group does not follow"
     rule = (
@@ -187,7 +187,7 @@ class NotFollowing(Fault):
         return None
 
     def _idles(self, cycle: Cycle, group: int) -> int:
-        """In how many samples in a row it has not followed what it took."""
+        """Number of consecutive samples in which a group did not follow the commands it took."""
         sample, before = cycle.sample, cycle.before
         assert self._first is not None
         echo = int(sample.echo[group])
@@ -199,7 +199,7 @@ class NotFollowing(Fault):
 
 
 class ServoSaturated(Fault):
-    """A drive gives all it can."""
+    """Drive at its force limit."""
 
     name = "servo at its limit"
     rule = f"a drive's force at its limit for {SATURATED:g} s"
@@ -213,7 +213,7 @@ class ServoSaturated(Fault):
         self._samples = round(SATURATED / seen.period)
 
     def found(self, cycle: Cycle) -> str | None:
-        """The drive that has been there longest."""
+        """The drive that has been at its limit longest."""
         if _AT_LIMIT not in self.seen.states:
             self._for.fill(0)
             return None
@@ -229,7 +229,7 @@ class ServoSaturated(Fault):
 
 
 class CorrectionAtLimit(Fault):
-    """The tension loop would change a length further than any good encoder is off."""
+    """Correction of the tension loop larger than the error of any good encoder."""
 
     name = "correction at its limit"
     rule = "the tension loop has changed a length by as much as it may, 5 mm unless set otherwise"
@@ -238,7 +238,7 @@ class CorrectionAtLimit(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The length that is changed most."""
+        """The length with the largest correction."""
         if largest(cycle.correction) < self.seen.largest * (1.0 - 1e-9):
             return None
         winch = int(np.argmax(np.abs(cycle.correction)))

@@ -1,4 +1,4 @@
-"""Faults of what is between controller and machine: blocks, grants, PLCs, the clock, the recording."""
+"""Faults between controller and machine: blocks, grants, PLCs, clock, recording."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _FREE: Final = "Free this computer of other work."
 
 
 class _Old(Fault):
-    """A group's newest sample is so many cycles old."""
+    """Newest sample of a group too many cycles old."""
 
     cycles: int
     step: str
 
     def found(self, cycle: Cycle) -> str | None:
-        """The oldest group, and how old."""
+        """The group with the oldest sample, and its age."""
         worst, limit = self.seen.oldest, self.cycles * self.seen.period
         if worst < limit * (1.0 - ROUNDING):
             return None
@@ -41,7 +41,7 @@ class _Old(Fault):
 
 
 class GroupStale(_Old):
-    """A group is late; the tension loop rests until it is back."""
+    """Late group; the tension loop rests until it is back."""
 
     name = "group stale"
     rule = f"newest sample of a group {STALE} cycles old: it is silent, or what it sends is repeated, late, bad"
@@ -53,7 +53,7 @@ class GroupStale(_Old):
 
 
 class GroupSilent(_Old):
-    """A group is gone."""
+    """Silent group."""
 
     name = "group silent"
     rule = f"newest sample of a group {SILENT} cycles old"
@@ -64,7 +64,7 @@ class GroupSilent(_Old):
 
 
 class BlockDiscarded(Fault):
-    """Blocks come in that are no good; if no good ones come either, the group is stale."""
+    """Invalid blocks; where no valid ones arrive, the group becomes stale."""
 
     name = "block discarded"
     rule = "torn or foreign, by counters at both ends, magic, version or size; repeated, or older than one before"
@@ -77,7 +77,7 @@ class BlockDiscarded(Fault):
         self._quiet, self._line = WINDOW, ""
 
     def found(self, cycle: Cycle) -> str | None:
-        """The group and how many of its blocks; it ends after a second without another."""
+        """The group and the number of its discarded blocks; ends after a second without another."""
         sample, before = cycle.sample, cycle.before
         self._quiet += 1
         if before is not None and sample.discarded.tolist() != before.discarded.tolist():
@@ -91,7 +91,7 @@ class BlockDiscarded(Fault):
 
 
 class OwnerLost(Fault):
-    """Somebody else has a grant that was ours, or nobody."""
+    """Grant lost to another controller, or to nobody."""
 
     name = "owner lost"
     rule = "grant of a group differs, once the connection had all of them"
@@ -112,7 +112,7 @@ class OwnerLost(Fault):
 
 
 class GroupActs(Fault):
-    """A PLC or a drive has stopped by itself."""
+    """PLC or drive that has stopped by itself."""
 
     name = "group acts by itself"
     rule = "a PLC reports a fault or locked drums, or a drive a fault; the connection ends with none"
@@ -121,12 +121,12 @@ class GroupActs(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with nothing told."""
+        """Begin without reported groups."""
         super().__init__(seen)
         self._told: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
-        """The groups of which it is new, and why the first of them."""
+        """The groups that are new, and the reason of the first."""
         seen, sample = self.seen, cycle.sample
         if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
             return None
@@ -156,7 +156,7 @@ class GroupActs(Fault):
 
 
 class EmergencyStop(Fault):
-    """The hardware has taken the power; the PLC mirrors it."""
+    """Emergency stop of the hardware, as the PLC reports it."""
 
     name = "emergency stop"
     rule = "a PLC reports that the emergency stop is pressed"
@@ -177,7 +177,7 @@ class EmergencyStop(Fault):
 
 
 class CycleLate(Fault):
-    """This computer is too busy."""
+    """Cycle late: the computer is too busy."""
 
     name = "cycle late"
     rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles > {1e3 * LATE_OFTEN:g} ms late"
@@ -191,7 +191,7 @@ class CycleLate(Fault):
         self._late: deque[tuple[int, float]] = deque()  # of the window: when, and by how much
 
     def found(self, cycle: Cycle) -> str | None:
-        """The latest; it ends after a second in which there were few."""
+        """The latest cycle of the last second, or the number of late ones."""
         self._cycle += 1
         late = self._late
         if LATE_OFTEN < cycle.late <= LOST:
@@ -212,7 +212,7 @@ class CycleLate(Fault):
 
 
 class CycleLost(Fault):
-    """This computer stood still."""
+    """Cycle so late that the PLCs have stopped the winches."""
 
     name = "cycle lost"
     rule = f"> {1e3 * LOST:g} ms late"
@@ -220,7 +220,7 @@ class CycleLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """How late."""
+        """By how much the cycle was late."""
         if cycle.late <= LOST:
             return None
         return (
@@ -230,7 +230,7 @@ class CycleLost(Fault):
 
 
 class RecordingStopped(Fault):
-    """The motion goes on."""
+    """Recording stopped; the motion goes on."""
 
     name = "recording stopped"
     rule = "a write fails, as where the disk is full, or the queue to the writer is full"
@@ -238,7 +238,7 @@ class RecordingStopped(Fault):
     within = "1 s"
 
     def found(self, cycle: Cycle) -> str | None:
-        """Why."""
+        """The reason."""
         if not cycle.recording:
             return None
         why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."

@@ -1,4 +1,4 @@
-"""Homing: the operator names the pose in which the platform is held, and jogs until the tensions say so too."""
+"""Homing: the operator names the pose of the platform, and jogs winches until the tensions agree with it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MOST: Final = 1.2  # times the plan's tension: more ends a jog
 
 
 class Homing:
-    """One pose at which lengths are set to those of the plan.
+    """Plan at the named pose, and comparison of tensions with it.
 
     Attributes:
         plan: The robot at that pose.
@@ -38,17 +38,7 @@ class Homing:
     """
 
     def __init__(self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod) -> None:
-        """Plan the pose.
-
-        Args:
-            robot: The robot.
-            pose: Where the platform is held, a single pose.
-            model: Of the cables.
-            method: How the load is shared.
-
-        Raises:
-            RefusedError: If the pose has no tensions within the limits.
-        """
+        """Plan the pose."""
         self.plan = inverse(robot, pose, model, method)
         if not self.plan.feasible:
             gap = self.plan.gaps[0]
@@ -65,19 +55,12 @@ class Homing:
         self.off, self.zero, self.agrees = np.full(m, np.nan), np.zeros(m), False
 
     def rest(self) -> None:
-        """Begin anew to look: something moved."""
+        """Discard the samples: a winch has moved."""
         self._count = 0
         self._lengths[:] = self._tensions[:] = 0.0
 
     def look(self, sample: Sample) -> bool:
-        """Take a sample at rest.
-
-        Args:
-            sample: What the machine said.
-
-        Returns:
-            Whether enough of them are there, and agree with the plan.
-        """
+        """Add a sample at rest; True where there are enough of them, and they agree with the plan."""
         if self._counter.size and bool((sample.counter == self._counter).any()):
             return False  # a group says what it said before
         self._counter = sample.counter
@@ -93,7 +76,7 @@ class Homing:
         return self.agrees
 
     def refusal(self) -> RefusedError:
-        """Which tensions are off, and which jog brings them nearer."""
+        """Error that names the deviating tensions, and a jog that reduces them."""
         off, beyond = self.off, np.abs(self.off) - SIGMAS * self.sigma
         named = ", ".join(f"{i} by {off[i]:+.1f} N" for i in np.argsort(-beyond)[:3] if beyond[i] > 0.0)
         allowed = f"{SIGMAS * float(self.sigma.max()):.3g} N"
@@ -104,7 +87,7 @@ class Homing:
         )
 
     def _jog(self, off: Array) -> tuple[int, float]:
-        """The jog of one winch that takes most of the error away, and by how much."""
+        """Winch and length [m] of the jog that reduces the error most."""
         slope = stiffness(self.state).tension_sensitivity
         by = -(slope.T @ off) / (slope**2).sum(axis=0)
         left = np.linalg.norm(off[:, None] + slope * by, axis=0)
@@ -113,17 +96,10 @@ class Homing:
 
 
 class HomingJog:
-    """One winch jogged while the platform's place is not known: its tensions alone are watched."""
+    """Set points of a jog of one winch while the pose is unknown."""
 
     def __init__(self, point: SetPoint, winch: int, by: float, period: float) -> None:
-        """Begin where the winches stand.
-
-        Args:
-            point: Where they stand.
-            winch: Which is jogged; the others have no power.
-            by: How far [m].
-            period: Of a cycle [s].
-        """
+        """Begin at the lengths of the winches; by [m], period [s]."""
         self._lengths, self._rates = winch_lengths(point.length, winch, by, period)
         self._row, self._point = 0, point
         self._enable = np.zeros(len(point.length), dtype=np.bool_)
@@ -142,5 +118,5 @@ class HomingJog:
 
 
 def tension_limits(homing: Homing, sample: Sample) -> Array:
-    """What a jog may bring the tensions to [N], shape (m,): 1.2 of the plan; those that are above already, no more."""
+    """Tension limits of a jog [N], shape (m,): 1.2 of the plan, or the present tension where that is larger."""
     return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

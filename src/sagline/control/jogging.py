@@ -1,4 +1,4 @@
-"""Jogging: one winch, or the platform along a straight line, as the operator asks."""
+"""Jogging of one winch, or of the platform along a straight line."""
 
 from __future__ import annotations
 
@@ -32,26 +32,15 @@ MOST_PLATFORM: Final = 0.2  # m, rad at a time
 
 
 def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
-    """A winch, and by how much it is jogged [m], positive where it lets cable out.
-
-    Raises:
-        InvalidValueError: If there is no such winch, or it is too far for a jog.
-    """
+    """Checked number of a winch, and the change of its length [m], positive where cable is let out."""
     chosen = whole_number(winch, "winch", 0, robot.cable_count - 1)
     return chosen, _at_most(number(by, "by", "m"), "m", MOST_WINCH)
 
 
 def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
-    """Lengths and rates of a jog of one winch, one row a cycle, from where it stands.
+    """Lengths and rates of a jog of one winch, (N, m), one row for each cycle from rest.
 
-    Args:
-        length: Before it [m], shape (m,).
-        winch: Which.
-        by: How far [m].
-        period: Of a cycle [s].
-
-    Returns:
-        Both of shape (N, m); the first row is where it stands.
+    Units: length [m] (m,); by [m]; period [s].
     """
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
@@ -64,19 +53,9 @@ def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[
 def winch_jog(
     robot: Robot, length: Array, here: Pose, winch: int, by: float, period: float, model: CableModel
 ) -> Motion:
-    """One winch jogged from an equilibrium, where the platform goes along: planned and checked.
+    """Plan and check a jog of one winch, in which the platform moves too.
 
-    Args:
-        robot: The robot.
-        length: Unstrained lengths off the drums there [m], shape (m,).
-        here: Where the platform is.
-        winch: Which winch.
-        by: How far [m], positive where it lets cable out.
-        period: Of a cycle [s].
-        model: Of the cables.
-
-    Raises:
-        RefusedError: If the platform would have no stable place on the way, or a tension leaves its limits.
+    Units: length [m] (m,); by [m]; period [s].
     """
     lengths, rates = winch_lengths(length, winch, by, period)
     found = forward(robot, lengths, here, model)
@@ -109,7 +88,7 @@ def winch_jog(
 
 
 class PlatformJog:
-    """The platform jogged along a straight line, each pose solved when it is due."""
+    """Jog of the platform along a straight line; each pose is solved when it is due."""
 
     def __init__(
         self,
@@ -121,21 +100,7 @@ class PlatformJog:
         model: CableModel,
         method: TensionMethod,
     ) -> None:
-        """Prepare the solver.
-
-        Args:
-            robot: The robot.
-            begin: The set point that is held.
-            pose: Where the platform is.
-            by: Displacement [m] and rotation vector [rad], world axes, shape (6,).
-            period: Of a cycle [s].
-            model: Of the cables.
-            method: How the load is shared.
-
-        Raises:
-            RefusedError: If the pose at the end, or the first one, has no tensions within the limits; or the lengths
-                that are held are not those of this pose.
-        """
+        """Prepare the solver and check the end; by [m, rad] (6,), period [s]."""
         self._robot, self._pose, self._by, self._period = robot, pose, by, period
         self._solver = InverseSolver(robot, model, method)
         move, turn = float(np.linalg.norm(by[:3])), float(np.linalg.norm(by[3:]))
@@ -155,7 +120,7 @@ class PlatformJog:
         self._fade = Fade(lead, period)
 
     def step(self) -> SetPoint:
-        """The set point at the end of the next cycle; where the pose has no answer the last one, and `failed` why."""
+        """The set point of the next cycle; where the pose has no solution, the last one, and `failed` the reason."""
         self._cycle = min(self._cycle + 1, self._count)
         share = self._cycle / self._count
         found = self._solver.step(*self._at(smooth(share)))
@@ -180,7 +145,7 @@ class PlatformJog:
         return self._point
 
     def _at(self, share: float) -> tuple[Array, Array]:
-        """Position and quaternion when so much of the way is done."""
+        """Position and quaternion at a share of the way."""
         by = share * self._by
         half = 0.5 * float(np.linalg.norm(by[3:]))
         x, y, z = 0.5 * np.sinc(half / np.pi) * by[3:]
@@ -198,11 +163,7 @@ class PlatformJog:
 
 
 def checked_displacement(by: ArrayLike) -> Array:
-    """A displacement of the platform, with or without a rotation, as shape (6,).
-
-    Raises:
-        InvalidValueError: If it is neither of shape (3,) nor (6,), or too far for a jog.
-    """
+    """Checked displacement of the platform with a rotation vector, zero where not given, shape (6,)."""
     given = checked(by, "by", "m or rad")
     if given.shape not in ((3,), (6,)):
         step = "Give a displacement, or that and a rotation vector."

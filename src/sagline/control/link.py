@@ -1,4 +1,4 @@
-"""What a controller and the machine say to each other: a command and a sample a cycle, whatever is between them."""
+"""Messages between controller and machine: one command and one sample in each cycle, over any connection."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RAMP: Final = 0.2  # s, in which rates go to zero, here and in a PLC
 
 
 class Mode(IntEnum):
-    """What a command asks of the drives."""
+    """Task of the drives in a command."""
 
     LEAVE = 0  # brakes on; the grant is given back
     HOLD = 1  # stay where you are
@@ -31,7 +31,7 @@ class Mode(IntEnum):
 
 
 class GroupStatus(IntFlag):
-    """What a PLC says of its group."""
+    """Status bits of a group."""
 
     READY = 1  # drives have no fault, and power
     BRAKED = 2
@@ -43,7 +43,7 @@ class GroupStatus(IntFlag):
 
 
 class GroupFault(Status):
-    """Why a PLC acts by itself; `text` says it."""
+    """Reason why a PLC acts by itself, in words `text`."""
 
     NONE = 0, "no fault"
     HEARTBEAT = 1, "no command came for 100 ms"  # the counter stood, or a command was valid no longer
@@ -55,12 +55,12 @@ class GroupFault(Status):
 
 
 def fault_text(code: int) -> str:
-    """What a PLC's fault means, also of one whose program knows more of them than we do."""
+    """Meaning of a PLC's fault code; also of unknown codes."""
     return GroupFault(code).text if code in set(GroupFault) else f"code {code}, which no table here has"
 
 
 class WinchState(IntEnum):
-    """What a PLC says of one winch."""
+    """State of one winch."""
 
     BRAKED = 0
     ENABLED = 1
@@ -70,7 +70,7 @@ class WinchState(IntEnum):
 
 
 class Command(NamedTuple):
-    """What a controller asks for in a cycle.
+    """Command of a controller in one cycle.
 
     Attributes:
         counter: Of commands, one more each cycle; wraps to 1 after 2^31 - 1.
@@ -96,7 +96,7 @@ class Command(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """What the machine said last; arrays belong to the one who asked. G groups, m winches.
+    """Newest data of the machine, in arrays of the caller's own. G groups, m winches.
 
     Attributes:
         time: When it was asked, on the link's clock [s].
@@ -138,7 +138,7 @@ class Sample(NamedTuple):
 
 
 class Missing(NamedTuple):
-    """There is no sample: some groups have never answered.
+    """No sample, because some groups have never answered.
 
     Attributes:
         time: When it was asked, on the link's clock [s].
@@ -152,7 +152,7 @@ class Missing(NamedTuple):
 
 
 class Link(Protocol):
-    """The way to a machine.
+    """Connection to a machine.
 
     What it hands over is never older than what it handed over before: a block that is torn, foreign, repeated or out of
     order is discarded, and the group's age goes on.
@@ -164,10 +164,10 @@ class Link(Protocol):
 
     @property
     def period(self) -> float:
-        """Between two commands, as the PLCs expect them: set points are reached so long after their command [s]."""
+        """Time between two commands, after which set points are reached [s]."""
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Send a command and take what there is, without waiting for an answer.
+        """Send a command and return the newest sample, without waiting for an answer.
 
         What each group is sent, `sent_to` says: the command only where its owner has the grant.
 
@@ -176,11 +176,11 @@ class Link(Protocol):
         """
 
     def close(self) -> None:
-        """Let go of the machine."""
+        """Close the connection."""
 
 
 class Sent(Enum):
-    """What a group is sent in a cycle."""
+    """Message to a group in a cycle."""
 
     COMMAND = "the command"
     CLAIM = "the claim of its owner"
@@ -188,32 +188,18 @@ class Sent(Enum):
 
 
 def sent_to(owner: int, command: Command) -> Sent:
-    """What a group is sent.
-
-    Args:
-        owner: Who has its grant, as it said last; 0 for nobody.
-        command: What a controller asks for.
-    """
+    """Message to a group, by the owner of its grant; 0 for nobody."""
     if owner == command.owner:
         return Sent.COMMAND
     return Sent.CLAIM if command.claims and command.mode != Mode.LEAVE else Sent.NOTHING
 
 
 def newer(counter: int, known: int) -> bool:
-    """Whether a counter is ahead of another, by less than half of all there are.
-
-    Args:
-        counter: Of a command or block.
-        known: Of another.
-    """
+    """Whether a counter is ahead of another, by less than half of all there are."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 
 def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:
-    """The winches of each group: two neighbors share a PLC, the last may be alone.
-
-    Args:
-        cable_count: Number of winches m.
-    """
+    """Winches of each group: two neighbors share a PLC, the last may be alone."""
     winches = range(cable_count)
     return tuple(tuple(winches[i : i + GROUP_SIZE]) for i in range(0, cable_count, GROUP_SIZE))

@@ -38,14 +38,7 @@ def cell_errors(robot: Robot) -> tuple[Array, Array]:
 
 
 def balance_slope(state: Equilibrium) -> Array:
-    """How the wrench of the cables changes with the tensions at the frame ends, the platform held.
-
-    Args:
-        state: An equilibrium, single or N of them.
-
-    Returns:
-        Its free parts, shape (..., n, m) [N/N, N m/N]; n the number of free motions.
-    """
+    """Free components of d(wrench)/d(tension) at the frame ends, platform held, (..., n, m) [N/N, N m/N]."""
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
     found: Array = -first_of(state.robot).freedom @ wrench  # the slopes are of the force on the cable
@@ -53,7 +46,7 @@ def balance_slope(state: Equilibrium) -> Array:
 
 
 def parity(state: Equilibrium) -> Array:
-    """What the balance of the platform says of each load cell, whatever its load weighs.
+    """Parity matrix for fault detection of load cells, independent of the weight of the load.
 
     Where the platform rests, tensions other than planned must leave the wrench as it is, but for a load that is not the
     planned one. With V the projection on all that they must not do, less the direction of the load, row i is
@@ -87,7 +80,7 @@ def parity(state: Equilibrium) -> Array:
 
 
 class NullSpace(NamedTuple):
-    """What can be mended at a pose, and what can be told; N_L = `null_lengths`, K_A = `tension_sensitivity`.
+    """Null-space and parity matrices at a pose; N_L = `null_lengths`, K_A = `tension_sensitivity`.
 
     Attributes:
         projection: Pi = N_L N_L^T, of lengths on those that do not move the platform, shape (..., m, m).
@@ -103,7 +96,7 @@ class NullSpace(NamedTuple):
 
 
 def null_space(state: Equilibrium) -> NullSpace:
-    """The changes of length that do not move the platform, to first order, and the tensions at the frame they change.
+    """Changes of length that do not move the platform, to first order, and their effect on the tensions.
 
     Six of the eight directions of a tension error are a wrench that the plan does not know, a payload or a load cell's
     own error; lengths that would hide it would move the platform. They are not among these.
@@ -134,7 +127,7 @@ EVERY: Final = 0.5  # s between rows: 3 cm at the article's speed
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gains:
-    """A table of what the tension loop needs, one row a pose of the plan.
+    """Matrices of the tension loop at some poses of a plan.
 
     Attributes:
         time: Of the poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
@@ -146,7 +139,7 @@ class Gains:
     _changes: tuple[float, ...]  # where the next row is as near, R - 1 of them
 
     def at(self, time: float) -> NullSpace:
-        """The row of the nearest pose; before the first that one, after the last the last, where the robot waits.
+        """Matrices of the nearest pose in time.
 
         Args:
             time: On the path's clock [s].

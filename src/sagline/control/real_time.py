@@ -33,10 +33,10 @@ BINS: Final = 1000  # and one for all that is longer
 
 
 class Histogram:
-    """How often which duration occurred, in bins of 0.1 ms up to 100 ms."""
+    """Histogram of durations, in bins of 0.1 ms up to 100 ms."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin empty."""
         self._counts = [0] * (BINS + 1)  # a list counts quicker than an array
         self.longest = 0.0
 
@@ -51,11 +51,11 @@ class Histogram:
 
     @property
     def counts(self) -> Indices:
-        """How many durations are in each bin, shape (1001,); the last has all from 100 ms on."""
+        """Number of durations in each bin, shape (1001,); the last has all from 100 ms on."""
         return locked(np.array(self._counts))
 
     def quantile(self, share: float) -> float:
-        """The duration that so many do not exceed, rounded up to the end of its bin [s]; 0 where there are none.
+        """Quantile of the durations, rounded up to the end of its bin [s]; 0 where there are none.
 
         Args:
             share: Of all, 0 to 1.
@@ -118,15 +118,7 @@ T = TypeVar("T")
 
 
 def in_background(work: Callable[[], T], threaded: bool) -> Future[T]:
-    """Begin it in a thread of its own; on a lockstep clock, where nobody waits, do it at once.
-
-    Args:
-        work: Reads nothing that cycles change.
-        threaded: Whether time goes on beside it.
-
-    Returns:
-        What becomes of it; done already without a thread.
-    """
+    """Begin work in a thread of its own; without threads, as on a lockstep clock, complete it at once."""
     if threaded:
         pool = ThreadPoolExecutor(1, "sagline planning")
         begun = pool.submit(work)
@@ -141,21 +133,21 @@ def in_background(work: Callable[[], T], threaded: bool) -> Future[T]:
 
 
 class Garbage:
-    """Whether garbage is collected: not while something moves, as that takes longer than a cycle."""
+    """Garbage collection, which is off during motion, as it takes longer than a cycle."""
 
     def __init__(self) -> None:
-        """Leave it as it is."""
+        """Begin without change."""
         self._stopped = False
 
     def stop(self) -> None:
-        """Collect none from here on; what there is now is not looked at any more."""
+        """Switch collection off, and exempt all objects that exist now."""
         if not self._stopped and gc.isenabled():
             self._stopped = True
             gc.disable()
             gc.freeze()
 
     def go_on(self) -> None:
-        """Collect again, if it was so before."""
+        """Switch collection on again, if it was on before."""
         if self._stopped:
             self._stopped = False
             gc.unfreeze()
@@ -164,15 +156,9 @@ class Garbage:
 
 @contextmanager
 def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
-    """Within, Ctrl-C calls a function and does nothing else, a second one nothing; at the end it interrupts.
+    """Context in which the first Ctrl-C calls a function; KeyboardInterrupt is raised at the end.
 
     It does so in the main thread alone, and not where Ctrl-C is ignored.
-
-    Args:
-        stop: Called between two instructions of Python, wherever they are.
-
-    Raises:
-        KeyboardInterrupt: At the end, if Ctrl-C was pressed.
     """
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
@@ -200,15 +186,11 @@ HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # below the frame's anchors, in widths of the 
 
 
 def load_all(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
-    """Do once what homing, a path and jogs do, near the middle of a robot; what is refused there does not matter.
+    """Run homing, a path and jogs once, near the middle of a robot, to load their kernels; refusals do not matter.
 
     Each part is tried by itself: one that is refused leaves no other cold.
 
-    Args:
-        robot: The robot.
-        period: Of a cycle [s].
-        model: Of the cables.
-        method: How the load is shared.
+    Units: period [s].
     """
     middle, homing = _homed(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
@@ -228,7 +210,7 @@ def load_all(robot: Robot, period: float, model: CableModel, method: TensionMeth
 
 
 def _homed(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
-    """The first place where the tensions are within their limits; else the middle, and None."""
+    """The first place with tensions within the limits; else the middle, and None."""
     for place in _middles(robot):
         pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
         with suppress(SaglineError):
@@ -239,14 +221,14 @@ def _homed(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose
 
 
 def _hanging(robot: Robot, pose: Pose) -> SetPoint:
-    """A set point with straight cables."""
+    """Set point with straight cables."""
     length = np.linalg.norm(pose.transform(robot.platform_anchors) - robot.frame_anchors, axis=1)
     none, unknown = np.zeros(len(length)), np.full(len(length), np.nan)
     return SetPoint(length, none, unknown, unknown, None, None, np.nan, True)
 
 
 def _middles(robot: Robot) -> list[Array]:
-    """Places where a robot can probably be: the middle of its test box, those below that of its frame anchors."""
+    """Probable positions: middle of the test box, and points below the middle of the frame anchors."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     width = float(np.linalg.norm((high - low)[:2]))
     below = [np.asarray(0.5 * (low + high) - [0.0, 0.0, height * width]) for height in HEIGHTS]

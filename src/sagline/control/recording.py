@@ -1,4 +1,4 @@
-"""Events and the record of each cycle, for those who ask afterwards and those who watch."""
+"""Events, and the record of each cycle for executions and recorders."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sagline.kinematics.plan import Plan
 
 
 class EventKind(StrEnum):
-    """What an event is about."""
+    """Kind of an event."""
 
     STATE = "state"  # it changed
     FAULT = "fault"
@@ -26,7 +26,7 @@ class EventKind(StrEnum):
 
 
 class Event(NamedTuple):
-    """One thing that happened.
+    """Change of state, fault or note.
 
     Attributes:
         time: On the link's clock [s].
@@ -57,7 +57,7 @@ WHOLE_OF_WINCHES: Final = ("counts", "state", "winch_fault")
 
 
 class Recorded(NamedTuple):
-    """One cycle, as it went. Its arrays are not written to again.
+    """Record of one cycle. Its arrays are not written to again.
 
     Attributes:
         number: Of the cycle, from 0.
@@ -91,11 +91,11 @@ class Recorded(NamedTuple):
 
 
 class Recorder(Protocol):
-    """One who looks on: a log, a status line. It must never block: the loop waits for it."""
+    """Receiver of cycles and events, such as a log or a status line. It must never block: the loop waits for it."""
 
     @property
     def stopped(self) -> str:
-        """Why it takes nothing more, "" while it does: what `Cycle.recording` tells the rules for faults."""
+        """Reason why it takes nothing more, "" while it does: `Cycle.recording` of the fault rules."""
 
     def begins(self, plan: Plan) -> None:
         """Take a plan, before the first cycle that follows it."""
@@ -111,16 +111,10 @@ class Recorder(Protocol):
 
 
 class Tape:
-    """Cycles one below the other, in memory that is made beforehand."""
+    """Table of cycles, in memory that is allocated beforehand."""
 
     def __init__(self, cable_count: int, group_count: int, expected: int) -> None:
-        """Make room.
-
-        Args:
-            cable_count: Number of winches m.
-            group_count: Number of groups G.
-            expected: How many cycles are to come; there may be more.
-        """
+        """Allocate memory."""
         m, g = cable_count, group_count
         own = dict.fromkeys(REAL_OWN, 1)
         groups = {f"group_{name}": g for name in REAL_OF_GROUPS}
@@ -169,14 +163,7 @@ class Tape:
         return self._numbers, self._codes
 
     def column(self, name: str) -> NDArray[Any]:
-        """One quantity over the cycles: a part of the tape, which is not copied and will not change.
-
-        Args:
-            name: Of what a cycle leaves; what a sample has, with group_ or winch_ before it.
-
-        Returns:
-            Shape (N,) for what there is one of, else (N, width); float64 or int64.
-        """
+        """One quantity over the cycles, (N,) or (N, width), without a copy."""
         rows = slice(self._count)
         whole = name in self._whole
         found: NDArray[Any] = self._codes[rows, self._whole[name]] if whole else self._numbers[rows, self._real[name]]
@@ -184,7 +171,7 @@ class Tape:
 
 
 def _columns(widths: dict[str, int]) -> dict[str, slice]:
-    """Which columns of a table each quantity has."""
+    """Columns of each quantity in a table."""
     ends = np.cumsum(list(widths.values())).tolist()
     return {name: slice(end - width, end) for (name, width), end in zip(widths.items(), ends, strict=True)}
 
@@ -194,47 +181,29 @@ def _width(columns: dict[str, slice]) -> int:
 
 
 class Journal:
-    """Events as they come, and one who is told of everything.
+    """List of events, and the recorder.
 
     Attributes:
         events: So far.
     """
 
     def __init__(self, record: Recorder | None) -> None:
-        """Nothing has happened.
-
-        Args:
-            record: Who looks on.
-        """
+        """Begin without events."""
         self.events: list[Event] = []
         self._record = record
 
     @property
     def watched(self) -> bool:
-        """Whether somebody looks on."""
+        """Whether there is a recorder."""
         return self._record is not None
 
     def add(self, event: Event) -> str:
-        """Keep an event.
-
-        Args:
-            event: What happened.
-
-        Returns:
-            As of `tell`.
-        """
+        """Add an event; the message of `tell`."""
         self.events.append(event)
         return self.tell(lambda record: record.event(event))
 
     def tell(self, what: Callable[[Recorder], object]) -> str:
-        """Tell the one who looks on, and nobody any more once that raises.
-
-        Args:
-            what: Calls a method of it.
-
-        Returns:
-            What to say of it where it has raised; "" where it has not.
-        """
+        """Call a method of the recorder; where it raises, drop it and return a message, else ""."""
         if self._record is None:
             return ""
         try:

@@ -1,4 +1,4 @@
-"""The commands of a controller: each bears its id and the next number."""
+"""Commands of a controller, each with its id and the next number."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOST_OWNER: Final = 2**31
 
 
 class Sender:
-    """Makes the command that goes out next.
+    """Maker of the next command.
 
     Attributes:
         owner: The controller's id.
@@ -25,12 +25,7 @@ class Sender:
     """
 
     def __init__(self, cable_count: int, random: np.random.Generator) -> None:
-        """Nothing is sent.
-
-        Args:
-            cable_count: Number of winches m.
-            random: For the id, and the number to begin with.
-        """
+        """Begin without a command."""
         self.owner = int(random.integers(1, MOST_OWNER))
         self.counter = int(random.integers(1, MOST_OWNER))
         self.command: Command | None = None
@@ -39,24 +34,11 @@ class Sender:
         self._disabled: Flags = ~self._enabled
 
     def follow(self, length: Array, rate: Array, tension: Array, enable: Flags | None) -> None:
-        """Ask the drives for set points.
-
-        Args:
-            length: Unstrained, as read [m], shape (m,).
-            rate: [m/s], shape (m,).
-            tension: At the drums [N], shape (m,).
-            enable: Which drives have power, shape (m,); None: all of them.
-        """
+        """Command set points; length [m], rate [m/s], tension [N] at the drums, enable (None: all), each (m,)."""
         self._send(Mode.FOLLOW, length, rate, tension, self._enabled if enable is None else enable, claims=False)
 
     def rest(self, mode: Mode, *, enabled: bool, claims: bool = False) -> None:
-        """Ask the drives to stand where they are.
-
-        Args:
-            mode: How: HOLD, LOCK or LEAVE.
-            enabled: Whether they have power.
-            claims: Whether the grants are asked for.
-        """
+        """Command the drives to stand where they are."""
         enable = self._enabled if enabled else self._disabled
         self._send(mode, self.length, np.zeros(len(self.length)), self.tension, enable, claims)
 
@@ -65,12 +47,7 @@ class Sender:
         self.command = None
 
     def stand_at(self, sample: Sample | None, tension: Array | None = None) -> None:
-        """Rest, from now on, where a sample says that the drums are.
-
-        Args:
-            sample: What the machine said last; None leaves everything.
-            tension: At the drums [N], shape (m,); None: what the sample says.
-        """
+        """Set the lengths of rest to those of a sample, and the tensions [N] (m,) to those given or read."""
         if sample is not None:
             self.length, self.tension = sample.length, sample.filtered if tension is None else tension
 

@@ -1,4 +1,4 @@
-"""Where set points come from, one a cycle: standing, along a plan, and slowing down."""
+"""Sources of set points: standing, along a plan, and slowing down."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WHOLE: Final = 1e-9  # of a row
 
 
 class SetPoint(NamedTuple):
-    """What is asked for at the end of a cycle.
+    """Set point for the end of a cycle.
 
     Attributes:
         length: Unstrained lengths off the drums, of the model [m], shape (m,).
@@ -52,28 +52,23 @@ class SetPoint(NamedTuple):
 
 
 class Course(Protocol):
-    """Set points, one after the other."""
+    """Source of one set point in each cycle."""
 
     def step(self) -> SetPoint:
-        """The next one; beyond the end the last one again, with rates of zero."""
+        """The next set point; beyond the end the last one again, with rates of zero."""
 
 
 class Standing:
-    """Stays where it is."""
+    """Constant set point."""
 
     def __init__(self, point: SetPoint, pose: Pose | None = None) -> None:
-        """Stay at a set point.
-
-        Args:
-            point: Where to stay.
-            pose: Of the platform there, where it is known.
-        """
+        """Begin at a set point."""
         self.pose = pose
         self._point = point._replace(rate=np.zeros(len(point.length)), clock=np.nan, done=True)
 
     @classmethod
     def at(cls, state: Equilibrium) -> Standing:
-        """Stay in an equilibrium, a single one."""
+        """Constant set point in a single equilibrium."""
         robot = state.one_robot
         redundant = robot.cable_count > robot.degrees_of_freedom
         length = state.unstrained_length
@@ -93,47 +88,32 @@ class Standing:
         )
 
     def step(self) -> SetPoint:
-        """The same."""
+        """The same set point."""
         return self._point
 
 
 def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
-    """Stay at lengths, wherever the platform is with them.
-
-    Args:
-        robot: The robot.
-        length: Unstrained lengths off the drums [m], shape (m,).
-        start: Near where it is; None: not known.
-        model: Of the cables.
-
-    Returns:
-        A course; or why there is no such place.
-    """
+    """Constant set point at lengths [m] (m,), with the pose found by forward kinematics; or why there is none."""
     found = forward(robot, length, start, model)
     return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
 
 
 class Fade:
-    """What lengths are off a plan at its beginning; it goes as smoothly as a winch that is jogged, and no faster."""
+    """Smooth transition from the lengths at rest to those of a plan."""
 
     def __init__(self, lead: Array, period: float) -> None:
-        """Begin with all of it.
-
-        Args:
-            lead: By how much the lengths that are held are off the plan's first ones [m], shape (m,).
-            period: Of a cycle [s].
-        """
+        """Begin with the whole difference: lead [m] (m,); period [s]."""
         largest = float(np.abs(lead).max())
         self._lead, self._period = lead, period
         self._cycle, self._cycles = 0, ceil(max(RAMP, 1.5 * largest / LEAD_SPEED) / period) if largest > 0.0 else 0
 
     @property
     def done(self) -> bool:
-        """Whether nothing is left."""
+        """Whether the difference is zero."""
         return self._cycle >= self._cycles
 
     def step(self) -> tuple[Array, Array] | None:
-        """What is left at the end of the next cycle [m], and its rate [m/s], both of shape (m,); None: nothing."""
+        """Remaining difference at the end of the next cycle [m] and its rate [m/s], (m,); None where it is zero."""
         self._cycle += 1
         if self.done:
             return None
@@ -143,16 +123,10 @@ class Fade:
 
 
 class Along:
-    """Along a motion, on a clock of its own that can slow down and go on."""
+    """Set points along a motion, on a clock that can slow down and go on."""
 
     def __init__(self, motion: Motion, period: float, lead: Array) -> None:
-        """Begin at its first row, where the platform is.
-
-        Args:
-            motion: What was planned and checked.
-            period: Of a cycle, and between two rows [s].
-            lead: By how much the lengths that are held are off its first ones [m], shape (m,); it fades away.
-        """
+        """Begin at the first row, off by lead [m] (m,), which fades away; period [s]."""
         self.motion = motion
         self._period, self._last = period, len(motion) - 1
         self._row = 0.0
@@ -162,12 +136,12 @@ class Along:
 
     @property
     def clock(self) -> float:
-        """On the plan [s]."""
+        """Time on the plan [s]."""
         return self._row * self._period
 
     @property
     def pose(self) -> Pose:
-        """Of the row that is nearest."""
+        """Pose of the nearest row."""
         return self.motion.state.pose[round(self._row)]
 
     @property
@@ -210,7 +184,7 @@ class Along:
         return SetPoint(length, rate, tension, drum, motion.wrench[k], at, on_plan, done, None, left is not None)
 
     def _between(self, k: int, u: float) -> tuple[Array, Array, Array, Array]:
-        """Between two rows: cubic in the lengths, as their rates are known; linear in tensions."""
+        """Interpolation between two rows: cubic in lengths and rates, linear in tensions."""
         motion, h = self.motion, self._period
         step = motion.length[k + 1] - motion.length[k]
         begin, end = h * motion.rate[k] - step, h * motion.rate[k + 1] - step
@@ -225,12 +199,7 @@ class Ramp:
     """All rates to zero in the same time, so that the direction is kept: l' = l'_0 (1 - t/t_s)."""
 
     def __init__(self, point: SetPoint, period: float) -> None:
-        """Begin where set points are.
-
-        Args:
-            point: The last set point that was sent.
-            period: Of a cycle [s].
-        """
+        """Begin at the last set point; period [s]."""
         self._begin = point
         self._share, self._cycle = period / RAMP, 0
 
@@ -249,7 +218,7 @@ _Real = TypeVar("_Real", float, Array)
 
 
 def smooth(share: _Real) -> _Real:
-    """From 0 to 1 with slopes of zero at both ends, 1.5 at most."""
+    """Cubic from 0 to 1 with slopes of zero at both ends, 1.5 at most."""
     return share * share * (3.0 - 2.0 * share)
 
 

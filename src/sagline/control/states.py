@@ -1,4 +1,4 @@
-"""The states of the controller, and what leads from one to another: one table, from which transitions are decided."""
+"""States of the controller and one table of the transitions between them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sagline.core.status import Status
 
 
 class State(Status):
-    """What the controller does with the winches."""
+    """State of the controller."""
 
     OFF = 0, "brakes on, no grant held; connect() begins"
     CONNECTING = 1, "claims the groups and waits until all of them agree; brakes on"
@@ -119,7 +119,7 @@ HOLDS_GRANT: Final = frozenset(State) - {State.OFF, State.CONNECTING}
 
 
 class RefusedError(SaglineError):
-    """What the controller does not do, and why; nothing was sent.
+    """Refused request, with the reason; nothing was sent.
 
     Attributes:
         what: What was asked for.
@@ -144,16 +144,7 @@ class RefusedError(SaglineError):
 
 
 def check_transition(state: State, to: State, what: str) -> None:
-    """Refuse what the table does not list.
-
-    Args:
-        state: Where the controller is.
-        to: Where it would go.
-        what: What was asked for.
-
-    Raises:
-        RefusedError: If the table has no such way; it names those that there are.
-    """
+    """Refuse a transition that is not in the table."""
     if to in EXITS[state]:
         return
     ways = ", ".join(f"{exit.to.name} ({exit.by})" for row in TABLE if row.state is state for exit in row.exits)

@@ -1,4 +1,4 @@
-"""The outer loop: tensions are mended by lengths that do not move the platform, and by no others."""
+"""Tension loop: tension errors are corrected by changes of length that do not move the platform."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_GAIN: Final = 0.1  # a cycle: a loop with five cycles of delay is unstable 
 
 @dataclass(frozen=True, slots=True)
 class TensionSettings:
-    """How the tension loop works; the defaults have 24 dB and 62 degrees at a delay of five cycles.
+    """Settings of the tension loop; the defaults have 24 dB and 62 degrees at a delay of five cycles.
 
     Attributes:
         filter_time: Time constant of the filter in front of it [s], > 0.
@@ -54,7 +54,7 @@ class TensionSettings:
 
 
 class TensionLoop:
-    """Adds to the lengths of a plan what brings the tensions back to it; one for a session, as errors of lengths last.
+    """Correction of lengths that brings the tensions back to the plan; it lasts for a session, as length errors do.
 
     f <- f + h/(tau + h) (T - T_plan - f), and while it acts delta <- delta - k N_L G f; docs/model.md, section 12.
 
@@ -64,7 +64,7 @@ class TensionLoop:
     """
 
     def __init__(self, cable_count: int, settings: TensionSettings | None = None, period: float = PERIOD) -> None:
-        """Begin with nothing added.
+        """Begin without correction.
 
         Args:
             cable_count: Number of cables m.
@@ -85,16 +85,16 @@ class TensionLoop:
 
     @property
     def correction(self) -> Array:
-        """What it adds to the lengths of the plan [m], shape (m,)."""
+        """Correction of the lengths of the plan [m], shape (m,)."""
         return self._correction.copy()
 
     @property
     def error(self) -> float:
-        """The largest error of a tension that it sees and can change, filtered [N]; 0 before the first step."""
+        """Largest filtered tension error in the null space [N]; 0 before the first step."""
         return 0.0 if self._row is None else float(np.abs(self._row.visible @ self._filtered).max())
 
     def step(self, tension: Array, planned: Array, row: NullSpace, *, frozen: bool = False) -> Array:
-        """One cycle.
+        """Correction for the next cycle.
 
         Args:
             tension: T_A, as the load cells read it [N], shape (m,).
@@ -117,7 +117,7 @@ class TensionLoop:
         return self._correction.copy()
 
     def _learn(self, row: NullSpace) -> None:
-        """Filter the error, and add to the lengths where it is large."""
+        """Filter the error, and change the correction where it is large."""
         settings, change = self.settings, self._change
         self._error -= self._filtered
         self._error *= self._share

@@ -1,4 +1,4 @@
-"""Links to real controllers of drives, over S7 or Modbus."""
+"""Links to PLCs, over S7 or Modbus."""
 
 from sagline.plc.modbus_link import ModbusLink
 from sagline.plc.s7_link import S7Link

@@ -1,4 +1,4 @@
-"""Link to PLCs by data blocks: one thread for each group waits for its socket, so that nobody else must."""
+"""Link to PLCs by data blocks, with one thread for each group that waits for its socket."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Newest(NamedTuple):
 
 
 class Outgoing(NamedTuple):
-    """What is to be written next.
+    """Block to be written next.
 
     Attributes:
         block: Which.
@@ -60,14 +60,7 @@ class Group(Thread):
     """
 
     def __init__(self, number: int, winches: int, wire: Wire, clock: Callable[[], float]) -> None:
-        """Prepare; `start` begins.
-
-        Args:
-            number: Of the group, from 0.
-            winches: How many it drives.
-            wire: To its PLC.
-            clock: Of the link [s].
-        """
+        """Prepare the thread; clock of the link [s]."""
         super().__init__(name=f"sagline group {number}", daemon=True)
         self.number = number
         self.newest: Newest | None = None
@@ -82,35 +75,26 @@ class Group(Thread):
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
-        """Have a block written, in place of one that was not written yet, and the PLC's read.
-
-        Args:
-            block: Which.
-            data: Its bytes.
-        """
+        """Queue a block to be written, in place of one not written yet, and read the PLC's."""
         self._outgoing.append(Outgoing(block, data, self._clock()))
         self._kick.set()
 
     def ask(self) -> None:
-        """Have the PLC's block read, and nothing written."""
+        """Read the PLC's block, and write nothing."""
         self._outgoing.clear()
         self._kick.set()
 
     def finish(self) -> None:
-        """Stop, once what was handed over is written."""
+        """Stop after the queued block is written."""
         self._ending.set()
         self._kick.set()
 
     def abort(self) -> None:
-        """Stop, whatever it waits for."""
+        """Stop at once."""
         self._wire.abort()
 
     def silence(self, waited: float) -> Refusal:
-        """What to say of a PLC that has said nothing yet.
-
-        Args:
-            waited: For how long [s].
-        """
+        """Message about a PLC that has not answered for a time [s]."""
         if self._wire.reached():
             return Refusal(f"something listens there, but has answered nothing for {waited:g} s", "Check the port")
         return Refusal(
@@ -118,7 +102,7 @@ class Group(Thread):
         )
 
     def run(self) -> None:
-        """Exchange until the end; connect anew whenever that fails."""
+        """Exchange blocks until the end; connect again after each failure."""
         while not self._ending.is_set():
             try:
                 self._wire.open()
@@ -156,7 +140,7 @@ class Group(Thread):
         self.settled.set()
 
     def _strange(self, values: dict[str, Any]) -> Refusal | None:
-        """Why a good block is not of the PLC that was expected here; None where it is."""
+        """Reason why a valid block is not of the expected PLC; None where it is."""
         told = values["group"] - 1  # in a block it is one more
         if told != self.number:
             who = f"is group {told}" if told >= 0 else "was not told which group it is"
@@ -170,7 +154,7 @@ class Group(Thread):
         return None
 
     def _is_news(self, counter: int, arrived: float, connected: float) -> bool:
-        """Whether a block is newer than the newest; where that is long ago, the PLC may have begun anew."""
+        """Whether a block is newer than the newest; after a long silence the PLC may have restarted."""
         newest = self.newest
         if newest is None:
             return True
@@ -188,20 +172,10 @@ LONGEST: Final = 3600.0  # s, that a PLC may take to answer first
 
 
 class BlockLink:
-    """A link (`sagline.control.link.Link`) over one wire a group; `S7Link` and `ModbusLink` are made of it."""
+    """Link (`sagline.control.link.Link`) over one wire for each group; base of `S7Link` and `ModbusLink`."""
 
     def __init__(self, addresses: Sequence[Address], robot: Robot | int, wires: Sequence[Wire], timeout: float) -> None:
-        """Connect to all groups at once.
-
-        Args:
-            addresses: Of the PLCs, in the groups' order.
-            robot: Whose winches they drive; or how many there are.
-            wires: To each of them.
-            timeout: How long they may take to answer first [s].
-
-        Raises:
-            LinkError: If one does not answer, or not as sagline's PLC would.
-        """
+        """Connect to all groups at once; timeout of the first answers [s]."""
         patience = number(timeout, "timeout", "s", above=0.0)
         if patience > LONGEST:
             raise InvalidValueError(
@@ -225,22 +199,19 @@ class BlockLink:
 
     @property
     def period(self) -> float:
-        """Between two commands, as the program in the PLCs has it [s]."""
+        """Time between two commands, as the program in the PLCs has it [s]."""
         return PERIOD
 
     @property
     def round_trip(self) -> Array:
-        """How long each group's newest sample took, from command to answer [s], shape (G,); NaN before the first."""
+        """Time from command to answer of each group's newest sample [s], shape (G,); NaN before the first."""
         return np.array([np.nan if g.newest is None else g.newest.round_trip for g in self._exchanges])
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Hand a command to the groups' threads and take what they have; waits for nothing.
+        """Pass a command to the groups' threads and return their newest data; waits for nothing.
 
         A group whose grant another id has, or nobody, is sent the claim of `command.owner` where it says so, and no
         command.
-
-        Args:
-            command: What is asked for; None: nothing is sent, for those who only read.
         """
         now = self._clock()
         newest = [group.newest for group in self._exchanges]
@@ -261,7 +232,7 @@ class BlockLink:
         )
 
     def close(self) -> None:
-        """Write what was handed over last, and disconnect."""
+        """Write the last command, and disconnect."""
         for group in self._exchanges:
             group.finish()
         for patience in (0.5, 0.2):  # s: for what they write, and for what they waited for
@@ -294,7 +265,7 @@ class BlockLink:
         return group.trouble or group.silence(waited)
 
     def _wait(self, timeout: float) -> None:
-        """Until every group has answered; whoever has not, or not well, ends the link."""
+        """Wait until every group has answered; close the link where one has not."""
         for group in self._exchanges:
             group.settled.wait(max(0.0, timeout - self._clock()))
         silent = [i for i, group in enumerate(self._exchanges) if group.newest is None]

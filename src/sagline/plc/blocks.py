@@ -42,7 +42,7 @@ class Field(NamedTuple):
 
 
 class Refusal(NamedTuple):
-    """Why a block, or a PLC, cannot be used.
+    """Reason why a block, or a PLC, cannot be used.
 
     Attributes:
         reason: What is wrong.
@@ -55,7 +55,7 @@ class Refusal(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A data block with standard (not optimized) access: every byte stays where the table says.
+    """Data block with standard (not optimized) access: every byte has the offset in the table.
 
     Attributes:
         number: Of the data block in the PLC.
@@ -88,7 +88,7 @@ class Block:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the rows."""
+        """Names of the rows."""
         return tuple(name for name, _, _ in self.rows)
 
     @cached_property
@@ -101,20 +101,12 @@ class Block:
         return struct.Struct(text + "x" * (self.size - at))
 
     def pack(self, values: Mapping[str, Any]) -> bytes:
-        """Bytes of the block.
-
-        Args:
-            values: By name of the row; what is not given is zero, but for magic, version and the counter's repetition.
-        """
+        """Bytes of the block."""
         known = {"magic": self.magic, "version": LAYOUT, AGAIN: values.get("counter", 0), **values}
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
-        """Values by name of the row, or what is wrong with bytes that came as this block.
-
-        Args:
-            data: What was read.
-        """
+        """Values by name of the row; or the reason why bytes are not this block."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
@@ -131,12 +123,7 @@ class Block:
 
 
 def winch_row(index: int, name: str) -> str:
-    """Name of a value of a winch, as SCL has it.
-
-    Args:
-        index: Of the winch in its group, from 0.
-        name: Of the row.
-    """
+    """Name of a value of a winch, as SCL has it."""
     return f"winch[{index + 1}].{name}"
 
 
@@ -228,23 +215,12 @@ BLOCKS: Final = (FROM_PLC, TO_PLC, CLAIM)
 
 
 def claim_block(owner: int) -> bytes:
-    """The block by which a controller asks for a grant.
-
-    Args:
-        owner: Its id; 0: nobody asks.
-    """
+    """The block by which a controller asks for a grant."""
     return CLAIM.pack({"owner": owner})
 
 
 def command_blocks(command: Command) -> list[bytes]:
-    """A command as the blocks of its groups.
-
-    Args:
-        command: Of all m winches.
-
-    Returns:
-        One block a group; the place of a winch that a last group does not have is zero.
-    """
+    """Blocks of a command, one for each group; zeros for a winch that the last group does not have."""
     head = {
         "counter": command.counter,
         "mode": int(command.mode),
@@ -262,15 +238,7 @@ def command_blocks(command: Command) -> list[bytes]:
 def sample_of(
     groups: Sequence[Mapping[str, Any]], *, winches: int, time: float, age: Array, discarded: Whole
 ) -> Sample:
-    """What good blocks of all groups say.
-
-    Args:
-        groups: Values of `FROM_PLC` of each group, in their order.
-        winches: How many there are, m.
-        time: When it was asked [s].
-        age: Of each block [s], shape (G,).
-        discarded: How many of each group were no good so far, shape (G,).
-    """
+    """Sample from valid blocks of all groups; time [s], age [s] (G,), discarded (G,)."""
 
     def heads(name: str) -> Whole:
         return np.array([group[name] for group in groups], dtype=np.int64)
@@ -301,12 +269,7 @@ def sample_of(
 
 
 def winch_rows(names: Sequence[str], columns: Sequence[Sequence[Any]]) -> dict[str, Any]:
-    """Values of a group's winches by name of the row.
-
-    Args:
-        names: Of what there is of each winch ("length").
-        columns: The values of each of these, one a winch.
-    """
+    """Values of a group's winches by name of the row."""
     return {
         winch_row(i, name): value for name, column in zip(names, columns, strict=True) for i, value in enumerate(column)
     }

@@ -80,11 +80,7 @@ class ModbusWire:
             raise WireError(Refusal("the connection was closed", "Check that nobody else is connected to it"))
 
     def read(self, block: Block) -> bytes:
-        """The bytes of a block.
-
-        Args:
-            block: Which.
-        """
+        """The bytes of a block."""
         count = block.size // 2
         try:
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
@@ -94,12 +90,7 @@ class ModbusWire:
             raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
-        """Replace the bytes of a block.
-
-        Args:
-            block: Which.
-            data: All of them.
-        """
+        """Replace the bytes of a block."""
         registers = list(struct.unpack(f">{len(data) // 2}H", data))
         try:
             _good(self._client.write_registers(block.register, registers, device_id=self._device), block)
@@ -112,14 +103,14 @@ class ModbusWire:
             self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:
-        """From another thread: end whatever waits."""
+        """End all waiting, from another thread."""
         connection = self._client.socket
         with suppress(OSError):
             if connection is not None:
                 connection.shutdown(socket.SHUT_RDWR)
 
     def reached(self) -> bool:
-        """Whether somebody is at the other end."""
+        """Whether the connection is open."""
         return self._client.connected
 
 

@@ -74,23 +74,14 @@ class S7Wire:
             raise WireError(refused(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
-        """The bytes of a block.
-
-        Args:
-            block: Which.
-        """
+        """The bytes of a block."""
         try:
             return bytes(self._open.db_read(block.number, 0, block.size))
         except Exception as error:
             raise WireError(_no_access(error, block)) from error
 
     def write(self, block: Block, data: bytes) -> None:
-        """Replace the bytes of a block.
-
-        Args:
-            block: Which.
-            data: All of them.
-        """
+        """Replace the bytes of a block."""
         try:
             self._open.db_write(block.number, 0, bytearray(data))
         except Exception as error:
@@ -110,14 +101,14 @@ class S7Wire:
         return self._client
 
     def abort(self) -> None:
-        """From another thread: end whatever waits."""
+        """End all waiting, from another thread."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:
                 _socket(client).shutdown(socket.SHUT_RDWR)
 
     def reached(self) -> bool:
-        """Whether somebody is at the other end."""
+        """Whether the connection is open."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:
@@ -127,7 +118,7 @@ class S7Wire:
 
 
 def _socket(client: Client) -> socket.socket:
-    """What the library speaks through; it has no setting for how long to wait."""
+    """Socket of the library, which has no setting for the time to wait."""
     connection = client.connection
     if connection is None or connection.socket is None:
         raise WireError(_CLOSED)
@@ -135,7 +126,7 @@ def _socket(client: Client) -> socket.socket:
 
 
 def _no_access(error: Exception, block: Block) -> Refusal:
-    """Why a block was not read or written."""
+    """Reason why a block was not read or written."""
     if isinstance(error, WireError):
         return error.refusal
     text = str(error)

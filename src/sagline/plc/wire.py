@@ -18,7 +18,7 @@ MOST_ADDRESSES: Final = 10_000  # addresses, or characters of all of them
 
 
 class Address(NamedTuple):
-    """Where a PLC is.
+    """Address of a PLC.
 
     Attributes:
         host: Name or IPv4 address.
@@ -29,20 +29,12 @@ class Address(NamedTuple):
     port: int
 
     def __str__(self) -> str:
-        """As it is written: host:port."""
+        """Text host:port."""
         return f"{self.host}:{self.port}"
 
 
 def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
-    """Addresses of the groups, in their order.
-
-    Args:
-        given: "host" or "host:port" of each; or all of them in one text, with commas between.
-        port: Where none is given.
-
-    Raises:
-        InvalidValueError: If one is no address, or two are the same.
-    """
+    """Addresses of the groups, in their order."""
     items: Any = given
     if not isinstance(items, Sequence) or isinstance(items, bytes) or not 0 < len(items) <= MOST_ADDRESSES:
         step = "Give a list of them, or one text with commas between."
@@ -63,15 +55,7 @@ def addresses_of(given: str | Sequence[str], port: int) -> tuple[Address, ...]:
 
 
 def groups_at(addresses: Sequence[Address], robot: Robot | int) -> tuple[tuple[int, ...], ...]:
-    """The winches of each group, where there are as many addresses as groups.
-
-    Args:
-        addresses: Of the PLCs.
-        robot: Whose winches they drive; or how many there are.
-
-    Raises:
-        InvalidValueError: If there are more or fewer addresses than groups.
-    """
+    """The winches of each group, where there are as many addresses as groups."""
     known: Any = robot
     winches = known.cable_count if isinstance(known, Robot) else whole_number(known, "robot", 1, MOST_ADDRESSES)
     groups = groups_of(winches)
@@ -102,7 +86,7 @@ ANSWER: Final = 0.5  # s: a PLC that has not answered for so long is connected a
 
 
 class LinkError(SaglineError):
-    """A PLC that cannot be worked with.
+    """Unusable PLC.
 
     Attributes:
         item: Which, in the reader's words ("group 2 at 192.168.0.12:102").
@@ -124,7 +108,7 @@ class LinkError(SaglineError):
 
 
 class WireError(Exception):
-    """A connection that failed.
+    """Failed connection.
 
     Attributes:
         refusal: Why, and what to do.
@@ -143,37 +127,24 @@ class Wire(Protocol):
         """Connect; waits as long as the protocol does."""
 
     def read(self, block: Block) -> bytes:
-        """The bytes of a block.
-
-        Args:
-            block: Which.
-        """
+        """The bytes of a block."""
 
     def write(self, block: Block, data: bytes) -> None:
-        """Replace the bytes of a block.
-
-        Args:
-            block: Which.
-            data: All of them.
-        """
+        """Replace the bytes of a block."""
 
     def close(self) -> None:
         """Disconnect; raises nothing."""
 
     def abort(self) -> None:
-        """From another thread: end whatever waits."""
+        """End all waiting, from another thread."""
 
     def reached(self) -> bool:
-        """Whether somebody is at the other end."""
+        """Whether the connection is open."""
 
 
 @contextmanager
 def needed() -> Iterator[None]:
-    """Imports of the packages PLCs need.
-
-    Raises:
-        FileError: If one is not installed.
-    """
+    """Context for imports of the packages that PLCs need."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -181,12 +152,7 @@ def needed() -> Iterator[None]:
 
 
 def refused(error: BaseException | None, speaks: str) -> Refusal:
-    """Why a connection failed, in the reader's words.
-
-    Args:
-        error: What the system or a library said, perhaps while it handled another.
-        speaks: The protocol.
-    """
+    """Reason why a connection failed."""
     text = " ".join(str(error).split()) or type(error).__name__
     cause = error
     while cause is not None and not isinstance(cause, OSError):

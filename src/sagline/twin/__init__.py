@@ -1,4 +1,4 @@
-"""The machine behind the link: the robot as it is, its drives, PLCs and network."""
+"""Digital twin of a machine: the true robot, its drives, PLCs and network."""
 
 from sagline.twin.injected import KINDS, Injected, fault
 from sagline.twin.link import Report

@@ -22,16 +22,7 @@ class BlockServers(ABC):
     """
 
     def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
-        """Start one server for each group.
-
-        Args:
-            blocks: Initial content of DB101 of each group.
-            host: Address to listen at; by default reachable from this machine only.
-            port: Of the first group, the others follow; 0: any that are free.
-
-        Raises:
-            InvalidValueError: If a port is in use, or the address is none of this machine.
-        """
+        """Start one server for each group."""
         self._memory = [{kind: bytearray(kind.size) for kind in BLOCKS} for _ in blocks]
         self.addresses: tuple[str, ...] = ()
         try:
@@ -76,11 +67,7 @@ class BlockServers(ABC):
 
 
 def check_free(host: str, port: int) -> str:
-    """IPv4 address of a host at which a port is free; python-snap7 shares ports, so two twins would share clients.
-
-    Raises:
-        InvalidValueError: If the port is in use, or the address is none of this machine.
-    """
+    """IPv4 address of a host at which a port is free; python-snap7 shares ports, so two twins would share clients."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:

@@ -1,4 +1,4 @@
-"""What the PLCs of a machine are wired to: drives, brakes, encoders and load cells, and the true robot behind them."""
+"""Hardware of a machine: drives, brakes, encoders and load cells, and the true robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # rows of what is read
 
 
 class Hardware:
-    """Drives and sensors, and the plant.
+    """Drives, sensors and plant.
 
     Attributes:
         read: What a period ends with, in the rows LENGTH: unstrained, off the drums, as nominal drums have it at what
@@ -29,16 +29,7 @@ class Hardware:
     """
 
     def __init__(self, robot: Robot, begin: Start, damping: Damping, step: float, period: float, seed: int) -> None:
-        """Switch on, brakes on.
-
-        Args:
-            robot: The true robot.
-            begin: Where it stands.
-            damping: Of the cables.
-            step: Of the plant [s].
-            period: Of the PLCs [s].
-            seed: Of the load cells' noise.
-        """
+        """Begin with brakes on; step of the plant [s], period of the PLCs [s]."""
         self._simulator = Simulator(robot, begin.state, winches="robot", step=step, damping=damping, seed=seed)
         self._simulator.hold()
         self._nominal, self._true, self._period = begin.nominal, begin.true, period
@@ -59,16 +50,13 @@ class Hardware:
 
     @property
     def reading(self) -> Reading:
-        """What is true."""
+        """True state of the plant."""
         return self._simulator.reading
 
     def go_on(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
-        """Go on for a period, in which the drives' set points go straight to those that are given.
+        """Simulate a period in which the set points go linearly to the given ones: length [m], tension [N].
 
-        Args:
-            length: Unstrained, as nominal drums have it [m], of each winch.
-            tension: Expected at the drums [N].
-            powered: Which drives have power; the brakes of the others are on.
+        Units: length [m]; tension [N].
         """
         if powered != self._powered:
             self._switch(powered)
@@ -78,7 +66,7 @@ class Hardware:
         self._take(self._simulator.step(targets, self._period, tension=tension, wrench=weight))
 
     def _switch(self, powered: list[bool]) -> None:
-        """Give power to drives, or take it from them."""
+        """Switch the power of drives."""
         changed = [i for i, (now, before) in enumerate(zip(powered, self._powered, strict=True)) if now != before]
         if on := [i for i in changed if powered[i]]:
             self._simulator.release(*on)
@@ -87,7 +75,7 @@ class Hardware:
         self._powered, self._torque_of_force = list(powered), self._lever * powered
 
     def _take(self, reading: Reading) -> None:
-        """Fill what encoders, drives and cells read."""
+        """Update the readings of encoders, drives and cells."""
         length, rate, torque, tension, filtered = self._rows
         self.counts = np.rint(self._true.counts(reading.length) + self._slip)
         now = self._nominal.lengths(self.counts)
@@ -102,11 +90,11 @@ class Hardware:
 
     @property
     def saturated(self) -> Array:
-        """Which drives are at a limit of torque or speed, not 0 where they are, (m,)."""
+        """Drives at a limit of torque or speed, not 0 where they are, (m,)."""
         return self._simulator.reading.saturated
 
     def spoil_cell(self, cell: int, words: str | None, value: float) -> None:
-        """Let a load cell be wrong in one of the ways of `KINDS`, or right again."""
+        """Give a load cell one of the faults of `KINDS`, or remove it."""
         if words is None:
             self._wrong.pop(cell, None)
         elif words == "is wrong by #":
@@ -116,20 +104,20 @@ class Hardware:
             self._wrong[cell] = (0.0, float(fixed))
 
     def break_cable(self, cable: int) -> None:
-        """Let a cable break."""
+        """Break a cable."""
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Let an encoder count so much more cable than there is [m]; its drive winds that in, as its gains say."""
+        """Shift the count of an encoder by a length of cable [m]; its drive winds that in."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
         self._simulator.shift(-slip / self._true.per_meter[winch], winch)
 
     def limit_force(self, winch: int, force: float) -> None:
-        """Let a drive give no more than so much at the cable [N]."""
+        """Limit the force of a drive at the cable [N]."""
         self._simulator.limit_force(force, winch)
 
     def load(self, mass: float) -> None:
-        """Hang a weight to the platform's center of mass [kg]."""
+        """Add a mass at the platform's center of mass [kg]."""
         self._weight[2] -= mass * self._gravity
         self._heavier = True

@@ -1,4 +1,4 @@
-"""Faults that a machine can be told to have: a line of text each, which says what happens, to what, and when."""
+"""Injected faults of a machine, each from one line of text."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ _NUMBER: Final = r"(?P<value>\S+)"
 
 @dataclass(frozen=True, slots=True)
 class Injected:
-    """A fault that is put into a machine.
+    """Fault injected into a machine.
 
     Attributes:
         kind: One of `KINDS`, "cell sticks" for instance.
@@ -147,7 +147,7 @@ def fault(text: str) -> Injected:
 
 
 def _unknown(text: str, what: str) -> InvalidValueError:
-    """What is said of words that are none: what may be said of that item, or which items there are."""
+    """Error for unknown words: names the words for that item, or the items."""
     items = sorted({kind.item for kind in KINDS.values()})
     first = what.split(" ")[0] if what else ""
     item = next((item for item in items if item.split(" ")[0] == first), None)
@@ -186,10 +186,10 @@ def _number(text: str, word: str | None, otherwise: float, unit: str) -> float:
 
 
 class Schedule:
-    """Faults whose time has not come, to begin or to end."""
+    """Queue of the beginnings and ends of faults."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin empty."""
         self._due: list[tuple[float, int, bool, Injected]] = []
         self._planned = 0
 
@@ -199,7 +199,7 @@ class Schedule:
         return bool(self._due)
 
     def plan(self, what: Injected) -> None:
-        """Put a fault where it begins, and where it ends."""
+        """Queue the beginning and the end of a fault."""
         self._push(what.time, True, what)
         if what.duration < math.inf:
             self._push(what.time + what.duration, False, what)
@@ -209,7 +209,7 @@ class Schedule:
         heappush(self._due, (time, self._planned, begins, what))
 
     def due(self, now: float) -> list[tuple[bool, Injected]]:
-        """What begins or ends by a time [s], in order: whether it begins, and what."""
+        """Faults that begin (True) or end by a time [s], in order."""
         found = []
         while self._due and self._due[0][0] <= now + TINY:
             _, _, begins, what = heappop(self._due)

@@ -17,24 +17,14 @@ TINY: Final = 1e-9  # s, of rounding
 
 
 class Network:
-    """How late messages arrive, and which do not.
+    """Delay, jitter and losses of messages.
 
     Attributes:
         ideal: Whether each arrives at once.
     """
 
     def __init__(self, delay: float, jitter: float, loss: float, seed: int) -> None:
-        """Say how it is.
-
-        Args:
-            delay: Of every message, each way [s], >= 0.
-            jitter: On top of it, evenly between 0 and this [s], >= 0; messages may overtake each other.
-            loss: Share of the messages that are lost, >= 0, < 1.
-            seed: Of all this; the generator is the network's own.
-
-        Raises:
-            InvalidValueError: If a value is out of its range.
-        """
+        """Check the values; delay [s], jitter [s]."""
         self._delay = number(delay, "delay", "s", low=0.0)
         self._jitter = number(jitter, "jitter", "s", low=0.0)
         self._loss = number(loss, "loss", "", low=0.0)
@@ -44,7 +34,7 @@ class Network:
         self._generator = np.random.default_rng((seed, 1))
 
     def arrival(self, now: float) -> float | None:
-        """When a message that is sent now arrives [s]; None if it is lost."""
+        """Time of arrival of a message that is sent now [s]; None if it is lost."""
         if self.ideal:
             return now
         lost, late = self._generator.random(2)
@@ -52,7 +42,7 @@ class Network:
 
 
 class Way:
-    """Messages that are on their way from one to another."""
+    """Messages on the way in one direction."""
 
     def __init__(self, network: Network) -> None:
         """Begin empty."""
@@ -66,7 +56,7 @@ class Way:
             heappush(self._messages, (arrival, self._sent, message))
 
     def arrived(self, now: float) -> list[tuple[float, Any]]:
-        """All that has arrived by now [s], the earliest first: when, and what."""
+        """Times of arrival [s] and messages up to now, the earliest first."""
         found = []
         while self._messages and self._messages[0][0] <= now + TINY:
             arrival, _, message = heappop(self._messages)
@@ -81,7 +71,7 @@ COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third
 
 
 class Snapshot:
-    """Blocks of all groups, in a few arrays.
+    """Blocks of all groups, in arrays.
 
     Attributes:
         arrays: Length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
@@ -92,22 +82,16 @@ class Snapshot:
     __slots__ = ("arrays", "owners")
 
     def __init__(self, arrays: tuple[Array, Whole, Whole, Array]) -> None:
-        """Keep what there is."""
+        """Keep the arrays."""
         self.arrays = arrays
         self.owners: list[int] = arrays[FIRST][OWNER].tolist()
 
     def counter(self, group: int) -> int:
-        """Of a group's block."""
+        """Counter of a group's block."""
         return int(self.arrays[FIRST][COUNTER, group])
 
     def keep(self, group: int, part: slice, before: Snapshot) -> None:
-        """Let a group say again what it said before.
-
-        Args:
-            group: Which, from 0.
-            part: Its winches.
-            before: What was said before.
-        """
+        """Restore the data of a group from before."""
         for k, (array, old) in enumerate(zip(self.arrays, before.arrays, strict=True)):
             where = part if k < FIRST else group
             array[..., where] = old[..., where]
@@ -115,7 +99,7 @@ class Snapshot:
 
 
 class Report(NamedTuple):
-    """What the block of one group holds, for a server to put it where a controller reads it.
+    """Content of the block of one group, for a server.
 
     Attributes:
         counter: Of the blocks, at the block's beginning.
@@ -158,7 +142,7 @@ HISTORY: Final = 100  # blocks of the past that a group which goes back still ha
 
 
 class Driven(Protocol):
-    """What a link needs of a machine."""
+    """Interface of a machine that a link needs."""
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -166,24 +150,24 @@ class Driven(Protocol):
 
     @property
     def period(self) -> float:
-        """By which it goes on in an exchange [s]."""
+        """Time of one exchange [s]."""
 
     @property
     def time(self) -> float:
-        """Since the machine was switched on [s]."""
+        """Time since the machine was switched on [s]."""
 
     def deliver(self, group: int, message: int | Order) -> None:
-        """Let a claim or a command arrive at a PLC."""
+        """Deliver a claim or a command to a PLC."""
 
     def advance(self) -> None:
-        """Go on for one period."""
+        """Simulate one period."""
 
 
 class MachineLink:
-    """A `Link` to a machine in the same process: nothing waits, and nothing runs beside it."""
+    """`Link` to a machine in the same process, without waiting and without threads."""
 
     def __init__(self, machine: Driven, network: Network, moves: bool) -> None:
-        """Begin without having heard of any group; `Machine.link` makes it."""
+        """Begin without data of any group; made by `Machine.link`."""
         self._machine, self._network, self._moves = machine, network, moves
         self._groups = machine.groups
         count = len(self._groups)
@@ -206,16 +190,11 @@ class MachineLink:
 
     @property
     def period(self) -> float:
-        """Between two commands [s]: so far an exchange moves the machine on."""
+        """Time between two commands, by which an exchange advances the machine [s]."""
         return self._machine.period
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Send a command, let the machine go on for a period, and take what there is then.
-
-        Args:
-            command: What is asked for; None: nothing is sent. A group whose grant another id has, or nobody, is sent
-                the claim of its owner instead where it says so.
-        """
+        """Send a command, advance the machine by a period, and return the newest sample."""
         machine = self._machine
         if command is not None and not self._closed:
             self._send(command, machine.time)
@@ -224,7 +203,7 @@ class MachineLink:
         return self._look(machine.time)
 
     def close(self) -> None:
-        """Send nothing any more; the machine stays."""
+        """Stop sending; the machine remains."""
         self._closed = True
 
     def _send(self, command: Command, now: float) -> None:
@@ -246,20 +225,14 @@ class MachineLink:
                 self._there[group].send(now, message)
 
     def before(self, now: float) -> None:
-        """Hand over to the PLCs what has arrived by the beginning of a scan [s]."""
+        """Deliver the messages that have arrived by the beginning of a scan [s]."""
         if not self._network.ideal:
             for group, way in enumerate(self._there):
                 for _, message in way.arrived(now):
                     self._machine.deliver(group, message)
 
     def after(self, now: float, snapshot: Snapshot, spoiled: dict[int, str]) -> None:
-        """Send what the PLCs say after a scan.
-
-        Args:
-            now: [s].
-            snapshot: What they say.
-            spoiled: What happens to the blocks of some groups.
-        """
+        """Send the blocks of the PLCs after a scan; now [s]."""
         if self._network.ideal and not spoiled:
             self._newest, self._owner = [snapshot] * len(self._groups), list(snapshot.owners)
             self._arrival.fill(now)
@@ -272,7 +245,7 @@ class MachineLink:
         self._past.append(snapshot)
 
     def _blocks(self, group: int, snapshot: Snapshot, how: str | None) -> list[Snapshot | None]:
-        """What goes out of a group in a scan; None for a block that is no good."""
+        """Blocks that a group sends in a scan; None for an invalid one."""
         held, self._held[group] = self._held[group], None
         if how == "goes back":
             self._steps_back[group] += 1
@@ -290,7 +263,7 @@ class MachineLink:
         return [snapshot, snapshot] if how == "doubles" else [snapshot, held] if held is not None else [snapshot]
 
     def _take(self, group: int, arrival: float, block: Snapshot | None) -> None:
-        """Take a block in, if it is good and newer than what was there."""
+        """Accept a block, if it is valid and newer than the one before."""
         known = self._newest[group]
         if block is None or (known is not None and not newer(block.counter(group), known.counter(group))):
             self._discarded[group] += 1
@@ -319,7 +292,7 @@ class MachineLink:
         )  # fmt: skip
 
     def _mixed(self, newest: list[Snapshot]) -> tuple[Any, ...]:
-        """Arrays of which each group's part is its newest."""
+        """Arrays composed of the newest block of each group."""
         found = tuple(array.copy() for array in newest[0].arrays)
         for group, (part, block) in enumerate(zip(self._parts, newest, strict=True)):
             for k, (array, own) in enumerate(zip(found, block.arrays, strict=True)):

@@ -1,4 +1,4 @@
-"""A whole machine in one process: the robot as it is, its drives, its PLCs and the network before them."""
+"""Whole machine in one process: the true robot, its drives, its PLCs and the network."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ TRIPPED: Final = 1  # the code of a drive that has
 
 
 class Machine:
-    """The machine behind the link, in steps of one period: what a controller drives, and a server shows to one.
+    """Simulated machine in steps of one period, driven by a controller or through a server.
 
     In process, `link` gives the way to it, each of whose exchanges moves it on. A server that other processes talk to
     drives it so, in every period:
@@ -139,7 +139,7 @@ class Machine:
             self.inject(one)
 
     def _switched_on(self, limits: Limits) -> list[Program]:
-        """The PLCs' programs, each with the limits of its own winches."""
+        """Programs of the PLCs, each with the limits of its own winches."""
         programs, length = [], self._hardware.read[LENGTH].tolist()
         for part in self._parts:
             program = Program(Limits(*(column[part] for column in limits)), self.period)
@@ -149,16 +149,16 @@ class Machine:
 
     @property
     def time(self) -> float:
-        """Since the machine was switched on [s]."""
+        """Time since the machine was switched on [s]."""
         return self._cycles * self.period
 
     @property
     def reading(self) -> Reading:
-        """What is true, platform and all; filled anew in every period."""
+        """True state of the plant; overwritten in every period."""
         return self._hardware.reading
 
     def link(self, *, moves: bool = True) -> MachineLink:
-        """A way to the machine for a controller in this process.
+        """Link to the machine for a controller in this process.
 
         Args:
             moves: Whether its exchanges move the machine on by a period each. Of several links one alone should.
@@ -183,7 +183,7 @@ class Machine:
         self.deliver(self._group(group), whole_number(owner, "owner", 0, LARGEST_ID))
 
     def take(self, group: int, command: Command) -> None:
-        """Give a PLC a command; it looks itself whether that is new, and its owner's.
+        """Give a PLC a command; it checks the counter and the owner.
 
         Args:
             group: Which, from 0.
@@ -205,7 +205,7 @@ class Machine:
         return whole_number(group, "group", 0, len(self.groups) - 1)
 
     def deliver(self, group: int, message: int | Order) -> None:
-        """Let a claim or a command arrive at a PLC, unless a fault is in the way.
+        """Deliver a claim or a command to a PLC, unless a fault prevents it.
 
         Args:
             group: Which, from 0.
@@ -223,7 +223,7 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Go on for one period: what goes wrong now, the PLCs' scans, drives and plant, and what is read then."""
+        """Simulate one period: faults that are due, the PLCs' scans, drives and plant, and the readings at its end."""
         now = self.time
         if self._schedule.waiting:
             self._let_happen()
@@ -236,7 +236,7 @@ class Machine:
             link.after(self.time, self._snapshot, self._spoiled)
 
     def _scan(self, now: float) -> None:
-        """Let the PLCs set the drives, and these move."""
+        """Scan all PLCs, and move the drives."""
         hardware = self._hardware
         encoder, cell = hardware.read[LENGTH].tolist(), hardware.read[CELL].tolist()
         length: list[float] = []
@@ -253,7 +253,7 @@ class Machine:
         hardware.go_on(length, tension, powered)
 
     def _written(self, before: Snapshot | None) -> Snapshot:
-        """The blocks of all groups; those of a PLC that stands stay as they were."""
+        """Blocks of all groups; those of a stopped PLC stay as they were."""
         hardware, programs, groups = self._hardware, self._programs, self._told
         self._counter = self._counter % COUNTERS + 1
         groups[COUNTER] = self._counter
@@ -273,7 +273,7 @@ class Machine:
         return new
 
     def report(self, group: int) -> Report | None:
-        """What the block of a group says now.
+        """Present block of a group.
 
         Args:
             group: Which, from 0.
@@ -296,7 +296,7 @@ class Machine:
         return Report(counter, again, how == "is foreign", float(clock[group]), *told, *rows)
 
     def inject(self, what: str | Injected) -> None:
-        """Let something go wrong.
+        """Inject a fault.
 
         Args:
             what: A text as `fault` reads it, or what it makes of it. What should have begun already begins at once.
@@ -312,12 +312,12 @@ class Machine:
         self._schedule.plan(found)
 
     def _let_happen(self) -> None:
-        """Let begin and end what is due."""
+        """Begin and end the faults that are due."""
         for begins, what in self._schedule.due(self.time):
             self._happen(what, begins)
 
     def _happen(self, what: Injected, begins: bool) -> None:
-        """Let a fault begin, or end."""
+        """Begin or end a fault."""
         hardware, which, value = self._hardware, what.which, what.value
         item, words = KINDS[what.kind].item, KINDS[what.kind].words
         if item == "cell":
@@ -341,7 +341,7 @@ class Machine:
             hardware.limit_force(which, value)
 
     def _spoil_group(self, group: int, words: str, begins: bool) -> None:
-        """Let a fault of a group begin, or end."""
+        """Begin or end a fault of a group."""
         kept = {"is taken": self._taken, "stops": self._stopped}.get(words)
         if kept is not None:
             (kept.add if begins else kept.discard)(group)
@@ -352,18 +352,18 @@ class Machine:
             self._spoiled[group] = words
 
     def emergency_stop(self) -> None:
-        """Press the emergency stop: hardware locks the drums and takes the power; the PLCs only tell."""
+        """Press the emergency stop: hardware locks the drums and cuts the power; the PLCs only report it."""
         for program in self._programs:
             program.emergency = True
 
     def reset(self) -> None:
-        """Let the emergency stop and locked drums go and clear the drives, as the operator at the machine does."""
+        """Release the emergency stop and the drums and clear the drives, as the operator at the machine does."""
         for program in self._programs:
             program.reset()
 
 
 def _several(faults: Any) -> Iterable[Any]:
-    """Faults, of which one may be given by itself."""
+    """Iterable of faults; a single one may be given by itself."""
     if isinstance(faults, str | Injected):
         return (faults,)
     if isinstance(faults, Iterable):

@@ -1,4 +1,4 @@
-"""What the program in the PLC of one group does in a scan: grant, heartbeat, ramp, limits, hold.
+"""Program in the PLC of one group: grant, heartbeat, ramp, limits, hold.
 
 The SCL source does the same, line by line. Numbers here are plain ones: a scan costs microseconds.
 """
@@ -33,7 +33,7 @@ _LEAVE, _HOLD, _FOLLOW, _LOCK = (int(mode) for mode in (Mode.LEAVE, Mode.HOLD, M
 
 
 class Order(NamedTuple):
-    """A command, as one PLC has it: of its own winches only."""
+    """Command to one PLC, for its own winches only."""
 
     counter: int
     owner: int
@@ -46,7 +46,7 @@ class Order(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What a PLC knows of its winches.
+    """Limits of the winches of a PLC.
 
     Attributes:
         least: Shortest set points [m].
@@ -62,7 +62,7 @@ class Limits(NamedTuple):
 
 
 class Program:
-    """The program of one group.
+    """Program of one group.
 
     What it reads stands in `order`, `encoder` and `cell`; what it sets in the attributes below.
 
@@ -79,12 +79,7 @@ class Program:
     """
 
     def __init__(self, limits: Limits, period: float) -> None:
-        """Begin with brakes on, and nobody's.
-
-        Args:
-            limits: Of its winches.
-            period: Of a scan [s].
-        """
+        """Begin with brakes on and without owner; period of a scan [s]."""
         self.limits, self.period = limits, period
         count = len(limits.least)
         self.winches = range(count)
@@ -105,17 +100,12 @@ class Program:
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
-        """Give the grant, where it is free or its holder's counter has stood for OWNER_TIMEOUT.
-
-        Args:
-            owner: Who asks.
-            now: On the PLC's clock [s].
-        """
+        """Give the grant, if it is free or its owner's counter has stood for OWNER_TIMEOUT; now [s]."""
         if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
             self.seize(owner, now)
 
     def seize(self, owner: int, now: float) -> None:
-        """Give the grant, whoever has it."""
+        """Give the grant in any case."""
         self.owner, self.echo, self._moved = owner, 0, now
         self._order, self._fresh = None, False
         if any(self._rate) and not self._ramp:
@@ -127,31 +117,25 @@ class Program:
             self.echo, self._order, self._fresh = order.counter, order, True
 
     def reset(self) -> None:
-        """Let the drums go and clear the drives, as the operator of the machine does; brakes stay on for now."""
+        """Release the drums and clear the drives, as the operator of the machine does; brakes stay on for now."""
         self.emergency = self.locked = False
         self.drive_fault = [0] * len(self.drive_fault)
         self.fault, self._order = GroupFault.NONE, None
         self._brake()
 
     def restart(self) -> None:
-        """Begin anew, as a PLC does that was stopped: brakes on, and nobody's."""
+        """Restart with brakes on and without owner."""
         self.owner, self.echo, self._order, self._fresh = 0, 0, None, False
         self.fault = GroupFault.NONE
         self._brake()
 
     def trip(self, winch: int, code: int) -> None:
-        """Let a drive trip: it has no power until the operator resets it."""
+        """Trip a drive: it has no power until the operator resets it."""
         self.drive_fault[winch], self.powered[winch] = code, False
         self._stop(GroupFault.DRIVE)
 
     def scan(self, now: float, encoder: list[float], cell: list[float]) -> None:
-        """Set the drives for the next period.
-
-        Args:
-            now: On the PLC's clock [s].
-            encoder: Lengths off the drums [m].
-            cell: Raw readings of the load cells [N].
-        """
+        """Set the drives for the next period; now [s], encoder [m], cell [N]."""
         order, fresh, waited, self._now = self._order, self._fresh, now - self._moved, now
         if fresh and order is not None:
             self._fresh, self._moved = False, now
@@ -204,7 +188,7 @@ class Program:
         return True
 
     def _let_lag(self, encoder: list[float], cell: list[float]) -> None:
-        """Set points of drives that are too far from theirs are where they are, and hold what their cells read."""
+        """Move set points that are too far away to the drives, with the tensions that their cells read."""
         read = self._known([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:
@@ -212,13 +196,13 @@ class Program:
                 self.length[i], self._rate[i], self.tension[i] = encoder[i], 0.0, read[i]
 
     def _brake(self) -> None:
-        """Take the power from all drives, whose brakes fall."""
+        """Cut the power of all drives; their brakes engage."""
         self.powered = [False] * len(self.powered)
         self._loaded = list(self.powered)
         self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, _LEAVE
 
     def _switch(self, order: Order, encoder: list[float]) -> None:
-        """Give power to the drives that may move, which begin where they stand, and take it from the others.
+        """Switch on the drives that may move, at their present lengths, and switch off the others.
 
         A drive takes up the tension that is expected first; its brake goes with the next command.
         """
@@ -233,7 +217,7 @@ class Program:
         self._loaded = order.enable
 
     def _obey(self, order: Order, waited: float, cell: list[float]) -> None:
-        """Do what a new command says."""
+        """Execute a new command."""
         if order.mode == _FOLLOW and any(self.powered):
             self._follow(order, waited, cell)
             return
@@ -245,12 +229,12 @@ class Program:
         self._slow_down(cell)
 
     def _known(self, tension: list[float]) -> list[float]:
-        """Tensions that are expected; where none is told that may be, that of before."""
+        """Expected tensions; where one is outside its limits, the one before."""
         rows = zip(tension, self.tension, self.limits.tension, strict=True)
         return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
 
     def _follow(self, order: Order, waited: float, cell: list[float]) -> None:
-        """Take new set points, if they are within their limits and no faster than the winches since the last ones."""
+        """Take new set points, if lengths, steps, rates and tensions are within their limits."""
         least, most, speed, tightest = self.limits
         lengths, rates, tensions, asked = order.length, order.rate, order.tension, self._asked
         self._mode, self._ramp = _FOLLOW, 0.0
@@ -275,7 +259,7 @@ class Program:
         self._drive(cell)
 
     def _drive(self, cell: list[float]) -> None:
-        """Move the set points on for a scan, unless that would take in a cable that pulls too hard.
+        """Advance the set points by a scan, unless that would wind in a cable beyond its tension limit.
 
         They go straight to those of the last command, where they are a cycle after it, and then on at its rates.
         """
@@ -299,13 +283,13 @@ class Program:
         self.length, self._left = moved, max(left - period, 0.0)
 
     def _stop(self, fault: GroupFault) -> None:
-        """Slow down by itself, and hold."""
+        """Begin to slow down and hold, because of a fault."""
         if not self.fault:
             self.fault, self._since = fault, self._now
             self._ramp = RAMP if any(self._rate) and not self._ramp else self._ramp
 
     def _slow_down(self, cell: list[float]) -> None:
-        """Lead the rates to zero, evenly, and stay there; what pulls too hard takes in no more cable."""
+        """Lead the rates to zero linearly; a cable beyond its tension limit is not wound in."""
         if self._ramp <= 0.0:
             return
         share, period = self._ramp / RAMP, min(self.period, self._ramp)
@@ -321,7 +305,7 @@ class Program:
 
     @property
     def _was_told(self) -> bool:
-        """Whether the ramp is over, and the fault was in the blocks so long that nobody missed it."""
+        """Whether the ramp is over, and the fault has been reported for a heartbeat."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 
     @property
@@ -341,7 +325,7 @@ class Program:
         return ready | _FOLLOWING if self._mode == _FOLLOW else ready
 
     def states(self, saturated: list[float]) -> tuple[list[int], list[int]]:
-        """Codes of `WinchState`, by which drives are at a limit, and the drives' own codes."""
+        """Codes of `WinchState`, from drives at a limit, and the drives' own codes."""
         states = [WinchState.SATURATED if full else WinchState.ENABLED for full in saturated]
         for i in self.winches:
             if self.drive_fault[i]:

@@ -36,7 +36,7 @@ ROWS: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "sta
 
 
 class Server:
-    """The PLCs of a machine, each at an address of its own, as controllers meet them; the plant goes by the wall clock.
+    """PLCs of a machine, each at an address of its own; the plant runs in real time.
 
     Attributes:
         machine: The machine.
@@ -48,7 +48,7 @@ class Server:
     """
 
     def __init__(self, machine: Machine, *, host: str = LOOPBACK, port: int = 0, modbus: bool = False) -> None:
-        """Listen.
+        """Start the servers.
 
         Args:
             machine: What stands behind the PLCs; its period is that of their scans.
@@ -71,7 +71,7 @@ class Server:
 
     @property
     def late(self) -> float:
-        """The most by which a scan began too late so far [s]; by as much the plant lost on the clock."""
+        """Largest delay of a scan so far [s]."""
         return self._pace.lateness.longest
 
     def run(self, watch: Callable[[float, Reading], None] | None = None) -> None:
@@ -87,7 +87,7 @@ class Server:
                 watch(self.machine.time, self.machine.reading)
 
     def scan(self) -> None:
-        """Let the PLCs take what was written, move the machine on by a period, and show what they say then."""
+        """Pass written blocks to the PLCs, advance the machine by a period, and publish the PLCs' blocks."""
         for group, (command, claim) in enumerate(self._servers.written()):
             asked = CLAIM.read(claim)
             if not isinstance(asked, Refusal):
@@ -101,11 +101,11 @@ class Server:
         self._servers.publish([self._block(group) for group in self._groups])
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop the servers and close all connections."""
         self._servers.close()
 
     def _command(self, group: int, data: bytes) -> Command | None:
-        """What stands in DB102; None where it is no command, or torn."""
+        """Command in DB102; None where it is none, or torn."""
         values = TO_PLC.read(data)
         if isinstance(values, Refusal):
             return None
@@ -126,18 +126,13 @@ class Server:
         )
 
     def _block(self, group: int) -> bytes | None:
-        """What the PLC of a group says; None where a fault keeps what is there."""
+        """Block of the PLC of a group; None where a fault keeps the one before."""
         report = self.machine.report(group)
         return None if report is None else block_of(group, report)
 
 
 def block_of(group: int, report: Report) -> bytes:
-    """What a PLC says, as its block.
-
-    Args:
-        group: Which, from 0.
-        report: What it says.
-    """
+    """Block of a PLC's report; group from 0."""
     head = {
         "counter": report.counter,
         AGAIN: report.counter_again,
@@ -171,7 +166,7 @@ SWITCHING_ON: Final = 60.0  # s, at most; kernels may have to be read from the d
 
 
 class Apart(NamedTuple):
-    """A machine in another process.
+    """Machine in another process.
 
     Attributes:
         addresses: "host:port" of each group's PLC.
@@ -182,26 +177,13 @@ class Apart(NamedTuple):
     place: Any
 
     def position(self) -> Array:
-        """Where the platform's origin is after the last scan [m], shape (3,)."""
+        """Position of the platform's origin after the last scan [m], shape (3,)."""
         return np.array(self.place[:])
 
 
 @contextmanager
 def apart(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[Apart]:
-    """Switch a machine on in another process, in real time; it is killed at the end.
-
-    Args:
-        robot: The robot as it is.
-        nominal: As it was planned.
-        start: The pose at which the encoders were set.
-        seed: Of noise and clocks.
-
-    Yields:
-        The way to it.
-
-    Raises:
-        SaglineError: If it cannot be switched on; or it does not answer.
-    """
+    """Context of a machine in another process, in real time; it is killed at the end."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
     place = context.Array("d", 3)
@@ -217,7 +199,7 @@ def apart(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterat
 
 
 def _told(pipe: Connection) -> tuple[str, ...]:
-    """The addresses, or why there are none."""
+    """Addresses from the other process; raises its error."""
     answer: tuple[str, ...] | SaglineError | None = None
     with suppress(EOFError):
         answer = pipe.recv() if pipe.poll(SWITCHING_ON) else None
@@ -230,7 +212,7 @@ def _told(pipe: Connection) -> tuple[str, ...]:
 
 
 def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connection, place: Any) -> None:
-    """Be the machine until killed; Ctrl-C is for the controller, which stops the robot first."""
+    """Run the machine until killed; SIGINT is ignored, as the controller stops the robot first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         machine = Machine(robot, nominal=nominal, start=start, seed=seed, period=SCAN)

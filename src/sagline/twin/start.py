@@ -26,24 +26,14 @@ from sagline.twin.plc_program import LEFT, Limits
 
 
 class Scale:
-    """Counts of lengths and lengths of counts, (m,); turn by turn where the drums are known, else by one radius each.
+    """Conversion between lengths and encoder counts, (m,): by the turns of known drums, else by one radius each.
 
     Attributes:
         per_meter: Counts for a meter of unstrained cable let out, where it was made, (m,).
     """
 
     def __init__(self, robot: Robot, length: Array, counts: Array) -> None:
-        """Take a robot's drums, and where their encoders stand.
-
-        Args:
-            robot: The robot; drums are known where its winches have groove_pitch and its cables a diameter.
-            length: Unstrained lengths off the drums [m], (m,).
-            counts: What the encoders read there, (m,).
-
-        Raises:
-            InvalidValueError: If the robot's winches have no drum_radius or no counts_per_turn, or the drums cannot
-                hold what is left at these lengths.
-        """
+        """Reference lengths [m] (m,) and counts (m,) of a robot's encoders."""
         winch = robot.winches
         if winch is None or winch.counts_per_turn is None:
             step = "Give it in the robot file, or with robot.replace(winches=Winch(counts_per_turn=...))."
@@ -61,7 +51,7 @@ class Scale:
             self._at_no_length = counts - length * self.per_meter
 
     def counts(self, length: Array) -> Array:
-        """Of the encoders, not rounded, at unstrained lengths off the drums [m]."""
+        """Counts of the encoders, not rounded, at unstrained lengths off the drums [m]."""
         if self._drums is None:
             found: Array = length * self.per_meter + self._at_no_length
             return found
@@ -72,7 +62,7 @@ class Scale:
         return found
 
     def lengths(self, counts: Array) -> Array:
-        """Unstrained, off the drums [m], at counts of the encoders."""
+        """Unstrained lengths off the drums at counts of the encoders [m]."""
         if self._drums is None:
             found: Array = (counts - self._at_no_length) / self.per_meter
             return found
@@ -89,7 +79,7 @@ REACH: Final = 2.0  # of the largest distance between frame anchors: no cable is
 
 
 class Start(NamedTuple):
-    """A machine before it is switched on.
+    """Machine before it is switched on.
 
     Attributes:
         state: The true robot at rest.
@@ -103,16 +93,7 @@ class Start(NamedTuple):
 
 
 def started(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
-    """Where the true platform rests, and what its encoders read there.
-
-    Args:
-        true: The robot as it is.
-        nominal: The robot as it is planned.
-        start: The pose at which the encoders were set; None for the middle of the robot's test_box.
-        surveyed: Whether the true platform stood at that pose then. Otherwise the lengths off its drums were those of
-            the nominal plan there, and what is wrapped and dead on the true machine was not counted: the platform
-            stands where these lengths put it.
-    """
+    """True equilibrium at the start, and the encoder scales there."""
     pose = start_pose(nominal, start)
     plan = inverse(nominal, pose)
     planned = _answered(plan.unstrained_length, nominal, "start")
@@ -131,7 +112,7 @@ def started(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
 
 
 def start_pose(robot: Robot, start: Any) -> Pose:
-    """The pose at which encoders are set; None for the middle of the robot's test_box, level."""
+    """Pose at which encoders are set; by default the middle of the robot's test_box, level."""
     pose = optional(start, Pose, "start")
     if pose is not None:
         if pose.shape:
@@ -145,7 +126,7 @@ def start_pose(robot: Robot, start: Any) -> Pose:
 
 
 def limits_of(robot: Robot, scale: Scale) -> Limits:
-    """What the PLCs know of a robot's winches, one list over all of them."""
+    """Limits of a robot's winches in the PLCs, each one list over all winches."""
     winch, anchors = robot.winches, robot.frame_anchors
     assert winch is not None
     apart = np.linalg.norm(anchors[:, None] - anchors, axis=-1).max()
@@ -159,17 +140,9 @@ def limits_of(robot: Robot, scale: Scale) -> Limits:
 
 
 def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
-    """Refuse a step that is too coarse for the robot's modes, its cables taut and its drums on their cables.
+    """Refuse a step [s] too coarse for the robot's modes, and a period [s] that does not fit.
 
-    Args:
-        robot: The true robot.
-        state: Where it stands.
-        step: Of the plant [s].
-        period: Of controller and PLCs [s].
-
-    Raises:
-        InvalidValueError: If a step is more than 0.2 radians of the highest of them, or the period not of whole ones or
-            longer than a PLC waits for a command.
+    Units: step [s]; period [s].
     """
     if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
         raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
@@ -196,7 +169,7 @@ def _answered(length: Array, robot: Robot, item: str) -> Array:
 
 
 def _left_there(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
-    """The true robot at rest on given lengths, near a pose."""
+    """Equilibrium of the true robot at given lengths, near a pose."""
     dead = dead_cable(robot) + np.zeros(robot.cable_count)
     found = forward(robot, length, start=pose) if (length > dead).all() else None
     if found is None or not found.stable:
@@ -206,7 +179,7 @@ def _left_there(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
 
 
 def _zero_errors(true: Robot, nominal: Robot) -> Array:
-    """By how much more is off the drums than the encoders say [m], shape (m,)."""
+    """Zero errors of the encoders: length off the drums beyond their reading [m], shape (m,)."""
     error = np.zeros(true.cable_count)
     if true.winches is not None and nominal.winches is not None:
         there, thought = true.winches.length_zero, nominal.winches.length_zero
@@ -216,7 +189,7 @@ def _zero_errors(true: Robot, nominal: Robot) -> Array:
 
 
 def _not_counted(true: Robot, nominal: Robot, pose: Pose) -> Array:
-    """What pulleys and dead cable of the true robot add to lengths at a pose that the nominal one has not [m], (m,)."""
+    """Length on pulleys and dead cable of the true robot beyond the nominal robot's [m], (m,)."""
     return _behind(true, pose) - _behind(nominal, pose)
 
 
@@ -228,13 +201,6 @@ def _behind(robot: Robot, pose: Pose) -> Array:
 
 
 def plc_limits(robot: Robot) -> Limits:
-    """What the PLCs of a robot know of its winches, one list over all of them.
-
-    Args:
-        robot: The robot as it is planned for.
-
-    Raises:
-        InvalidValueError: If data of the winches are missing.
-    """
+    """What the PLCs of a robot know of its winches, one list over all of them."""
     planned = _answered(inverse(robot, start_pose(robot, None)).unstrained_length, robot, "test_box")
     return limits_of(robot, Scale(robot, planned, np.zeros(robot.cable_count)))
