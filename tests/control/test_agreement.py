@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.connecting import trouble
+from sagline.control.connecting import disagreement
 from sagline.control.controller import Controller
 from sagline.control.link import COUNTERS, GroupStatus, Mode, Sample, WinchState
 from sagline.control.states import RefusedError, State
@@ -52,10 +52,10 @@ BAD: dict[str, tuple[str, int, float, int]] = {
 @pytest.mark.parametrize("name", BAD)
 def test_each_disagreement_is_refused_with_its_group_cause_and_next_step(name: str, snapshot: Any) -> None:
     field, index, value, group = BAD[name]
-    assert trouble(agreeing(), OWN, COUNTER, GROUPS) is None
+    assert disagreement(agreeing(), OWN, COUNTER, GROUPS) is None
     wrong = getattr(agreeing(), field).copy()
     wrong[index] = value
-    found = trouble(agreeing()._replace(**{field: wrong}), OWN, COUNTER, GROUPS)
+    found = disagreement(agreeing()._replace(**{field: wrong}), OWN, COUNTER, GROUPS)
     assert found is not None
     error = found.refusal("it")
     assert (error.item, error.reason.partition(":")[0]) == ("it", f"group {group}")
@@ -65,8 +65,8 @@ def test_each_disagreement_is_refused_with_its_group_cause_and_next_step(name: s
 
 def test_an_echo_may_be_ten_commands_old_across_the_end_of_the_counters() -> None:
     sample = agreeing()._replace(echo=np.full(4, COUNTERS - 4))
-    assert trouble(sample, OWN, 6, GROUPS) is None
-    assert trouble(sample, OWN, 7, GROUPS) is not None
+    assert disagreement(sample, OWN, 6, GROUPS) is None
+    assert disagreement(sample, OWN, 7, GROUPS) is not None
 
 
 MISHAPS = [

@@ -147,5 +147,5 @@ def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.Monke
     for name in names:
         monkeypatch.setattr(real_time, name, trying(name))
     nowhere = prototype().replace(tension_min=2000.0, tension_max=2100.0)  # no pose has such tensions
-    real_time.load_all(nowhere, 0.01, sl.Catenary(), sl.Closest())
+    real_time.load_kernels(nowhere, 0.01, sl.Catenary(), sl.Closest())
     assert tried == names

@@ -95,10 +95,10 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
     from sagline.control.controller import Controller
     from sagline.control.real_time import Pace
     from sagline.plc.s7_link import S7Link
-    from sagline.twin.server import apart
+    from sagline.twin.server import machine_in_process
 
     with (
-        apart(with_cells(true), nominal, level_poses(HOME), seed=seed) as twin,
+        machine_in_process(with_cells(true), nominal, level_poses(HOME), seed=seed) as twin,
         closing(S7Link(twin.addresses, nominal)) as link,
     ):
         watch = Watch(twin.position, tell)

@@ -146,10 +146,10 @@ def _at_ticks(path: Path, period: float) -> Path:
         chosen, ticks = np.append(chosen, len(time) - 1), np.append(ticks, [period * count])
     if len(ticks) < 2:
         raise RefusedError("the path", f"it takes {time[-1]:g} s, no cycle", "Give one that moves.")
-    return _taken(path, chosen, ticks)
+    return _path_at(path, chosen, ticks)
 
 
-def _taken(path: Path, chosen: Indices, time: Array) -> Path:
+def _path_at(path: Path, chosen: Indices, time: Array) -> Path:
     jerk = None if path.jerk is None else path.jerk[chosen]
     return Path(time, path.pose[chosen], path.twist[chosen], path.twist_rate[chosen], jerk)
 

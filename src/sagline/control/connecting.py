@@ -33,7 +33,7 @@ _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY),
 _AGAIN: Final = "Try again; if it stays so, check the PLC's program."
 
 
-class Trouble(NamedTuple):
+class Disagreement(NamedTuple):
     """Reason why groups do not agree.
 
     Attributes:
@@ -51,9 +51,9 @@ class Trouble(NamedTuple):
         return RefusedError(what, self.reason, self.next_step)
 
 
-def trouble(
+def disagreement(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
-) -> Trouble | None:
+) -> Disagreement | None:
     """Reason why not all groups agree, the most general one first; None where all do.
 
     A group agrees where its sample is fresh, its grant is ours, its drives are ready, without fault and not locked, and
@@ -82,7 +82,7 @@ def trouble(
     for there, reason, step, lasting in causes:
         if there.any():
             names = ", ".join(map(str, np.flatnonzero(there)))
-            return Trouble(f"group {names}: {reason}", step, lasting)
+            return Disagreement(f"group {names}: {reason}", step, lasting)
     return None
 
 
@@ -105,7 +105,7 @@ class Claim:
         self._tries = 1
         self.mode: Mode | None = Mode.HOLD
         self.ready = False
-        self.refused: Trouble | None = None
+        self.refused: Disagreement | None = None
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
         """Judge an answer, and decide on the next command."""
@@ -113,13 +113,13 @@ class Claim:
             self._silent += 1
             if self._silent * self._period >= SILENT:
                 reason = "; ".join(f"group {g}: {why}" for g, why in zip(*answer[1:], strict=True))
-                self._refuse(Trouble(reason, "Check the PLCs and the network, then try again."))
+                self._refuse(Disagreement(reason, "Check the PLCs and the network, then try again."))
             return
         self._cycles += 1
         if self._waiting:
             self._wait()
             return
-        why = trouble(answer, self._owner, counter, self._groups, self._period)
+        why = disagreement(answer, self._owner, counter, self._groups, self._period)
         self._agreed = self._agreed + 1 if why is None else 0
         if why is None:
             self.ready = self._agreed >= AGREEING
@@ -147,5 +147,5 @@ class Claim:
         if not self._waiting:
             self.mode, self._cycles = Mode.HOLD, 0
 
-    def _refuse(self, why: Trouble) -> None:
+    def _refuse(self, why: Disagreement) -> None:
         self.refused, self.mode = why, Mode.LEAVE

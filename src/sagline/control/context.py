@@ -13,7 +13,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.control.checks import Motion
-from sagline.control.connecting import trouble
+from sagline.control.connecting import disagreement
 from sagline.control.estimator import Estimator
 from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
@@ -150,7 +150,7 @@ class Context:
         """The newest sample; refuses a request that needs all groups, where one of them does not agree."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
-        why = trouble(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
+        why = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
         if why is not None:
             raise why.refusal(what)
         return self.sample

@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 from sagline.cables.model import CableModel
 from sagline.control.active_states import Connecting, Following, Holding, HomingState, Off, idle_at
 from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
-from sagline.control.connecting import Trouble
+from sagline.control.connecting import Disagreement
 from sagline.control.context import Context
 from sagline.control.execution import Execution
 from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog, checked_displacement, checked_winch, winch_jog
 from sagline.control.link import Link, Sample
 from sagline.control.loop import Loop
-from sagline.control.real_time import Pace, in_background, interrupt_calls, load_all
+from sagline.control.real_time import Pace, in_background, interrupt_calls, load_kernels
 from sagline.control.recording import Event, EventKind, Recorder
 from sagline.control.set_points import Along, Course, SetPoint, Standing
 from sagline.control.states import MOTION, RefusedError, State, check_transition
@@ -93,7 +93,7 @@ class Controller:
         self._context = c = Context(robot, link, pace, model, tension, loop, record, bool(shadow), seed)
         self._loop = Loop(c)
         if pace is not None:
-            load_all(robot, c.period, c.model, c.method)
+            load_kernels(robot, c.period, c.model, c.method)
 
     @property
     def state(self) -> State:
@@ -218,7 +218,7 @@ class Controller:
         if self.state is not State.READY:
             step = "Check the machine and who else controls it, then try again."
             refused = connecting.claim.refused if isinstance(connecting, Connecting) else None
-            raise (refused or Trouble(self._context.run.reason, step)).refusal("connecting")
+            raise (refused or Disagreement(self._context.run.reason, step)).refusal("connecting")
 
     def begin_homing(self, pose: Pose) -> None:
         """Name the pose in which the platform is held, and begin to compare tensions.

@@ -9,7 +9,7 @@ from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from sagline.control.extrema import ends, finite, largest
+from sagline.control.extrema import extrema, finite, largest
 from sagline.control.link import RAMP, Command, Mode, Sample, WinchState, groups_of
 from sagline.control.null_space import SIGMAS, NullSpace
 from sagline.core.arrays import Array, Flags
@@ -145,7 +145,7 @@ class Evidence:
         """Update the evidence with a new cycle."""
         self.cycle, sample = cycle, cycle.sample
         self._read(cycle)
-        self.oldest = ends(sample.age)[1]
+        self.oldest = extrema(sample.age)[1]
         self.bits, self.common, self.states = 0, -1, sample.state.tolist()
         for bits in sample.status.tolist():
             self.bits |= bits
@@ -157,7 +157,7 @@ class Evidence:
         self._look_for_slack(cycle)
         self._compare(cycle)
 
-    def disbelieve(self, cells: Flags) -> None:
+    def ignore_cells(self, cells: Flags) -> None:
         """Ignore some cells from here on, shape (m,)."""
         self.believed &= ~cells
         self._all_believed = False
@@ -175,12 +175,12 @@ class Evidence:
     def _read(self, cycle: Cycle) -> None:
         """Take the readings, except of cells that are ignored."""
         self.tension = tension = cycle.sample.tension
-        self.least, self.most = ends(tension)
+        self.least, self.most = extrema(tension)
         self.plain = self._all_believed and math.isfinite(self.least) and math.isfinite(self.most)
         if not self.plain:
             planned = np.where(np.isfinite(cycle.tension), cycle.tension, self._neither)
             self.tension = np.where(self.believed & np.isfinite(tension), tension, planned)
-            self.least, self.most = ends(self.tension)
+            self.least, self.most = extrema(self.tension)
 
     @property
     def fresh(self) -> Flags:
@@ -272,7 +272,7 @@ class Fault(ABC):
             seen: Shared by the whole set.
         """
         self.seen, self.present = seen, False
-        self._spoke, self._unsaid = 10**9, 0  # cycles since it was told, and how often it began meanwhile
+        self._since_report, self._suppressed = 10**9, 0  # cycles since it was told, and how often it began meanwhile
 
     def look(self, cycle: Cycle) -> str | None:
         """Look at a cycle; every cycle once, in order.
@@ -293,7 +293,7 @@ class Fault(ABC):
                 return None
             waits = not self.present
         line = self.found(cycle)
-        self._spoke += 1
+        self._since_report += 1
         if line is None:
             if not self.lasting:
                 self.present = False
@@ -304,17 +304,17 @@ class Fault(ABC):
         self.present = True
         if begins and stops:
             self.seen.stop()
-        return self._said(line) if begins else None
+        return self._without_repeats(line) if begins else None
 
-    def _said(self, line: str) -> str | None:
+    def _without_repeats(self, line: str) -> str | None:
         """Suppress repeats within `quiet` seconds."""
         if not self.quiet:
             return line
-        if self._spoke * self.seen.period <= self.quiet:
-            self._unsaid += 1
+        if self._since_report * self.seen.period <= self.quiet:
+            self._suppressed += 1
             return None
-        more = f" It was so {self._unsaid} times more since this was told last." if self._unsaid else ""
-        self._spoke, self._unsaid = 0, 0
+        more = f" It was so {self._suppressed} times more since this was told last." if self._suppressed else ""
+        self._since_report, self._suppressed = 0, 0
         return line + more
 
     @abstractmethod

@@ -12,7 +12,7 @@ def finite(values: Array) -> bool:
     return isfinite(sum(values.tolist()))
 
 
-def ends(values: Array) -> tuple[float, float]:
+def extrema(values: Array) -> tuple[float, float]:
     """Minimum and maximum; NaN where a value is not finite."""
     numbers = values.tolist()
     if not isfinite(sum(numbers)):
@@ -23,5 +23,5 @@ def ends(values: Array) -> tuple[float, float]:
 
 def largest(values: Array) -> float:
     """Largest absolute value; NaN where a value is not finite."""
-    least, most = ends(values)
+    least, most = extrema(values)
     return max(-least, most)

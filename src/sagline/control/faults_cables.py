@@ -147,7 +147,7 @@ class CellDead(Fault):
         dead &= seen.believed
         if not dead.any():
             return None
-        seen.disbelieve(dead)
+        seen.ignore_cells(dead)
         cell = int(np.argmax(dead))
         holds = f" while its motor holds {pull[cell]:.4g} N" if np.isfinite(pull[cell]) else ""
         return f"cell {cell} reads {tension[cell]:.4g} N{holds}; planned: {cycle.tension[cell]:.4g} N. {_STEP}"
@@ -183,7 +183,7 @@ class CellStuck(Fault):
         stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # so many after the first of them
         if not stuck.any():
             return None
-        seen.disbelieve(stuck)
+        seen.ignore_cells(stuck)
         cell = int(np.argmax(stuck))
         reading = cycle.sample.tension[cell]
         return f"cell {cell} has read {reading:.4g} N in {STUCK_SAMPLES} samples of a motion. {_STEP}"
@@ -221,7 +221,7 @@ class CellOff(Fault):
         cell = int(np.argmax(np.abs(error)))
         if self._for[cell] < self._samples:
             return None
-        seen.disbelieve(np.arange(error.size) == cell)
+        seen.ignore_cells(np.arange(error.size) == cell)
         seen_of_it = float(cycle.gains.parity[cell, cell]) if cycle.gains is not None else 1.0
         return (
             f"cell {cell} is off by about {error[cell] / seen_of_it:.0f} N by the platform's balance; "

@@ -185,18 +185,18 @@ MOVE = 0.01  # m
 HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # below the frame's anchors, in widths of the frame
 
 
-def load_all(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
+def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
     """Run homing, a path and jogs once, near the middle of a robot, to load their kernels; refusals do not matter.
 
     Each part is tried by itself: one that is refused leaves no other cold.
 
     Units: period [s].
     """
-    middle, homing = _homed(robot, model, method)
+    middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)
     previous = None if homing is None else homing.plan
-    point = _hanging(robot, middle) if homing is None else homing.standing.step()
+    point = _straight_set_point(robot, middle) if homing is None else homing.standing.step()
     parts: tuple[Callable[[], object], ...] = (
         lambda: None if homing is None else homing.refusal(),
         lambda: standing_at(robot, point.length, None, model),
@@ -209,25 +209,25 @@ def load_all(robot: Robot, period: float, model: CableModel, method: TensionMeth
             part()
 
 
-def _homed(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
+def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
     """The first place with tensions within the limits; else the middle, and None."""
-    for place in _middles(robot):
+    for place in _probable_positions(robot):
         pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
         with suppress(SaglineError):
             homing = Homing(robot, pose, model, method)
             homing.off = np.zeros(robot.cable_count)
             return pose, homing
-    return Pose.from_euler(_middles(robot)[0], 0.0, 0.0, 0.0), None
+    return Pose.from_euler(_probable_positions(robot)[0], 0.0, 0.0, 0.0), None
 
 
-def _hanging(robot: Robot, pose: Pose) -> SetPoint:
+def _straight_set_point(robot: Robot, pose: Pose) -> SetPoint:
     """Set point with straight cables."""
     length = np.linalg.norm(pose.transform(robot.platform_anchors) - robot.frame_anchors, axis=1)
     none, unknown = np.zeros(len(length)), np.full(len(length), np.nan)
     return SetPoint(length, none, unknown, unknown, None, None, np.nan, True)
 
 
-def _middles(robot: Robot) -> list[Array]:
+def _probable_positions(robot: Robot) -> list[Array]:
     """Probable positions: middle of the test box, and points below the middle of the frame anchors."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     width = float(np.linalg.norm((high - low)[:2]))

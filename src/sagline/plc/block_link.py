@@ -108,7 +108,7 @@ class Group(Thread):
                 self._wire.open()
                 self._serve()
             except Exception as error:  # whatever it is: nobody but this thread would connect anew
-                self.trouble = error.refusal if isinstance(error, WireError) else _mishap(error)
+                self.trouble = error.refusal if isinstance(error, WireError) else _unexpected(error)
                 self.settled.set()
             finally:
                 self._wire.close()
@@ -132,14 +132,14 @@ class Group(Thread):
     def _take(self, data: bytes, asked: float, connected: float) -> None:
         arrived = self._clock()
         values = FROM_PLC.read(data)
-        self.trouble = values if isinstance(values, Refusal) else self._strange(values)
-        if isinstance(values, Refusal) or self.trouble or not self._is_news(values["counter"], arrived, connected):
+        self.trouble = values if isinstance(values, Refusal) else self._mismatch(values)
+        if isinstance(values, Refusal) or self.trouble or not self._is_newer(values["counter"], arrived, connected):
             self.discarded += 1
         else:
             self.newest = Newest(values, arrived, arrived - asked)
         self.settled.set()
 
-    def _strange(self, values: dict[str, Any]) -> Refusal | None:
+    def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
         """Reason why a valid block is not of the expected PLC; None where it is."""
         told = values["group"] - 1  # in a block it is one more
         if told != self.number:
@@ -153,7 +153,7 @@ class Group(Thread):
             )
         return None
 
-    def _is_news(self, counter: int, arrived: float, connected: float) -> bool:
+    def _is_newer(self, counter: int, arrived: float, connected: float) -> bool:
         """Whether a block is newer than the newest; after a long silence the PLC may have restarted."""
         newest = self.newest
         if newest is None:
@@ -163,7 +163,7 @@ class Group(Thread):
         return newer(counter, known) or (anew and counter != known)
 
 
-def _mishap(error: Exception) -> Refusal:
+def _unexpected(error: Exception) -> Refusal:
     text = " ".join(str(error).split())[:80]
     return Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")
 

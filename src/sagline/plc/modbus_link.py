@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Final
 from sagline.core.arguments import whole_number
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import LOAD, Block, Refusal
-from sagline.plc.wire import ANSWER, WireError, addresses_of, needed, refused
+from sagline.plc.wire import ANSWER, WireError, addresses_of, plc_packages, refusal_of
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class ModbusWire:
 
     def __init__(self, host: str, port: int, device: int) -> None:
         """Keep the address; `open` connects."""
-        with needed():
+        with plc_packages():
             from pymodbus.client import ModbusTcpClient
         self._client = ModbusTcpClient(host, port=port, timeout=ANSWER, retries=0)
         self._place = (host, port)
@@ -71,12 +71,12 @@ class ModbusWire:
         try:
             connected = self._client.connect()  # type: ignore[no-untyped-call]
         except Exception as error:
-            raise WireError(refused(error, "Modbus")) from error
+            raise WireError(refusal_of(error, "Modbus")) from error
         if not connected:
             try:  # the library keeps to itself why not
                 socket.create_connection(self._place, timeout=ANSWER).close()
             except OSError as error:
-                raise WireError(refused(error, "Modbus")) from error
+                raise WireError(refusal_of(error, "Modbus")) from error
             raise WireError(Refusal("the connection was closed", "Check that nobody else is connected to it"))
 
     def read(self, block: Block) -> bytes:
@@ -115,7 +115,7 @@ class ModbusWire:
 
 
 def _failed(error: Exception) -> WireError:
-    return error if isinstance(error, WireError) else WireError(refused(error, "Modbus"))
+    return error if isinstance(error, WireError) else WireError(refusal_of(error, "Modbus"))
 
 
 def _good(answer: ModbusPDU, block: Block) -> ModbusPDU:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from sagline.plc.block_link import BlockLink
 from sagline.plc.blocks import LOAD, Block, Refusal
-from sagline.plc.wire import ANSWER, WireError, addresses_of, needed, refused
+from sagline.plc.wire import ANSWER, WireError, addresses_of, plc_packages, refusal_of
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class S7Wire:
 
     def __init__(self, host: str, port: int) -> None:
         """Keep the address; `open` connects."""
-        with needed():
+        with plc_packages():
             import snap7
         self._library = snap7
         self._host = host
@@ -71,7 +71,7 @@ class S7Wire:
             client.connect(self._host, RACK, SLOT, tcp_port=self._port)
             _socket(client).settimeout(ANSWER)
         except Exception as error:  # of a stranger's answer the library may make anything
-            raise WireError(refused(error, "S7")) from error
+            raise WireError(refusal_of(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
         """The bytes of a block."""
@@ -134,4 +134,4 @@ def _no_access(error: Exception, block: Block) -> Refusal:
         return Refusal(f"it has no DB{block.number} of {block.size} bytes", f"{LOAD}, without optimized access")
     if "(0x03)" in text or "(0x01)" in text or getattr(error, "error_code", None) == FORBIDDEN:
         return Refusal(f"it lets nobody at DB{block.number}", "Permit PUT/GET in its protection settings")
-    return refused(error, "S7")
+    return refusal_of(error, "S7")

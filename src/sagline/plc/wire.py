@@ -143,7 +143,7 @@ class Wire(Protocol):
 
 
 @contextmanager
-def needed() -> Iterator[None]:
+def plc_packages() -> Iterator[None]:
     """Context for imports of the packages that PLCs need."""
     try:
         yield
@@ -151,7 +151,7 @@ def needed() -> Iterator[None]:
         raise FileError.not_installed(str(error.name).partition(".")[0], "PLCs need it", "plc") from None
 
 
-def refused(error: BaseException | None, speaks: str) -> Refusal:
+def refusal_of(error: BaseException | None, speaks: str) -> Refusal:
     """Reason why a connection failed."""
     text = " ".join(str(error).split()) or type(error).__name__
     cause = error

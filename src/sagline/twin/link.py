@@ -41,7 +41,7 @@ class Network:
         return None if lost < self._loss else now + self._delay + late * self._jitter
 
 
-class Way:
+class Channel:
     """Messages on the way in one direction."""
 
     def __init__(self, network: Network) -> None:
@@ -171,8 +171,8 @@ class MachineLink:
         self._machine, self._network, self._moves = machine, network, moves
         self._groups = machine.groups
         count = len(self._groups)
-        self._there = [Way(network) for _ in range(count)]
-        self._back = [Way(network) for _ in range(count)]
+        self._outbound = [Channel(network) for _ in range(count)]
+        self._inbound = [Channel(network) for _ in range(count)]
         self._newest: list[Snapshot | None] = [None] * count
         self._arrival = np.zeros(count)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self._groups]
@@ -222,12 +222,12 @@ class MachineLink:
             if ideal:
                 deliver(group, message)
             else:
-                self._there[group].send(now, message)
+                self._outbound[group].send(now, message)
 
     def before(self, now: float) -> None:
         """Deliver the messages that have arrived by the beginning of a scan [s]."""
         if not self._network.ideal:
-            for group, way in enumerate(self._there):
+            for group, way in enumerate(self._outbound):
                 for _, message in way.arrived(now):
                     self._machine.deliver(group, message)
 
@@ -237,7 +237,7 @@ class MachineLink:
             self._newest, self._owner = [snapshot] * len(self._groups), list(snapshot.owners)
             self._arrival.fill(now)
         else:
-            for group, back in enumerate(self._back):
+            for group, back in enumerate(self._inbound):
                 for block in self._blocks(group, snapshot, spoiled.get(group)):
                     back.send(now, block)
                 for arrival, block in back.arrived(now):

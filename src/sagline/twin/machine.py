@@ -32,7 +32,7 @@ from sagline.twin.link import (
     Snapshot,
 )
 from sagline.twin.plc_program import Limits, Order, Program
-from sagline.twin.start import check_step, limits_of, started
+from sagline.twin.start import check_step, initial_state, limits_of
 
 LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # ours; on the prototype as if the air took 2 N s/m
 MOST_SEED: Final = 2**63 - 1
@@ -119,15 +119,15 @@ class Machine:
         losses = optional(damping, Damping, "damping") or LOSSES
         noise = whole_number(seed, "seed", 0, MOST_SEED)
         self._network = Network(delay, jitter, loss, noise)
-        begin = started(robot, self.nominal, start, bool(surveyed))
+        begin = initial_state(robot, self.nominal, start, bool(surveyed))
         self._hardware = Hardware(robot, begin, losses, size, self.period, noise)
         check_step(robot, begin.state, size, self.period)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self.groups]
-        self._programs = self._switched_on(limits_of(self.nominal, begin.nominal))
+        self._programs = self._make_programs(limits_of(self.nominal, begin.nominal))
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
-        self._told = np.zeros((5, len(self.groups)), dtype=np.int64)
+        self._group_rows = np.zeros((5, len(self.groups)), dtype=np.int64)
         self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)
-        self._news: Any = None  # what was told last but for counters
+        self._reported: Any = None  # what was told last but for counters
         self._cycles = self._counter = 0
         self._links: list[MachineLink] = []
         self._schedule, self._commands = Schedule(), ""
@@ -135,10 +135,10 @@ class Machine:
         self._stopped: set[int] = set()
         self._taken: set[int] = set()
         self._snapshot = self._written(None)
-        for one in _several(faults):
+        for one in _each_fault(faults):
             self.inject(one)
 
-    def _switched_on(self, limits: Limits) -> list[Program]:
+    def _make_programs(self, limits: Limits) -> list[Program]:
         """Programs of the PLCs, each with the limits of its own winches."""
         programs, length = [], self._hardware.read[LENGTH].tolist()
         for part in self._parts:
@@ -212,7 +212,7 @@ class Machine:
             message: The owner who claims, or a command.
         """
         if self._schedule.waiting:
-            self._let_happen()
+            self._apply_due_faults()
         if group in self._stopped or self._commands not in ("", "are foreign"):
             return
         if isinstance(message, int):
@@ -226,7 +226,7 @@ class Machine:
         """Simulate one period: faults that are due, the PLCs' scans, drives and plant, and the readings at its end."""
         now = self.time
         if self._schedule.waiting:
-            self._let_happen()
+            self._apply_due_faults()
         for link in self._links:
             link.before(now)
         self._scan(now)
@@ -254,14 +254,14 @@ class Machine:
 
     def _written(self, before: Snapshot | None) -> Snapshot:
         """Blocks of all groups; those of a stopped PLC stay as they were."""
-        hardware, programs, groups = self._hardware, self._programs, self._told
+        hardware, programs, groups = self._hardware, self._programs, self._group_rows
         self._counter = self._counter % COUNTERS + 1
         groups[COUNTER] = self._counter
         groups[ECHO] = [program.echo for program in programs]
         saturated = hardware.saturated.tolist()
         news = [(program.owner, program.status, program.fault, *program.powered) for program in programs], saturated
-        if news != self._news:
-            self._news = news
+        if news != self._reported:
+            self._reported = news
             groups[OWNER], groups[STATUS], groups[FAULT] = zip(*(row[:3] for row in news[0]), strict=True)
             for program, part in zip(programs, self._parts, strict=True):
                 self._whole[STATE, part], self._whole[DRIVE_FAULT, part] = program.states(saturated[part])
@@ -311,12 +311,12 @@ class Machine:
             raise InvalidValueError("fault", brief(str(found)), f"{kind.item} 0 to {parts - 1}", "They count from 0.")
         self._schedule.plan(found)
 
-    def _let_happen(self) -> None:
+    def _apply_due_faults(self) -> None:
         """Begin and end the faults that are due."""
         for begins, what in self._schedule.due(self.time):
-            self._happen(what, begins)
+            self._apply_fault(what, begins)
 
-    def _happen(self, what: Injected, begins: bool) -> None:
+    def _apply_fault(self, what: Injected, begins: bool) -> None:
         """Begin or end a fault."""
         hardware, which, value = self._hardware, what.which, what.value
         item, words = KINDS[what.kind].item, KINDS[what.kind].words
@@ -362,7 +362,7 @@ class Machine:
             program.reset()
 
 
-def _several(faults: Any) -> Iterable[Any]:
+def _each_fault(faults: Any) -> Iterable[Any]:
     """Iterable of faults; a single one may be given by itself."""
     if isinstance(faults, str | Injected):
         return (faults,)

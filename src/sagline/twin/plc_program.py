@@ -158,12 +158,12 @@ class Program:
                 self.locked = True
                 self._brake()
                 return
-            self._let_lag(encoder, cell)
+            self._move_to_drives(encoder, cell)
             self._stop(GroupFault.FOLLOWING_ERROR)
             self.fault = GroupFault.FOLLOWING_ERROR  # whatever came before
         if any(self.drive_fault):
             self.fault = self.fault or GroupFault.DRIVE
-        elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_told)):
+        elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_reported)):
             self.fault = GroupFault.NONE
             if order.enable != self.powered:
                 self._switch(order, encoder)
@@ -187,9 +187,9 @@ class Program:
             return False
         return True
 
-    def _let_lag(self, encoder: list[float], cell: list[float]) -> None:
+    def _move_to_drives(self, encoder: list[float], cell: list[float]) -> None:
         """Move set points that are too far away to the drives, with the tensions that their cells read."""
-        read = self._known([max(reading, 0.0) for reading in cell])
+        read = self._valid_tensions([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:
             if self.powered[i] and abs(self.length[i] - encoder[i]) > FOLLOWING:
@@ -221,14 +221,14 @@ class Program:
         if order.mode == _FOLLOW and any(self.powered):
             self._follow(order, waited, cell)
             return
-        known = self._known(order.tension)  # a drive that holds goes on with what it has
+        known = self._valid_tensions(order.tension)  # a drive that holds goes on with what it has
         self.tension = [old if has else new for has, old, new in zip(self.powered, self.tension, known, strict=True)]
         if self._mode == _FOLLOW and any(self._rate):
             self._ramp = RAMP
         self._mode = order.mode
         self._slow_down(cell)
 
-    def _known(self, tension: list[float]) -> list[float]:
+    def _valid_tensions(self, tension: list[float]) -> list[float]:
         """Expected tensions; where one is outside its limits, the one before."""
         rows = zip(tension, self.tension, self.limits.tension, strict=True)
         return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
@@ -254,7 +254,7 @@ class Program:
                     self._slow_down(cell)
                     return
             elif not 0.0 <= tensions[i] <= tightest[i]:
-                tensions = self._known(tensions)
+                tensions = self._valid_tensions(tensions)
         self.tension, self._asked, self._rate, self._left = tensions, lengths, rates, PERIOD
         self._drive(cell)
 
@@ -304,7 +304,7 @@ class Program:
             self._rate = [0.0] * len(self._rate)
 
     @property
-    def _was_told(self) -> bool:
+    def _was_reported(self) -> bool:
         """Whether the ramp is over, and the fault has been reported for a heartbeat."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 

@@ -18,7 +18,7 @@ from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.plc.blocks import AGAIN, CLAIM, FROM_PLC, TO_PLC, Refusal, winch_row, winch_rows
-from sagline.plc.wire import LAST_PORT, needed
+from sagline.plc.wire import LAST_PORT, plc_packages
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.twin.block_servers import LOOPBACK, BlockServers
@@ -152,7 +152,7 @@ def block_of(group: int, report: Report) -> bytes:
 
 
 def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> BlockServers:
-    with needed():
+    with plc_packages():
         if modbus:
             from sagline.twin.modbus_servers import ModbusServers
 
@@ -165,7 +165,7 @@ def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> B
 SWITCHING_ON: Final = 60.0  # s, at most; kernels may have to be read from the disk
 
 
-class Apart(NamedTuple):
+class RemoteMachine(NamedTuple):
     """Machine in another process.
 
     Attributes:
@@ -182,7 +182,7 @@ class Apart(NamedTuple):
 
 
 @contextmanager
-def apart(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[Apart]:
+def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[RemoteMachine]:
     """Context of a machine in another process, in real time; it is killed at the end."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
@@ -191,14 +191,14 @@ def apart(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterat
     process.start()
     there.close()
     try:
-        yield Apart(_told(here), place)
+        yield RemoteMachine(_receive_addresses(here), place)
     finally:
         process.kill()
         process.join()
         here.close()
 
 
-def _told(pipe: Connection) -> tuple[str, ...]:
+def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
     """Addresses from the other process; raises its error."""
     answer: tuple[str, ...] | SaglineError | None = None
     with suppress(EOFError):

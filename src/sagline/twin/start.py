@@ -25,7 +25,7 @@ from sagline.robot.robot import Robot
 from sagline.twin.plc_program import LEFT, Limits
 
 
-class Scale:
+class EncoderScale:
     """Conversion between lengths and encoder counts, (m,): by the turns of known drums, else by one radius each.
 
     Attributes:
@@ -88,27 +88,27 @@ class Start(NamedTuple):
     """
 
     state: Equilibrium
-    nominal: Scale
-    true: Scale
+    nominal: EncoderScale
+    true: EncoderScale
 
 
-def started(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
+def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
     """True equilibrium at the start, and the encoder scales there."""
     pose = start_pose(nominal, start)
     plan = inverse(nominal, pose)
-    planned = _answered(plan.unstrained_length, nominal, "start")
+    planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
     counts = np.zeros(nominal.cable_count)
-    scale = Scale(nominal, planned, counts)
+    scale = EncoderScale(nominal, planned, counts)
     if (winch := nominal.winches) is not None and winch.length_zero is not None:
         stretch = 1.0 + winch.winding_tension / nominal.cables.axial_stiffness
         counts = np.rint(winch.count_zero - scale.counts(winch.length_zero / stretch))
-        scale = Scale(nominal, planned, counts)
+        scale = EncoderScale(nominal, planned, counts)
     if surveyed:
         state = inverse(true, pose).state
-        _answered(state.unstrained_length, true, "start")
+        _feasible_lengths(state.unstrained_length, true, "start")
     else:
-        state = _left_there(true, planned + _not_counted(true, nominal, pose) + _zero_errors(true, nominal), pose)
-    return Start(state, scale, Scale(true, state.unstrained_length, counts))
+        state = _rest_at(true, planned + _uncounted_length(true, nominal, pose) + _zero_errors(true, nominal), pose)
+    return Start(state, scale, EncoderScale(true, state.unstrained_length, counts))
 
 
 def start_pose(robot: Robot, start: Any) -> Pose:
@@ -125,7 +125,7 @@ def start_pose(robot: Robot, start: Any) -> Pose:
     return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
 
 
-def limits_of(robot: Robot, scale: Scale) -> Limits:
+def limits_of(robot: Robot, scale: EncoderScale) -> Limits:
     """Limits of a robot's winches in the PLCs, each one list over all winches."""
     winch, anchors = robot.winches, robot.frame_anchors
     assert winch is not None
@@ -161,14 +161,14 @@ def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> 
         raise InvalidValueError("step", f"{step:g} s", allowed, f"Give step={finer:.6g}.")
 
 
-def _answered(length: Array, robot: Robot, item: str) -> Array:
+def _feasible_lengths(length: Array, robot: Robot, item: str) -> Array:
     if np.isnan(length).any():
         allowed = f"one that {robot.name} can hold within its tension limits"
         raise InvalidValueError(item, "a pose without an answer", allowed, "Give another pose as start.")
     return length
 
 
-def _left_there(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
+def _rest_at(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
     """Equilibrium of the true robot at given lengths, near a pose."""
     dead = dead_cable(robot) + np.zeros(robot.cable_count)
     found = forward(robot, length, start=pose) if (length > dead).all() else None
@@ -188,19 +188,19 @@ def _zero_errors(true: Robot, nominal: Robot) -> Array:
     return error
 
 
-def _not_counted(true: Robot, nominal: Robot, pose: Pose) -> Array:
+def _uncounted_length(true: Robot, nominal: Robot, pose: Pose) -> Array:
     """Length on pulleys and dead cable of the true robot beyond the nominal robot's [m], (m,)."""
-    return _behind(true, pose) - _behind(nominal, pose)
+    return _routed_length(true, pose) - _routed_length(nominal, pose)
 
 
-def _behind(robot: Robot, pose: Pose) -> Array:
+def _routed_length(robot: Robot, pose: Pose) -> Array:
     if robot.winches is None or not robot.winches.anything_behind:
         return np.zeros(robot.cable_count)
     whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))
-    return _answered(whole - bare, robot, "start")
+    return _feasible_lengths(whole - bare, robot, "start")
 
 
 def plc_limits(robot: Robot) -> Limits:
     """What the PLCs of a robot know of its winches, one list over all of them."""
-    planned = _answered(inverse(robot, start_pose(robot, None)).unstrained_length, robot, "test_box")
-    return limits_of(robot, Scale(robot, planned, np.zeros(robot.cable_count)))
+    planned = _feasible_lengths(inverse(robot, start_pose(robot, None)).unstrained_length, robot, "test_box")
+    return limits_of(robot, EncoderScale(robot, planned, np.zeros(robot.cable_count)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagline.control.extrema import ends, finite, largest
+from sagline.control.extrema import extrema, finite, largest
 
 ODD = (np.nan, np.inf, -np.inf)
 
@@ -17,19 +17,19 @@ def test_ends_are_those_of_numpy(count: int) -> None:
         values = random.normal(0.0, 100.0, count)
         odd = random.random(count) < random.choice([0.0, 0.3])
         values[odd] = random.choice(ODD, int(odd.sum()))
-        np.testing.assert_array_equal(ends(values), (values.min(), values.max()))
+        np.testing.assert_array_equal(extrema(values), (values.min(), values.max()))
         np.testing.assert_array_equal(largest(values), np.abs(values).max())
         assert finite(values) == bool(np.isfinite(values).all())
 
 
 def test_infinities_of_both_signs_are_the_ends_though_their_sum_is_no_number() -> None:
     values = np.array([1.0, np.inf, -np.inf, 2.0])
-    assert ends(values) == (-np.inf, np.inf)
+    assert extrema(values) == (-np.inf, np.inf)
     assert largest(values) == np.inf
     assert not finite(values)
 
 
 def test_values_stay_in_their_order() -> None:
     values = np.array([3.0, -7.0, 5.0])
-    assert ends(values) == (-7.0, 5.0)
+    assert extrema(values) == (-7.0, 5.0)
     assert values.tolist() == [3.0, -7.0, 5.0]
