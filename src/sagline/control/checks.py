@@ -111,7 +111,7 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
 def check_lead(what: str, lead: Array) -> None:
     """Refuse a way that begins with other lengths, where the tensions differ too much from its plan.
 
-    Units: lead [m] (m,).
+    Lead: difference of the lengths at rest from the first ones of the plan [m], (m,).
     """
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:

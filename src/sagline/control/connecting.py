@@ -37,9 +37,9 @@ class Disagreement(NamedTuple):
     """Reason why groups do not agree.
 
     Attributes:
-        reason: Which groups, and why, in words.
-        next_step: What to do about it.
-        lasting: Whether waiting does not mend it.
+        reason: The groups and the cause, in words.
+        next_step: For the reader.
+        lasting: Whether it needs the operator.
     """
 
     reason: str
@@ -58,8 +58,6 @@ def disagreement(
 
     A group agrees where its sample is fresh, its grant is ours, its drives are ready, without fault and not locked, and
     it has taken one of the last commands.
-
-    Units: period [s].
     """
     status, other = sample.status, sample.owner
     faulty = (sample.winch_fault != 0) | (sample.state == int(WinchState.FAULT))
@@ -92,7 +90,7 @@ class Claim:
     Attributes:
         mode: Of the next command; None: nothing is sent.
         ready: Whether all groups agree.
-        refused: Why they do not, when it is given up; None before.
+        refused: Reason of the failure; None before.
     """
 
     def __init__(

@@ -22,14 +22,14 @@ class Cycle(NamedTuple):
     """One cycle, after its sample and before the next command.
 
     Attributes:
-        sample: What the machine said last.
-        before: What it had said in the cycle before; None in the first.
-        command: What was sent in the cycle before; None where nothing was, by those who only read.
+        sample: The newest sample.
+        before: The sample of the cycle before; None in the first.
+        command: Sent in the cycle before; None where nothing was sent.
         tension: T_A, planned for this cycle [N], shape (m,); NaN where there is no plan, as before homing.
         gains: Row of the plan's gains at this time; None where there is none.
-        correction: What the tension loop adds to the lengths of the plan [m], shape (m,).
-        late: How much later than planned the cycle began [s]; 0 on the clock of an in-process machine.
-        recording: Why recording has stopped; "" while it goes on, or where nothing is recorded.
+        correction: Of the lengths of the plan by the tension loop [m], shape (m,).
+        late: Delay of the beginning of the cycle [s]; 0 on the clock of an in-process machine.
+        recording: Reason why recording has stopped; "" while it goes on, or where nothing is recorded.
     """
 
     sample: Sample
@@ -68,26 +68,26 @@ class Evidence:
         sigma: The same with the bias that a good cell may have [N].
         limit: Upper limits of T_A [N], shape (m,).
         full_scale: Of the cells [N], infinite where it is not known, shape (m,).
-        believed: Which cells are, shape (m,).
-        tension: T_A of those that are and read a number [N]; of the others what is planned, or something between
+        believed: Cells that are not ignored, shape (m,).
+        tension: T_A of these with a finite reading [N]; of the others the planned tension, or a value between
             slack and tight where nothing is; shape (m,).
-        plain: Whether all are, and do.
-        stopped: Whether a fault has been told that stops the motion, which does not stand yet.
-        broken: Which cables are known to be, shape (m,).
-        jumped: Which encoders have, shape (m,).
+        plain: Whether no cell is ignored and all readings are finite.
+        stopped: Whether a reported fault stops the motion, which does not stand yet.
+        broken: Cables found broken, shape (m,).
+        jumped: Encoders that have jumped, shape (m,).
         least: Smallest of these tensions [N].
         most: Largest [N].
         oldest: Age of the oldest group's sample [s].
-        bits: Of the status, those that any group has.
-        common: Those that every group has.
+        bits: Status bits of any group.
+        common: Status bits of every group.
         faulted: Whether a PLC reports a fault.
-        tripped: Whether a drive does.
-        states: Of the winches, as plain numbers.
-        low: For how many new readings in a row each cable has been slack that the plan wants taut, shape (m,).
+        tripped: Whether a drive reports a fault.
+        states: Codes of the winches' states, as plain numbers.
+        low: Number of consecutive new readings in which a cable that is taut in the plan was slack, shape (m,).
         before_low: The reading before these [N], shape (m,).
-        steady: T_A less the plan, behind the slow filter, which rests while a cable is slack [N], shape (m,).
-        quick: The same behind the quick one [N], shape (m,).
-        compared: Whether there is a plan that tensions could be held against.
+        steady: T_A minus the plan after the slow filter, which rests while a cable is slack [N], shape (m,).
+        quick: The same after the quick filter [N], shape (m,).
+        compared: Whether tensions can be compared with a plan.
     """
 
     def __init__(
@@ -246,15 +246,15 @@ class Fault(ABC):
     """One rule. `faults_of` makes a fresh set without memory, for use after the operator has cleared a fault.
 
     Attributes:
-        name: What an event calls it.
-        rule: When it is there, in words.
-        reaction: What follows.
-        within: How long it takes to be found, in words.
-        homing: Whether it leaves a length in doubt, so that the robot must be homed again.
-        lasting: Whether it stays until a fresh set is made, though its rule holds no longer; each item is told once.
-        quiet: For how long after it was told nothing is said where it begins again, but how often it did [s].
-        present: Whether it is there now; one that stops a motion which another has stopped already, once that stands.
-        seen: What the set of faults has seen.
+        name: Of its events.
+        rule: Its condition, in words.
+        reaction: Of the controller.
+        within: Time until it is found, in words.
+        homing: Whether a length is in doubt, so that the robot must be homed again.
+        lasting: Whether it stays until a fresh set is made; each item is reported once.
+        quiet: Time after a report in which repeats are only counted [s].
+        present: Whether its condition holds; during a stop by another fault only once the winches stand.
+        seen: Evidence of the whole set.
     """
 
     name: ClassVar[str]

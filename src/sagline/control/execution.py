@@ -110,18 +110,18 @@ class Execution(Result, Saved):
 
     Attributes:
         robot: The robot as the controller knows it.
-        plan: What was to be done, from its first pose to its last; None where nothing was planned, as of a jog.
-        status: How it ended.
-        reason: One line on how it ended.
+        plan: The whole plan; None where nothing was planned, as of a jog.
+        status: At the end.
+        reason: One line on the end.
         period: Of a cycle [s].
-        zero: What homing found is to be added to the lengths that samples tell [m], shape (m,).
-        events: What happened.
+        zero: Of homing, added to the lengths of samples [m], shape (m,).
+        events: During the motion.
         time: On the link's clock [s], shape (N,).
-        answered: In which cycles there was a sample, shape (N,).
+        answered: Cycles with a sample, shape (N,).
         state: Codes of `State` at the end of each cycle, shape (N,).
-        late: By how much each cycle began too late [s], shape (N,).
-        clock: Where on the plan each cycle was, from its start [s], shape (N,); NaN beside it.
-        samples: What the machine said.
+        late: Delay of the beginning of each cycle [s], shape (N,).
+        clock: Time on the plan from its start [s], shape (N,); NaN beside it.
+        samples: Of the machine.
         position: Of the platform's origin, estimated from the encoders [m], shape (N, 3).
         quaternion: Its rotation, platform -> world, scalar last, shape (N, 4).
         estimate: Codes of `ForwardStatus` of these, -1 where there is none, shape (N,).
@@ -130,7 +130,7 @@ class Execution(Result, Saved):
         set_rate: Of their rates [m/s], shape (N, m).
         set_tension: Of the tensions at the drums [N], shape (N, m).
         planned_tension: T_A planned for the moment of each sample [N], shape (N, m); NaN where nothing is planned.
-        correction: What the tension loop has in the set points [m], shape (N, m).
+        correction: Of the tension loop, in the set points [m], shape (N, m).
     """
 
     robot: Robot

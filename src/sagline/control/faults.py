@@ -57,11 +57,11 @@ class FaultRow(NamedTuple):
     """One fault, as the documentation lists it.
 
     Attributes:
-        name: What an event calls it.
-        rule: When it is there.
-        to: What follows.
-        within: How long it takes.
-        by: Who looks.
+        name: Of its events.
+        rule: Its condition.
+        to: The reaction.
+        within: Time until it is found.
+        by: The part that finds it.
     """
 
     name: str

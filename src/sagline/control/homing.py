@@ -29,11 +29,11 @@ class Homing:
     Attributes:
         plan: The robot at that pose.
         state: The same as an equilibrium.
-        standing: The course that stays there.
+        standing: Constant set point there.
         tension: T_A there [N], shape (m,).
         sigma: Of the load cells [N], shape (m,).
-        off: By how much the mean of the tensions was above these when looked at last [N], shape (m,).
-        zero: What is to be added to the lengths that were read [m], shape (m,).
+        off: Mean of the measured tensions minus these [N], shape (m,).
+        zero: To be added to the lengths of samples [m], shape (m,).
         agrees: Whether every tension was within 5 sigma.
     """
 

@@ -40,7 +40,7 @@ def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
 def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
     """Lengths and rates of a jog of one winch, (N, m), one row for each cycle from rest.
 
-    Units: length [m] (m,); by [m]; period [s].
+    Length at rest [m], (m,); by [m], positive where cable is let out; period [s].
     """
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
@@ -55,7 +55,7 @@ def winch_jog(
 ) -> Motion:
     """Plan and check a jog of one winch, in which the platform moves too.
 
-    Units: length [m] (m,); by [m]; period [s].
+    Length at rest [m], (m,); by [m], positive where cable is let out; period [s].
     """
     lengths, rates = winch_lengths(length, winch, by, period)
     found = forward(robot, lengths, here, model)

@@ -75,13 +75,13 @@ class Command(NamedTuple):
     Attributes:
         counter: Of commands, one more each cycle; wraps to 1 after 2^31 - 1.
         owner: The controller's random id, 1 to 2^31 - 1.
-        mode: What the drives are to do.
-        valid_for: How long a PLC may go on with it [s].
+        mode: Task of the drives.
+        valid_for: Time for which a PLC may use it [s].
         length: Set points of the unstrained lengths off the drums at the end of the cycle [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
         tension: Expected at the drums, which the motors hold beforehand [N], shape (m,).
-        enable: Which drives may move, shape (m,).
-        claims: Whether a group whose grant another id has, or nobody, is asked for it; no command to leave does so.
+        enable: Drives that may move, shape (m,).
+        claims: Whether grants that are not ours are claimed; a command to leave never does so.
     """
 
     counter: int
@@ -99,11 +99,11 @@ class Sample(NamedTuple):
     """Newest data of the machine, in arrays of the caller's own. G groups, m winches.
 
     Attributes:
-        time: When it was asked, on the link's clock [s].
-        age: Since the newest good block of each group came in [s], shape (G,).
+        time: Of the request, on the link's clock [s].
+        age: Time since the newest valid block of each group arrived [s], shape (G,).
         counter: Of each group's blocks, shape (G,).
-        plc_time: When each PLC wrote it, on its own clock [s], shape (G,).
-        owner: Who has each grant, 0 for nobody, shape (G,).
+        plc_time: Time of writing, on the clock of each PLC [s], shape (G,).
+        owner: Owner of each grant, 0 for nobody, shape (G,).
         echo: Counter of the last command each PLC took, shape (G,).
         status: Bits of `GroupStatus`, shape (G,).
         fault: Codes of `GroupFault`, shape (G,).
@@ -111,11 +111,11 @@ class Sample(NamedTuple):
         rate: Their rates [m/s], shape (m,).
         torque: Of the motors at their shafts, positive where it lets cable out [N m], shape (m,).
         tension: T_A, at the frame ends, as the load cells read it [N], shape (m,).
-        filtered: The same behind the PLC's filter [N], shape (m,).
+        filtered: The same after the PLC's filter [N], shape (m,).
         counts: Of the encoders, shape (m,).
         state: Codes of `WinchState`, shape (m,).
         winch_fault: The drives' own codes, 0 for none, shape (m,).
-        discarded: How many blocks of each group were no good so far, shape (G,).
+        discarded: Number of invalid blocks of each group so far, shape (G,).
     """
 
     time: float
@@ -141,9 +141,9 @@ class Missing(NamedTuple):
     """No sample, because some groups have never answered.
 
     Attributes:
-        time: When it was asked, on the link's clock [s].
-        groups: Which, from 0.
-        reasons: Why, one a group.
+        time: Of the request, on the link's clock [s].
+        groups: Numbers of the silent groups, from 0.
+        reasons: One for each of them.
     """
 
     time: float

@@ -130,8 +130,8 @@ class Gains:
     """Matrices of the tension loop at some poses of a plan.
 
     Attributes:
-        time: Of the poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
-        rows: What is needed there, R of them.
+        time: Of the R poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
+        rows: Matrices at these poses.
     """
 
     time: Array

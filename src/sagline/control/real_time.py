@@ -188,9 +188,7 @@ HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # below the frame's anchors, in widths of the 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
     """Run homing, a path and jogs once, near the middle of a robot, to load their kernels; refusals do not matter.
 
-    Each part is tried by itself: one that is refused leaves no other cold.
-
-    Units: period [s].
+    A refused part does not keep the others from being loaded. Period [s].
     """
     middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)

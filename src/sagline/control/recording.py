@@ -30,8 +30,8 @@ class Event(NamedTuple):
 
     Attributes:
         time: On the link's clock [s].
-        cycle: In which cycle of the controller, from 0.
-        kind: What it is about.
+        cycle: Number of the controller's cycle, from 0.
+        kind: State, fault or note.
         name: The state that was entered, or the fault.
         state: Of the controller after it.
         text: One line for the operator.
@@ -62,15 +62,15 @@ class Recorded(NamedTuple):
     Attributes:
         number: Of the cycle, from 0.
         state: Of the controller at its end.
-        degraded: Whether a cell is distrusted, and the tension loop off.
-        late: By how much it began too late [s]; 0 on a lockstep clock.
-        clock: Where on the plan it was [s], from its start; NaN where there is none.
-        command: What was sent in it; None: nothing was.
-        answer: What came back.
+        degraded: Whether a cell is ignored, and the tension loop rests.
+        late: Delay of its beginning [s]; 0 on a lockstep clock.
+        clock: Time on the plan from its start [s]; NaN where there is none.
+        command: Sent in it; None: nothing was sent.
+        answer: Of the link.
         position: Of the platform's origin, from the encoders [m], shape (3,); NaN before homing.
         quaternion: Rotation platform -> world from the encoders, scalar last, shape (4,).
         estimate: Code of its `ForwardStatus`; -1 where there is none.
-        zero: What is added to lengths of samples, and taken from set points, since homing [m], shape (m,).
+        zero: Of homing, added to lengths of samples and subtracted from set points [m], shape (m,).
         planned_tension: T_A planned for the moment of the answer [N], shape (m,); NaN where there is no plan.
         correction: Of the tension loop, in the set points that were sent [m], shape (m,).
     """

@@ -19,9 +19,9 @@ class Sender:
     Attributes:
         owner: The controller's id.
         counter: Of the last command.
-        command: The one that goes out next; None: nothing does.
-        length: As read where nothing is followed [m], shape (m,).
-        tension: At the drums there [N], shape (m,).
+        command: To be sent next; None: nothing is sent.
+        length: At rest, as read [m], shape (m,).
+        tension: At rest, at the drums [N], shape (m,).
     """
 
     def __init__(self, cable_count: int, random: np.random.Generator) -> None:

@@ -32,11 +32,11 @@ class SetPoint(NamedTuple):
         tension: T_A planned there [N], shape (m,); NaN where nothing is known.
         drum_tension: Expected at the drums [N], shape (m,).
         wrench: External plus inertial, on the platform [N, N m], shape (6,); None for none.
-        row: What the tension loop needs there; None where there is none.
+        row: Matrices of the tension loop there; None where there are none.
         clock: On the plan [s]; NaN beside one.
         done: Whether the course ends here.
-        enable: Which drives may move, shape (m,); None for all.
-        leading: Whether lengths that were held before fade into those of a plan: tensions are not the plan's yet.
+        enable: Drives that may move, shape (m,); None for all.
+        leading: Whether the lengths at rest still change to those of a plan: tensions are not the plan's yet.
     """
 
     length: Array

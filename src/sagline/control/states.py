@@ -29,7 +29,7 @@ class Exit(NamedTuple):
 
     Attributes:
         to: The state it leads to.
-        by: What opens it.
+        by: Its condition.
     """
 
     to: State
@@ -41,8 +41,8 @@ class Row(NamedTuple):
 
     Attributes:
         state: The state.
-        winches: What they do in it.
-        exits: Where it leaves to, and by what; nowhere else.
+        winches: Their action in it.
+        exits: All ways out of it.
     """
 
     state: State
@@ -122,9 +122,9 @@ class RefusedError(SaglineError):
     """Refused request, with the reason; nothing was sent.
 
     Attributes:
-        what: What was asked for.
-        reason: Why not.
-        next_step: What to do about it.
+        what: The request.
+        reason: Of the refusal.
+        next_step: For the reader.
         item: The same as `what`, under the name that all errors have.
     """
 

@@ -24,10 +24,10 @@ class TensionSettings:
 
     Attributes:
         filter_time: Time constant of the filter in front of it [s], > 0.
-        gain: Share of the error that it makes up each cycle, >= 0, at most 0.1; 0 for a loop that is off.
-        act_above: It begins to act where a tension that it can change is further from the plan than this [N].
-        rest_below: It rests again where all are nearer than this [N], >= 0, less than `act_above`.
-        largest: It never changes a length by more [m], > 0.
+        gain: Share of the error that it corrects in each cycle, >= 0, at most 0.1; 0 for a loop that is off.
+        act_above: Largest tension error in the null space above which it begins to act [N].
+        rest_below: Largest tension error below which it rests again [N], >= 0, less than `act_above`.
+        largest: Limit of the correction of a length [m], > 0.
 
     Raises:
         InvalidValueError: If a value is out of its range.
@@ -59,7 +59,7 @@ class TensionLoop:
     f <- f + h/(tau + h) (T - T_plan - f), and while it acts delta <- delta - k N_L G f; docs/model.md, section 12.
 
     Attributes:
-        settings: How it works.
+        settings: Gain, filter and limits.
         acting: Whether it acts.
     """
 

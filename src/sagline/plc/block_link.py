@@ -25,8 +25,8 @@ class Newest(NamedTuple):
 
     Attributes:
         values: By name of the row.
-        arrived: When it came in, on the link's clock [s].
-        round_trip: From when it was asked for, and a command sent [s].
+        arrived: Time of arrival, on the link's clock [s].
+        round_trip: Time since the request or the command [s].
     """
 
     values: dict[str, Any]
@@ -38,9 +38,9 @@ class Outgoing(NamedTuple):
     """Block to be written next.
 
     Attributes:
-        block: Which.
-        data: Its bytes.
-        since: When it was handed over [s].
+        block: To be written.
+        data: Bytes of the block.
+        since: Time at which it was queued [s].
     """
 
     block: Block
@@ -53,10 +53,10 @@ class Group(Thread):
 
     Attributes:
         number: Of the group, from 0.
-        newest: Its newest good block; None before the first.
-        discarded: How many blocks were no good.
-        trouble: What went wrong last; None while all is well.
-        settled: Set when the PLC has answered, well or not.
+        newest: Its newest valid block; None before the first.
+        discarded: Number of invalid blocks.
+        trouble: The last error; None where there is none.
+        settled: Set when the PLC has answered, validly or not.
     """
 
     def __init__(self, number: int, winches: int, wire: Wire, clock: Callable[[], float]) -> None:

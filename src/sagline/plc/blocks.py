@@ -45,8 +45,8 @@ class Refusal(NamedTuple):
     """Reason why a block, or a PLC, cannot be used.
 
     Attributes:
-        reason: What is wrong.
-        next_step: What to do about it.
+        reason: In words.
+        next_step: For the reader.
     """
 
     reason: str
@@ -60,7 +60,7 @@ class Block:
     Attributes:
         number: Of the data block in the PLC.
         name: Of it, in SCL.
-        magic: What its row `magic` holds.
+        magic: Value of its row `magic`.
         register: First Modbus holding register of its copy.
         size: Of the whole [bytes].
         fields: Its rows.

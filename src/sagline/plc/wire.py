@@ -89,9 +89,9 @@ class LinkError(SaglineError):
     """Unusable PLC.
 
     Attributes:
-        item: Which, in the reader's words ("group 2 at 192.168.0.12:102").
-        reason: What is wrong with it.
-        next_step: What to do about it.
+        item: Group and address ("group 2 at 192.168.0.12:102").
+        reason: In words.
+        next_step: For the reader.
     """
 
     def __init__(self, item: str, reason: str, next_step: str) -> None:
@@ -111,7 +111,7 @@ class WireError(Exception):
     """Failed connection.
 
     Attributes:
-        refusal: Why, and what to do.
+        refusal: Reason and next step.
     """
 
     def __init__(self, refusal: Refusal) -> None:

@@ -21,9 +21,9 @@ class Hardware:
     """Drives, sensors and plant.
 
     Attributes:
-        read: What a period ends with, in the rows LENGTH: unstrained, off the drums, as nominal drums have it at what
+        read: Readings at the end of a period, in the rows LENGTH: unstrained, off the drums, of nominal drums at what
             the encoders count [m]; RATE: its change in the period [m/s]; TORQUE: of the motors at their shafts,
-            positive where it lets cable out [N m]; CELL: what the load cells read [N]; FILTERED: the same behind a
+            positive where it lets cable out [N m]; CELL: readings of the load cells [N]; FILTERED: the same after a
             filter [N], (5, m).
         counts: Of the encoders, whole numbers as floats, (m,).
     """
@@ -54,10 +54,7 @@ class Hardware:
         return self._simulator.reading
 
     def go_on(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
-        """Simulate a period in which the set points go linearly to the given ones: length [m], tension [N].
-
-        Units: length [m]; tension [N].
-        """
+        """Simulate a period in which the set points go linearly to the given ones: length [m], tension [N]."""
         if powered != self._powered:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))

@@ -17,13 +17,13 @@ class Kind(NamedTuple):
     """One kind of fault.
 
     Attributes:
-        item: What it happens to, of which a number says which; none where there is only one.
-        numbered: Whether there are several.
-        words: What happens, with # where a number is.
-        unit: Of that number, as it is written.
+        item: Kind of part ("cell").
+        numbered: Whether there are several, told apart by a number.
+        words: The fault, with # in place of its value.
+        unit: Of that value in texts.
         scale: To SI.
         for_good: Whether it cannot end by itself.
-        sense: What it means, for people.
+        sense: Meaning, in words.
     """
 
     item: str
@@ -86,8 +86,8 @@ class Injected:
         kind: One of `KINDS`, "cell sticks" for instance.
         which: Number of the cell, cable, encoder, servo or group, from 0; 0 where there is only one.
         value: Its number, SI; 0 where it has none.
-        time: When it begins, since the start of the machine [s].
-        duration: How long it lasts [s]; infinite unless told.
+        time: Of its beginning, since the start of the machine [s].
+        duration: Until its end [s]; infinite by default.
     """
 
     kind: str

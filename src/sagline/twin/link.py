@@ -76,7 +76,7 @@ class Snapshot:
     Attributes:
         arrays: Length, rate, torque, tension, filtered (5, m); counts, state, winch fault (3, m); counter, owner,
             echo, status, fault (5, G); the PLCs' clocks [s] (G,).
-        owners: Who has the grants, as plain numbers.
+        owners: Owners of the grants, as plain numbers.
     """
 
     __slots__ = ("arrays", "owners")
@@ -106,7 +106,7 @@ class Report(NamedTuple):
         counter_again: At its end: another one where the block is torn.
         foreign: Whether the block is of another program.
         plc_time: On the PLC's clock [s].
-        owner: Who has the grant.
+        owner: Of the grant.
         echo: Counter of the last command taken.
         status: Bits of `GroupStatus`.
         fault: Code of `GroupFault`.

@@ -67,10 +67,10 @@ class Program:
     What it reads stands in `order`, `encoder` and `cell`; what it sets in the attributes below.
 
     Attributes:
-        owner: Who has the grant, 0 for nobody.
+        owner: Of the grant, 0 for nobody.
         echo: Counter of the last command taken, 0 before the first.
-        fault: Why it acts by itself, until a command to hold acknowledges it: after the ramp, and 100 ms at least.
-        powered: Which drives have power, and no brake.
+        fault: Reason why it acts by itself; a command to hold acknowledges it after the ramp, and 100 ms at least.
+        powered: Drives with power and without brake.
         length: Set points at the end of the scan's period [m].
         tension: Expected at the drums [N].
         drive_fault: Codes of the drives, not 0 where one has tripped.

@@ -29,7 +29,7 @@ class EncoderScale:
     """Conversion between lengths and encoder counts, (m,): by the turns of known drums, else by one radius each.
 
     Attributes:
-        per_meter: Counts for a meter of unstrained cable let out, where it was made, (m,).
+        per_meter: Counts per meter of unstrained cable let out, at the reference lengths, (m,).
     """
 
     def __init__(self, robot: Robot, length: Array, counts: Array) -> None:
@@ -83,8 +83,8 @@ class Start(NamedTuple):
 
     Attributes:
         state: The true robot at rest.
-        nominal: What the PLCs take the encoders for.
-        true: What they are.
+        nominal: Scale of the encoders in the PLCs.
+        true: True scale.
     """
 
     state: Equilibrium
@@ -140,10 +140,7 @@ def limits_of(robot: Robot, scale: EncoderScale) -> Limits:
 
 
 def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
-    """Refuse a step [s] too coarse for the robot's modes, and a period [s] that does not fit.
-
-    Units: step [s]; period [s].
-    """
+    """Refuse a step [s] too coarse for the robot's modes, and a period [s] that does not fit."""
     if not (parts := period / step) >= 0.5 or abs(parts - round(parts)) > NEAR * parts:
         raise InvalidValueError("period", f"{period:g} s", f"a whole multiple of {step:g} s, the step", "Correct it.")
     if period > HEARTBEAT:
