@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.control.connecting import disagreement
+from sagline.control.commands import disagreement
 from sagline.control.controller import Controller
 from sagline.control.link import COUNTERS, GroupStatus, Mode, Sample, WinchState
 from sagline.control.states import RefusedError, State

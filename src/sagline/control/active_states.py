@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.control.connecting import FRESH, Claim
+from sagline.control.commands import FRESH, Claim
 from sagline.control.context import Context
 from sagline.control.execution import ExecutionStatus
 from sagline.control.homing import Homing, HomingJog, tension_limits

@@ -13,7 +13,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.control.checks import Motion
-from sagline.control.connecting import disagreement
+from sagline.control.commands import Sender, disagreement
 from sagline.control.estimator import Estimator
 from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
@@ -21,7 +21,6 @@ from sagline.control.faults import faults_of
 from sagline.control.link import PERIOD, Link, Sample
 from sagline.control.real_time import Garbage, Pace, in_background
 from sagline.control.recording import Event, EventKind, Journal, Recorded, Recorder, Tape
-from sagline.control.sender import Sender
 from sagline.control.set_points import Along, Standing, standing_at
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionLoop, TensionSettings

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from sagline.cables.model import CableModel
 from sagline.control.active_states import Connecting, Following, Holding, HomingState, Off, idle_at
 from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
-from sagline.control.connecting import Disagreement
+from sagline.control.commands import Disagreement
 from sagline.control.context import Context
 from sagline.control.execution import Execution
 from sagline.control.homing import Homing
@@ -122,7 +122,7 @@ class Controller:
 
     @property
     def homed(self) -> bool:
-        """Whether the pose of the platform is known."""
+        """True if the pose of the platform is known."""
         return self._context.homed
 
     @property
@@ -132,7 +132,7 @@ class Controller:
 
     @property
     def degraded(self) -> bool:
-        """Whether tensions are not to be believed: the tension loop keeps its correction, and learns nothing."""
+        """True if tensions are not to be believed: the tension loop keeps its correction, and learns nothing."""
         return self._context.degraded
 
     @property
@@ -180,7 +180,7 @@ class Controller:
 
     @property
     def moving(self) -> bool:
-        """Whether set points change."""
+        """True if set points change."""
         return self.state in MOTION and not (self.state is State.HOMING and self._loop.active.course is None)
 
     def cycle(self) -> None:

@@ -43,7 +43,7 @@ class Cycle(NamedTuple):
 
     @property
     def moving(self) -> bool:
-        """Whether set points change."""
+        """True if set points change."""
         command = self.command
         return command is not None and command.mode == Mode.FOLLOW and bool(abs(command.rate).max() > MOVING)
 

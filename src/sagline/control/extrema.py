@@ -8,7 +8,7 @@ from sagline.core.arrays import Array
 
 
 def finite(values: Array) -> bool:
-    """Whether all values are finite, shape (m,)."""
+    """True if all values are finite, shape (m,)."""
     return isfinite(sum(values.tolist()))
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from sagline.control.connecting import BEHIND
+from sagline.control.commands import BEHIND
 from sagline.control.evidence import Cycle, Evidence, Fault, Reaction
 from sagline.control.extrema import finite, largest
 from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer

@@ -195,7 +195,7 @@ def sent_to(owner: int, command: Command) -> Sent:
 
 
 def newer(counter: int, known: int) -> bool:
-    """Whether a counter is ahead of another, by less than half of all there are."""
+    """True if a counter is ahead of another, by less than half of all there are."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 

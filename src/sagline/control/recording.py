@@ -194,7 +194,7 @@ class Journal:
 
     @property
     def watched(self) -> bool:
-        """Whether there is a recorder."""
+        """True if there is a recorder."""
         return self._record is not None
 
     def add(self, event: Event) -> str:

@@ -109,7 +109,7 @@ class Fade:
 
     @property
     def done(self) -> bool:
-        """Whether the difference is zero."""
+        """True if the difference is zero."""
         return self._cycle >= self._cycles
 
     def step(self) -> tuple[Array, Array] | None:
@@ -146,7 +146,7 @@ class Along:
 
     @property
     def at_end(self) -> bool:
-        """Whether the end is reached."""
+        """True if the end is reached."""
         return self._row >= self._last and self._fade.done
 
     def pause(self) -> None:

@@ -154,7 +154,7 @@ class Group(Thread):
         return None
 
     def _is_newer(self, counter: int, arrived: float, connected: float) -> bool:
-        """Whether a block is newer than the newest; after a long silence the PLC may have restarted."""
+        """True if a block is newer than the newest; after a long silence the PLC may have restarted."""
         newest = self.newest
         if newest is None:
             return True

@@ -110,7 +110,7 @@ class ModbusWire:
                 connection.shutdown(socket.SHUT_RDWR)
 
     def reached(self) -> bool:
-        """Whether the connection is open."""
+        """True if the connection is open."""
         return self._client.connected
 
 

@@ -108,7 +108,7 @@ class S7Wire:
                 _socket(client).shutdown(socket.SHUT_RDWR)
 
     def reached(self) -> bool:
-        """Whether the connection is open."""
+        """True if the connection is open."""
         client = self._client
         with suppress(OSError, WireError):
             if client is not None:

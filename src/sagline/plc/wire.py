@@ -139,7 +139,7 @@ class Wire(Protocol):
         """End all waiting, from another thread."""
 
     def reached(self) -> bool:
-        """Whether the connection is open."""
+        """True if the connection is open."""
 
 
 @contextmanager

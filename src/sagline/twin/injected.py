@@ -195,7 +195,7 @@ class Schedule:
 
     @property
     def waiting(self) -> bool:
-        """Whether there are any."""
+        """True if there are any."""
         return bool(self._due)
 
     def plan(self, what: Injected) -> None:

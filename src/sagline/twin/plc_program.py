@@ -178,7 +178,7 @@ class Program:
         self._slow_down(cell)
 
     def _lags(self, encoder: list[float]) -> bool:
-        """Whether a drive is too far from its set point."""
+        """True if a drive is too far from its set point."""
         length, powered = self.length, self.powered
         for i in self.winches:
             if powered[i] and not -FOLLOWING <= length[i] - encoder[i] <= FOLLOWING:
@@ -305,7 +305,7 @@ class Program:
 
     @property
     def _was_reported(self) -> bool:
-        """Whether the ramp is over, and the fault has been reported for a heartbeat."""
+        """True if the ramp is over, and the fault has been reported for a heartbeat."""
         return not self._ramp and self._now - self._since >= HEARTBEAT - TINY
 
     @property

@@ -198,6 +198,6 @@ def _routed_length(robot: Robot, pose: Pose) -> Array:
 
 
 def plc_limits(robot: Robot) -> Limits:
-    """What the PLCs of a robot know of its winches, one list over all of them."""
+    """Limits of a robot's winches in the PLCs, each one list over all winches."""
     planned = _feasible_lengths(inverse(robot, start_pose(robot, None)).unstrained_length, robot, "test_box")
     return limits_of(robot, EncoderScale(robot, planned, np.zeros(robot.cable_count)))
