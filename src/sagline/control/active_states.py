@@ -84,9 +84,9 @@ class ActiveState(ABC):
 class Off(ActiveState):
     """OFF: all grants are given back, then nothing is sent."""
 
-    def __init__(self, context: Context, reason: str = "") -> None:
-        """Begin to give the grants back; without a reason there are none yet."""
-        super().__init__(context)
+    def __init__(self, context: Context, reason: str = "", point: SetPoint | None = None) -> None:
+        """Begin to give the grants back, after the command of a set point; without a reason there are none yet."""
+        super().__init__(context, point)
         self._cycles = 0
         if reason:
             self._cycles = round(LEAVING / context.period)

@@ -514,7 +514,7 @@ class Controller:
         """
         if self.state is not State.OFF:
             check_transition(self.state, State.OFF, "switching off")
-            self._loop.active = Off(self._context, "the operator")
+            self._loop.active = Off(self._context, "the operator", self._loop.active.point)
             self.cycle()
         self._wait_until_left()
 

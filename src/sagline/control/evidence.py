@@ -272,6 +272,7 @@ class Fault(ABC):
             seen: Shared by the whole set.
         """
         self.seen, self.present = seen, False
+        self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples, of rules that count them
         self._since_report, self._suppressed = 10**9, 0  # cycles since it was told, and how often it began meanwhile
 
     def look(self, cycle: Cycle) -> str | None:

@@ -29,7 +29,7 @@ class OverTension(Fault):
         """Begin with no cable tight."""
         super().__init__(seen)
         self._near = NEAR * seen.limit
-        self._least, self._for = float(self._near.min()), np.zeros(seen.limit.size, dtype=np.int64)
+        self._least = float(self._near.min())
 
     def found(self, cycle: Cycle) -> str | None:
         """The cable with the largest tension relative to its limit."""
@@ -162,11 +162,6 @@ class CellStuck(Fault):
     within = "0.5 s"
     lasting = True
 
-    def __init__(self, seen: Evidence) -> None:
-        """Begin with no cell stuck."""
-        super().__init__(seen)
-        self._for = np.zeros(seen.limit.size, dtype=np.int64)
-
     def found(self, cycle: Cycle) -> str | None:
         """The first cell that is newly stuck."""
         seen = self.seen
@@ -201,7 +196,6 @@ class CellOff(Fault):
     def __init__(self, seen: Evidence) -> None:
         """Begin with no cell suspected."""
         super().__init__(seen)
-        self._for = np.zeros(seen.limit.size, dtype=np.int64)
         self._samples = round(ODD_TIME / seen.period)
         self._quiet = True
 

@@ -206,12 +206,6 @@ class ServoSaturated(Fault):
     reaction = Reaction.STOPPING
     within = "0.2 s"
 
-    def __init__(self, seen: Evidence) -> None:
-        """Begin with no drive at its limit."""
-        super().__init__(seen)
-        self._for = np.zeros(seen.limit.size, dtype=np.int64)
-        self._samples = round(SATURATED / seen.period)
-
     def found(self, cycle: Cycle) -> str | None:
         """The drive that has been at its limit longest."""
         if _AT_LIMIT not in self.seen.states:
@@ -220,7 +214,7 @@ class ServoSaturated(Fault):
         at_limit = cycle.sample.state == _AT_LIMIT
         self._for = np.where(at_limit, self._for + 1, 0)
         winch = int(np.argmax(self._for))
-        if self._for[winch] < self._samples:
+        if self._for[winch] < round(SATURATED / self.seen.period):
             return None
         return (
             f"drive {winch} has been at its limit of force for {self._for[winch] * self.seen.period:.1f} s at "
