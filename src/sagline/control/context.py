@@ -27,8 +27,8 @@ from sagline.control.tension_loop import TensionLoop, TensionSettings
 from sagline.core.arguments import brief, instance, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
-from sagline.kinematics.status import ForwardStatus
 from sagline.kinematics.plan import Plan
+from sagline.kinematics.status import ForwardStatus
 from sagline.robot.drum import drum_lever
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
