@@ -19,7 +19,7 @@ SAGLINE = (sys.executable, "-m", "sagline.cli")
 VIEW = """
 import sys, threading, time
 import sagline as sl
-from sagline.cli.readings import Readings
+from sagline.cli.hosting import Readings
 import numpy as np
 from sagline.viewer.hull import WorkspaceQuery, region_hull
 from sagline.viewer.server import started, stop
@@ -48,7 +48,7 @@ def watch():
     viewer.stop()
 
 threading.Thread(target=watch, daemon=True).start()
-with readings.compiled_beside(viewer):
+with readings.compiled_for(viewer):
     viewer.serve()
 stop(server)
 """

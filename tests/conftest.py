@@ -22,7 +22,7 @@ from numba.core import event
 from typer.main import get_command
 
 from sagline.cli import entries
-from sagline.cli.cold_start import cold, compile_all
+from sagline.cli.compilation import compile_all, not_compiled
 from sagline.cli.entries import ENTRIES
 from tests.effort import slowness
 from tests.tiers import FILE_LIMIT, TEST_LIMIT
@@ -61,7 +61,7 @@ def needed_entries(config: pytest.Config) -> list[str]:
 def pytest_xdist_setupnodes(config: pytest.Config, specs: Any) -> None:
     """Compile kernels before the workers start; a kernel that does not compile is left to the tests."""
     names = needed_entries(config)
-    if waiting := cold(names):
+    if waiting := not_compiled(names):
         config.get_terminal_writer().line(f"compiling {', '.join(waiting)} ...")
     with suppress(Exception):
         compile_all(waiting, lambda stage: None)

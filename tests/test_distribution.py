@@ -27,10 +27,7 @@ EXTRA_PACKAGES = (
     *("bokeh", "cma", "dask", "distributed", "fcl", "foxglove_schemas_protobuf", "mcap", "mcap_protobuf"),
     *("pymodbus", "pymoo", "skimage", "snap7", "trimesh", "viser", "zarr", "zstandard"),
 )
-MADE_FOR_EXTRAS = (
-    *("sagline.viewer", "sagline.cli.readings"),
-    *("sagline.twin.modbus_servers", "sagline.twin.s7_servers"),
-)
+MADE_FOR_EXTRAS = ("sagline.viewer", "sagline.twin.modbus_servers", "sagline.twin.s7_servers")
 USED = """
 import sys
 from importlib.resources import files

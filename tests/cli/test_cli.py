@@ -17,7 +17,7 @@ from numba.core import event
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.cli.ending import ended
+from sagline.cli.ending import exit_code_of
 from sagline.cli.main import app
 from sagline.kernels.inverse.poses import inverse_poses
 from tests.cli import interrupts
@@ -235,7 +235,7 @@ def test_a_lost_interrupt_ends_the_command_all_the_same(capsys: pytest.CaptureFi
             with suppress(KeyboardInterrupt):
                 signal.raise_signal(signal.SIGINT)
 
-        code = ended(loses)
+        code = exit_code_of(loses)
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
         signal.signal(signal.SIGINT, before)
@@ -251,7 +251,7 @@ def test_a_cold_start_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> 
             pass
 
     sagline("track", "article-suspended", "inside.yaml", "--no-figures")  # whatever it needs is compiled then
-    monkeypatch.setattr("sagline.cli.line.compile_all", compile_all)
+    monkeypatch.setattr("sagline.cli.progress.compile_all", compile_all)
     result = sagline("track", "article-suspended", "inside.yaml", "--no-figures", "--json")
     assert "inverse kinematics" in result.stderr
     assert result.stderr.count("\n") == 1

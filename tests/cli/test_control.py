@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 import sagline as sl
-from sagline.cli.session import Session
-from sagline.cli.status_line import StatusLine
+from sagline.cli.session import Session, StatusLine
 from sagline.control.states import State
 from tests.control.rigs import rig
 from tests.tiers import wide

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 import sagline as sl
-from sagline.cli.ending import ended
+from sagline.cli.ending import exit_code_of
 from sagline.cli.main import app
 from sagline.cli.terminal import show_data
 from tests.tiers import extended, wide
@@ -28,7 +28,7 @@ def broken(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
     def fail(*_: object, **__: object) -> None:
         raise error
 
-    monkeypatch.setattr("sagline.robot.catalogue.robot_names", fail)
+    monkeypatch.setattr("sagline.files.robot_file.load_robot", fail)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_what_was_written_before_is_named(tmp_path: Path, monkeypatch: pytest.Mo
     def fail(*_: object) -> None:
         raise sl.FileError("figure.png", "cannot be written (No space left on device)", "Make room.")
 
-    monkeypatch.setattr("sagline.cli.track.write_figures", fail)
+    monkeypatch.setattr("sagline.cli.output.Output.draw", fail)
     result = CliRunner().invoke(app, ["track", "cogiro", "short.yaml"])
     assert result.exit_code == 2
     error, written = result.stderr.splitlines()
@@ -93,7 +93,7 @@ def test_an_error_is_cut_once_and_its_line_stays_short(length: int, capsys: pyte
     def fail() -> None:
         raise error
 
-    assert ended(fail) == 2
+    assert exit_code_of(fail) == 2
     line = capsys.readouterr().err
     assert line == f"Error: {error}\n"
     assert len(line) <= 300
@@ -241,7 +241,7 @@ def test_the_end_of_the_input_is_no_answer() -> None:
 
         raise typer.Abort
 
-    assert ended(asks) == 2
+    assert exit_code_of(asks) == 2
 
 
 @extended
@@ -250,3 +250,23 @@ def test_loading_takes_no_time_that_is_not_needed() -> None:
     heavy = ("numpy", "numba", "typer", "rich", "yaml", "matplotlib")
     code = f"import sys, sagline.cli.__main__; print([name for name in {heavy} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "[]\n"
+
+
+LOADED = """
+import sys
+from sagline.cli.main import app
+from typer.testing import CliRunner
+
+assert CliRunner().invoke(app, sys.argv[1:]).exit_code == 0
+print(*(name for name in sys.modules if name.split(".")[0] == "sagline"))
+"""
+
+
+@extended
+@pytest.mark.parametrize(("words", "most"), [(["--help"], 40), (["track", "--help"], 20), (["robots"], 90)])
+def test_a_command_loads_few_modules(words: list[str], most: int) -> None:
+    """Each subcommand is imported by itself, and what it works with when it is called."""
+    done = subprocess.run([sys.executable, "-c", LOADED, *words], capture_output=True, text=True, check=True)
+    loaded = done.stdout.split()
+    assert len(loaded) <= most
+    assert ("sagline.cli.view" in loaded) is (words == ["--help"])

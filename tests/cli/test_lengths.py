@@ -28,8 +28,8 @@ def test_the_summary_counts_all_cable_off_the_drum() -> None:
     plan = sl.inverse(ROBOT, ENDS)
     told = summary(Run(sl.confirm(plan), 0.0))
     straight = np.linalg.norm(ENDS.position[:, None] + ROBOT.platform_anchors - ROBOT.frame_anchors, axis=-1)
-    assert straight.min() + 4.0 < told.unstrained_length_min_m < straight.min() + 4.0 + 0.2 * np.pi
-    assert told.unstrained_length_max_m == plan.unstrained_length.max()
+    assert straight.min() + 4.0 < told["unstrained_length_min_m"] < straight.min() + 4.0 + 0.2 * np.pi
+    assert told["unstrained_length_max_m"] == plan.unstrained_length.max()
 
 
 def test_feasible_samples_are_written_with_their_own_times(tmp_path: Path) -> None:

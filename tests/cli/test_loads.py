@@ -79,7 +79,7 @@ def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[Any] = []
 
     class Viewer:
-        def __init__(self, server: Any, robot: sl.Robot, run: Any, ready: Any, wrench: Any, *start: Any) -> None:
+        def __init__(self, server: Any, robot: sl.Robot, *, wrench: Any, **page: Any) -> None:
             taken.append((robot, wrench))
 
         def serve(self) -> None:
@@ -87,7 +87,7 @@ def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("sagline.viewer.server.started", lambda *_: SimpleNamespace(stop=int, get_port=lambda: 1))
     monkeypatch.setattr("sagline.viewer.viewer.Viewer", Viewer)
-    monkeypatch.setattr("sagline.cli.readings.cold", lambda names: [])
+    monkeypatch.setattr("sagline.cli.hosting.not_compiled", lambda names: [])
     assert sagline("view", "article-suspended", "--no-browser", *LOADS).exit_code == 0
     (robot, wrench) = taken[0]
     assert robot.mass == 55.0

@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline import Plan
-from sagline.cli import view_log
+from sagline.cli import view
+from sagline.cli.hosting import Address
 from sagline.cli.main import app
 from sagline.files.mcap_writer import Recorder
 from tests.files.executions import cycles_of, events_of, execution, plan_of
@@ -23,6 +24,7 @@ from tests.files.test_mcap import assert_same
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
+NOWHERE = Address("", 0, browser=False)
 ROBOT = sl.load_robot("article-prototype")
 
 
@@ -116,10 +118,10 @@ def test_a_growing_log_is_waited_for_until_its_first_bytes_are_there(
         if len(looks) == 3:
             file.write_bytes(whole)
 
-    monkeypatch.setattr(view_log.time, "sleep", sleep)  # type: ignore[attr-defined]
-    monkeypatch.setattr(view_log, "hosted", lambda robot, session, *_, **__: len(session.time))
-    assert view_log.view_log(log, None, True, log.parent / "twin.mcap", "", 0, browser=False) == 201
-    assert looks == [view_log.LOOK] * 3
+    monkeypatch.setattr(view.time, "sleep", sleep)  # type: ignore[attr-defined]
+    monkeypatch.setattr("sagline.cli.hosting.serve", lambda robot, address, *, played, **_: len(played.time))
+    assert view.view_log(log, None, NOWHERE, live=True, truth=log.parent / "twin.mcap") == 201
+    assert looks == [view.LOOK] * 3
 
 
 @pytest.mark.parametrize("said", [b"no log at all", b"no", None])
@@ -127,13 +129,13 @@ def test_what_is_no_log_is_not_waited_for(tmp_path: Path, said: bytes | None) ->
     file = tmp_path / "run.mcap"
     file.mkdir() if said is None else file.write_bytes(said)
     with refused(kind=sl.FileError, file=file):
-        view_log.view_log(file, None, True, None, "", 0, browser=False)
+        view.view_log(file, None, NOWHERE, live=True)
 
 
 @extended
 def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In place of the page: what it would be given."""
-    monkeypatch.setattr("sagline.cli.view_log.LOOK", 0.05)
+    monkeypatch.setattr("sagline.cli.view.LOOK", 0.05)
     monkeypatch.setattr("sagline.files.mcap_writer.CHUNK", 0.2)
     lengths: list[int] = []
     file = tmp_path / "run.mcap"
@@ -142,9 +144,9 @@ def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monke
         def extend(self, session: Any) -> None:
             lengths.append(len(session.time))
 
-    def hosted(robot: sl.Robot, session: Any, *more: Any, beside: Any, **others: Any) -> int:
-        lengths.append(len(session.time))
-        around: AbstractContextManager[None] = beside(Page())
+    def serve(robot: sl.Robot, address: Address, *, meanwhile: Any, played: Any, **page: Any) -> int:
+        lengths.append(len(played.time))
+        around: AbstractContextManager[None] = meanwhile(Page())
         with around:
             end = time.monotonic() + 20.0
             while lengths[-1] < 200 and time.monotonic() < end:
@@ -161,9 +163,9 @@ def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monke
 
     plan_of()
     writer = threading.Thread(target=write)
-    monkeypatch.setattr("sagline.cli.view_log.hosted", hosted)
+    monkeypatch.setattr("sagline.cli.hosting.serve", serve)
     writer.start()
-    assert view_log.view_log(file, None, True, None, "", 0, browser=False) == 0
+    assert view.view_log(file, None, NOWHERE, live=True) == 0
     writer.join()
     assert lengths == sorted(lengths)  # equal ones: what came then was an event, or a cycle was cut in two
     assert lengths[-1] == 200

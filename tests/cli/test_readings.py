@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import pytest
 
-from sagline.cli import readings as module
-from sagline.cli.compiling import Stage
+from sagline.cli import hosting as module
+from sagline.cli.compilation import Stage
 from sagline.cli.entries import MARGINS, POLYGON, VIBRATION
-from sagline.cli.readings import ENTRY_OF, ORDER, Readings
+from sagline.cli.hosting import ENTRY_OF, ORDER, Readings
 from sagline.viewer.feature import Reading
 
 
@@ -46,7 +46,7 @@ class FakeSide:
     def kill(self) -> None:
         pass
 
-    def take_over(self) -> None:
+    def move_kernels(self) -> None:
         self.moved += 1
 
     def stages(self) -> Iterator[Stage]:
@@ -56,13 +56,13 @@ class FakeSide:
 @pytest.fixture
 def side(monkeypatch: pytest.MonkeyPatch) -> type[FakeSide]:
     monkeypatch.setattr(FakeSide, "started", [], raising=False)
-    monkeypatch.setattr(module, "Side", FakeSide)
-    monkeypatch.setattr(module, "cores", lambda: 2)
+    monkeypatch.setattr(module, "CompilerProcess", FakeSide)
+    monkeypatch.setattr(module, "available_cores", lambda: 2)
     return FakeSide
 
 
 def test_readings_come_one_after_the_other(side: type[FakeSide], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "cold", lambda names: [MARGINS, POLYGON])
+    monkeypatch.setattr(module, "not_compiled", lambda names: [MARGINS, POLYGON])
     steps, viewer = threading.Semaphore(0), Watched()
 
     def said() -> Iterator[Stage]:
@@ -74,14 +74,14 @@ def test_readings_come_one_after_the_other(side: type[FakeSide], monkeypatch: py
     monkeypatch.setattr(side, "said", said, raising=False)
     readings, others = Readings(), [True] * (len(Reading) - 2)
     assert [readings.ready(each) for each in Reading] == [False, False, *others]
-    with readings.compiled_beside(viewer):  # type: ignore[arg-type]
+    with readings.compiled_for(viewer):  # type: ignore[arg-type]
         for count, expected in ((1, [True, False, *others]), (2, [True, True, *others])):
             steps.release()
             while viewer.refreshed < count:
                 threading.Event().wait(0.001)
             assert [readings.ready(each) for each in Reading] == expected
     assert side.started == [[MARGINS, POLYGON]]
-    assert not readings.cold
+    assert not readings.missing
 
 
 def test_if_the_other_process_fails_they_come_all_the_same(
@@ -93,32 +93,32 @@ def test_if_the_other_process_fails_they_come_all_the_same(
         for name in (MARGINS, VIBRATION)
     }
     monkeypatch.setattr(module, "ENTRIES", entries)
-    monkeypatch.setattr(module, "cold", lambda names: [MARGINS, VIBRATION])
+    monkeypatch.setattr(module, "not_compiled", lambda names: [MARGINS, VIBRATION])
     monkeypatch.setattr(side, "said", lambda: iter(()), raising=False)
     readings, viewer = Readings(), Watched()
-    with readings.compiled_beside(viewer):  # type: ignore[arg-type]
+    with readings.compiled_for(viewer):  # type: ignore[arg-type]
         while viewer.refreshed < 2:
             threading.Event().wait(0.001)
     assert compiled == [MARGINS, VIBRATION]
-    assert not readings.cold
+    assert not readings.missing
 
 
 def test_warm_nothing_is_started(side: type[FakeSide], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "cold", lambda names: [])
+    monkeypatch.setattr(module, "not_compiled", lambda names: [])
     readings = Readings()
-    with readings.compiled_beside(Watched()):  # type: ignore[arg-type]
+    with readings.compiled_for(Watched()):  # type: ignore[arg-type]
         pass
     assert side.started == []
     assert all(readings.ready(each) for each in Reading)
-    assert {ENTRY_OF[each] for each in Reading} < set(ORDER)
+    assert {ENTRY_OF[each.name] for each in Reading} < set(ORDER)
 
 
 def test_on_one_core_the_cables_come_first(side: type[FakeSide], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "cores", lambda: 1)
-    monkeypatch.setattr(module, "cold", lambda names: [MARGINS])
+    monkeypatch.setattr(module, "available_cores", lambda: 1)
+    monkeypatch.setattr(module, "not_compiled", lambda names: [MARGINS])
     monkeypatch.setattr(side, "said", lambda: iter([Stage(MARGINS, 1, 1, finished=True)]), raising=False)
     viewer = Watched()
-    with Readings().compiled_beside(viewer):  # type: ignore[arg-type]
+    with Readings().compiled_for(viewer):  # type: ignore[arg-type]
         threading.Event().wait(0.3)
         assert side.started == []
         viewer.shown.set()

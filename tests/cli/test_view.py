@@ -18,8 +18,8 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.cli.played import played_beside, played_in
 from sagline.cli.terminal import notices
+from sagline.cli.view import played_beside, played_in
 from tests.cli import interrupts
 from tests.refusal import refused
 from tests.tiers import extended

@@ -24,15 +24,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_calibration_is_shown_with_its_robot(words: list[str], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[Any] = []
 
-    def hosted(machine: sl.Robot, course: Any, *more: Any, found: sl.Calibration, **others: Any) -> int:
-        shown.append((machine, course, found))
+    def serve(machine: sl.Robot, address: Any, *, found: sl.Calibration, **page: Any) -> int:
+        shown.append((machine, page.get("played"), found))
         return 0
 
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("sagline.cli.hosting.hosted", hosted)
+    monkeypatch.setattr("sagline.cli.hosting.serve", serve)
     result = CliRunner().invoke(app, ["view", *words, "--no-browser"])
     assert result.exit_code == 0, result.output
-    [(machine, course, found)] = shown
-    assert course is None
+    [(machine, played, found)] = shown
+    assert played is None
     np.testing.assert_array_equal(found.covariance, made_up(count=6).covariance)
     np.testing.assert_array_equal(machine.frame_anchors, found.robot.frame_anchors)

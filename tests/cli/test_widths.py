@@ -23,7 +23,7 @@ import sagline as sl
 from sagline.cli import terminal
 from sagline.cli.examples import examples
 from sagline.cli.main import app
-from sagline.cli.tables import Grid
+from sagline.cli.output import Grid
 from tests.abuse.command_lines import LINES
 from tests.kinematics.winches import wound
 from tests.tiers import extended, wide

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.cli.regions import box_of, wrenches_of
+from sagline.cli.values import box_of, wrenches_of
 from sagline.core.errors import MOST
 from tests.tiers import extended
 

@@ -114,11 +114,11 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         served.append(robot)
         return 0
 
-    def serve_run(robot: sl.Robot, run: Path, *more: Any, beside: Path | None = None, **others: Any) -> int:
+    def serve_run(robot: sl.Robot, run: Path, address: Any, beside: Path | None) -> int:
         served.append([sl.load_plan(file) for file in (run, beside) if file is not None])
         return 0
 
-    def serve_log(log: Path, robot: str | None, live: bool, truth: Path | None, *more: Any, **others: Any) -> int:
+    def serve_log(log: Path, *more: Any, truth: Path | None, **others: Any) -> int:
         assert truth is None or read_log(truth).truth
         served.append(sl.load_execution(log))
         return 0
@@ -127,10 +127,10 @@ def test_a_printed_command_runs(words: list[str], folder: Path, monkeypatch: pyt
         served.append(sl.load_calibration(file))
         return 0
 
-    monkeypatch.setattr("sagline.cli.view.serve", serve)
+    monkeypatch.setattr("sagline.cli.view.view_robot", serve)
     monkeypatch.setattr("sagline.cli.view.view_run", serve_run)
     monkeypatch.setattr("sagline.cli.view.view_calibration", serve_found)
-    monkeypatch.setattr("sagline.cli.view_log.view_log", serve_log)
+    monkeypatch.setattr("sagline.cli.view.view_log", serve_log)
     monkeypatch.setattr("sagline.article.report.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.run.FIGURES", ())
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)

@@ -1,11 +1,11 @@
-"""What the shell starts, and `python -m sagline.cli` too: it hears Ctrl-C before it loads anything."""
+"""Entry point of the shell and of `python -m sagline.cli`; it handles Ctrl-C before it loads anything."""
 
 from __future__ import annotations
 
 import os
 import sys
 
-from sagline.cli.ending import INTERRUPTED, ended
+from sagline.cli.ending import INTERRUPTED, exit_code_of
 
 
 def app_entry() -> None:
@@ -18,7 +18,7 @@ def app_entry() -> None:
             if descriptor == 1:  # refuses whatever is written, so that nothing is lost without a word
                 sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
-    code = ended(lambda: _command(debug), debug=debug, last=True)
+    code = exit_code_of(lambda: _command(debug), debug=debug, last=True)
     if code == INTERRUPTED:  # Python's finalization can abort in an extension whose import was interrupted
         os._exit(code)
     sys.exit(code)
@@ -29,13 +29,13 @@ def _command(debug: bool) -> object:
     import threading
     import warnings
 
-    from sagline.cli.ending import tell_thread
+    from sagline.cli.ending import report_thread
     from sagline.cli.main import app
 
     if not debug:  # what libraries have to say is for developers
         warnings.simplefilter("ignore")
         logging.getLogger().addHandler(logging.NullHandler())
-        threading.excepthook = tell_thread
+        threading.excepthook = report_thread
     return app(prog_name="sagline", standalone_mode=False)
 
 

@@ -6,10 +6,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from sagline.cli.entries import FORWARD, INVERSE
-from sagline.cli.options import JsonOption, OutOption
+from sagline.cli.options import JsonOption, OutOption, argument
 from sagline.cli.terminal import counting, note, show_json
 from sagline.files.writing import check_files
 
@@ -17,9 +15,9 @@ from sagline.files.writing import check_files
 def article(
     parts: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="PART",
-            help="figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, "
+        argument(
+            "PART",
+            "figures N-M, table 2, or a chapter: feasible-sets, intercept, sag, constants, identify, models, "
             "simulation, poses, workspace, errata. Default: everything.",
         ),
     ] = None,

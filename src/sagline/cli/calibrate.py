@@ -6,12 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
-import typer
 from rich.text import Text
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
-from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument
+from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument, argument, flag, option
 from sagline.cli.terminal import note, show, show_json, show_pieces, working
 from sagline.core.errors import FileError, InvalidValueError, printable
 from sagline.files.writing import check_files, create_folder, write_text
@@ -27,52 +26,29 @@ WHOLE: Final = ".nc"
 FIGURES: Final = (".png", ".svg", ".pdf")
 
 
-class Deviations(NamedTuple):
-    """Of the sensors, as texts of the command line; None for what the log says."""
+class Request(NamedTuple):
+    """The options of fitting and of choosing poses; deviations are texts by the names of the quantities."""
 
-    length: str | None
-    tension: str | None
-    position: str | None
-    rotation: str | None
+    robot: str
+    unknowns: tuple[str, ...]
+    deviations: dict[str, str | None]
+    files: tuple[Path, ...]
+    plot: Path | None
 
-    def given(self) -> dict[str, Any]:
-        """Those that are given, by the names of the sensors' fields.
-
-        Raises:
-            InvalidValueError: If one is no such quantity, or not positive.
-        """
+    def sensor_deviations(self) -> dict[str, Any]:
+        """The deviations that are given, by the names of the sensors' fields."""
         from sagline.cli.values import quantity
 
         units = {"length": "m", "tension": "N", "position": "m", "rotation": "rad"}
         return {
             f"{name}_deviation": quantity(text, f"--{name}-deviation", units[name], above=0.0)
-            for name, text in self._asdict().items()
+            for name, text in self.deviations.items()
             if text is not None
         }
 
-
-class Asked(NamedTuple):
-    """What is wanted, as the command line has it."""
-
-    robot: str
-    unknowns: str | None
-    deviations: Deviations
-    files: tuple[Path, ...]
-    plot: Path | None
-
-    def names(self) -> tuple[str, ...]:
-        """Names of the unknowns."""
-        from sagline.calibration.calibrate import UNKNOWNS
-
-        return UNKNOWNS if self.unknowns is None else tuple(name.strip() for name in self.unknowns.split(","))
-
     def check_files(self, suffixes: tuple[str, ...]) -> None:
-        """Refuse files that could not be written, before any work is done.
-
-        Raises:
-            FileError: If one is of another kind than these suffixes have, its place is taken, or it is the robot's own.
-        """
-        for file, allowed in [(file, suffixes) for file in self.files] + [(self.plot, FIGURES)] * bool(self.plot):
+        """Refuse files of other kinds than these, the robot's own, and those that could not be written."""
+        for file, allowed in [*((file, suffixes) for file in self.files), *[(self.plot, FIGURES)] * bool(self.plot)]:
             assert file is not None
             if file.suffix.lower() not in allowed:
                 kinds = ", ".join(allowed)
@@ -82,62 +58,45 @@ class Asked(NamedTuple):
             check_files(file.parent, [file.name])
 
 
-def _deviation(what: str) -> typer.models.OptionInfo:
-    found: typer.models.OptionInfo = typer.Option(
-        metavar="NUMBER", help=f"Standard deviation of {what}. Default: what the log says.", show_default=False
-    )
-    return found
+def _deviation(quantity: str) -> Any:
+    return option("NUMBER", f"Standard deviation of {quantity}. Default: what the log says.")
 
 
 def calibrate(
     robot: RobotArgument,
     log: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="LOG",
-            help="CSV: one row a pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z where measured.",
-            show_default=False,
+        argument(
+            "LOG", "CSV: one row a pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z where measured."
         ),
     ] = None,
     out: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            help="The robot that was found, .yaml, or all that was found, .nc; may be given twice. With --plan: the "
+        option(
+            "FILE",
+            "The robot that was found, .yaml, or all that was found, .nc; may be given twice. With --plan: the "
             "poses, .yaml.",
-            show_default=False,
+            "--out",
         ),
     ] = None,
     unknowns: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="What is looked for, with commas between. Default: "
+        option(
+            "NAMES",
+            "What is looked for, with commas between. Default: "
             "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass.",
-            show_default=False,
         ),
     ] = None,
     length_deviation: Annotated[str | None, _deviation("a length off a drum, counted or given, '0.5 mm'")] = None,
     tension_deviation: Annotated[str | None, _deviation("a load cell's reading, '5 N'")] = None,
     position_deviation: Annotated[str | None, _deviation("a measured coordinate, '1 mm'")] = None,
     rotation_deviation: Annotated[str | None, _deviation("a measured rotation, '1 mrad'")] = None,
-    folds: Annotated[
-        int, typer.Option(metavar="NUMBER", help="Parts of the poses that are predicted from the others; 0 for none.")
-    ] = 5,
-    robust: Annotated[
-        bool, typer.Option("--robust/--no-robust", help="Poses that do not fit the rest count less.")
-    ] = True,
+    folds: Annotated[int, option("NUMBER", "Parts of the poses that are predicted from the others; 0 for none.")] = 5,
+    robust: Annotated[bool, flag("Poses that do not fit the rest count less.", "--robust/--no-robust")] = True,
     model: ModelOption = Model.CATENARY,
-    plot: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="A figure of the fit: .png, .svg or .pdf.", show_default=False),
-    ] = None,
-    plan: Annotated[
-        int | None,
-        typer.Option(metavar="NUMBER", help="Choose so many poses to measure, instead of a LOG.", show_default=False),
-    ] = None,
-    seed: Annotated[int, typer.Option(metavar="NUMBER", help="Of the poses among which --plan chooses.")] = 0,
+    plot: Annotated[Path | None, option("FILE", "A figure of the fit: .png, .svg or .pdf.")] = None,
+    plan: Annotated[int | None, option("NUMBER", "Choose so many poses to measure, instead of a LOG.")] = None,
+    seed: Annotated[int, option("NUMBER", "Of the poses among which --plan chooses.")] = 0,
     as_json: JsonOption = False,
 ) -> int:
     """Find what a robot's anchors, zeros and cables really are, from its own readings.
@@ -153,19 +112,23 @@ def calibrate(
         sagline calibrate winches_robot.yaml winches.csv --folds 10 --out found.nc
         sagline calibrate winches_robot.yaml --plan 40 --out poses.yaml
     """
-    deviations = Deviations(length_deviation, tension_deviation, position_deviation, rotation_deviation)
-    asked = Asked(robot, unknowns, deviations, tuple(out or ()), plot)
+    from sagline.calibration.calibrate import UNKNOWNS
+
+    names = UNKNOWNS if unknowns is None else tuple(name.strip() for name in unknowns.split(","))
+    deviations = {
+        "length": length_deviation,
+        "tension": tension_deviation,
+        "position": position_deviation,
+        "rotation": rotation_deviation,
+    }
+    request = Request(robot, names, deviations, tuple(out or ()), plot)
     if plan is not None:
-        return _plan_poses(asked, plan, seed, log, as_json=as_json)
-    return _fit(asked, log, model.build(), folds, robust=robust, as_json=as_json)
+        return _plan_poses(request, plan, seed, log, as_json=as_json)
+    return _fit(request, log, model.build(), folds, robust=robust, as_json=as_json)
 
 
-def _fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
-    """Calibrate, tell, and write; returns the exit code.
-
-    Raises:
-        SaglineError: If an input is wrong or a file cannot be written.
-    """
+def _fit(request: Request, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
+    """Calibrate, write and print the result; returns the exit code."""
     from sagline.calibration import parameters, summary
     from sagline.calibration.calibrate import calibrate
     from sagline.calibration.findings import CalibrationStatus
@@ -176,12 +139,12 @@ def _fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robus
         raise InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
     if log.suffix.lower() in (*ROBOTS, WHOLE):
         raise FileError(log, "is no CSV file of readings", "Give what encoders and load cells read, winches.csv.")
-    asked.check_files((*ROBOTS, WHOLE))
-    robot, readings = load_robot(asked.robot), _log(log, asked.deviations)
-    unknowns = parameters.chosen(asked.names())  # before anything is compiled
+    request.check_files((*ROBOTS, WHOLE))
+    robot, readings = load_robot(request.robot), _log(log, request.sensor_deviations())
+    unknowns = parameters.chosen(request.unknowns)  # before anything is compiled
     with working(f"{robot.name}: calibrating from {len(readings):,} rows", FORWARD, STARTING_LENGTHS, READINGS) as line:
         found = calibrate(robot, readings, unknowns, model=model, robust=robust, folds=folds, progress=line.progress)
-        files = _written(found, asked, line)
+        files = _written(found, request, line)
     if as_json:
         show_json({**_record(found), "files": files})
     else:
@@ -191,63 +154,58 @@ def _fit(asked: Asked, log: Path | None, model: CableModel, folds: int, *, robus
     if found.status is CalibrationStatus.FOUND:
         return 0
     note(f"{robot.name}: ", found.status.text, style="bold red")
-    if found.status is CalibrationStatus.NOT_CONVERGED and len(files) < len(asked.files):
+    if found.status is CalibrationStatus.NOT_CONVERGED and len(files) < len(request.files):
         note("", "No robot file is written of numbers that are none.")
     return OUTSIDE
 
 
-def _plan_poses(asked: Asked, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
-    """Choose poses, tell, and write them; returns the exit code.
-
-    Raises:
-        SaglineError: If an input is wrong or the file cannot be written.
-    """
+def _plan_poses(request: Request, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
+    """Choose poses, write and print them; returns the exit code."""
     from sagline.calibration import parameters, planning
     from sagline.calibration.log import Sensors
     from sagline.calibration.planning import calibration_poses
     from sagline.files.robot_file import load_robot
 
-    for item, value in (("LOG", log), ("--plot", asked.plot)):
+    for item, value in (("LOG", log), ("--plot", request.plot)):
         if value is not None:
             step = f"Leave out --plan, or {item}."
             raise InvalidValueError(item, f"given with --plan: {str(value)!r}", "one of the two", step)
-    asked.check_files(ROBOTS)
-    robot, given = load_robot(asked.robot), asked.deviations.given()
-    unknowns = parameters.chosen(asked.names())  # before anything is compiled
+    request.check_files(ROBOTS)
+    robot, given = load_robot(request.robot), request.sensor_deviations()
+    unknowns = parameters.chosen(request.unknowns)  # before anything is compiled
     with working(f"{robot.name}: choosing {count:,} poses", INVERSE, READINGS) as line:
         sensors = Sensors(**given) if given else None
         chosen = calibration_poses(robot, count, unknowns, sensors, seed=seed, progress=line.progress)
-        for file in asked.files:
+        for file in request.files:
             create_folder(file.parent)
             chosen.save(file)
     if as_json:
-        show_json({**_record_of_poses(chosen), "files": list(asked.files)})
+        show_json({**_record_of_poses(chosen), "files": list(request.files)})
         return 0
     _show_lines(lambda width: f"{planning.in_words(chosen, width)}\n{planning.table(chosen, width)}")
-    _tell_files(list(asked.files))
+    _tell_files(list(request.files))
     return 0
 
 
-def _log(file: Path, deviations: Deviations) -> WinchLog:
-    """The log, its sensors as the command line has them where it says something."""
+def _log(file: Path, deviations: dict[str, Any]) -> WinchLog:
+    """The log; deviations on the command line replace those of its comments."""
     from sagline.files.log_file import load_log, sensors_of_comments
     from sagline.files.reading import read_text
     from sagline.files.table import TABLE_LIMIT
 
-    given = deviations.given()
-    if not given:
+    if not deviations:
         return load_log(file)
     said, _ = sensors_of_comments(read_text(file, TABLE_LIMIT), file)
-    return load_log(file, said.replace(**given))
+    return load_log(file, said.replace(**deviations))
 
 
-def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
-    """Write what is to be written; a robot only where it was found. Returns the files."""
+def _written(found: Calibration, request: Request, line: Any) -> list[Path]:
+    """Write the robot if the search has converged, the whole result and the figure; returns the files."""
     from sagline.calibration.findings import CalibrationStatus
     from sagline.files.robot_file import dump_robot
 
     files = []
-    for file in asked.files:
+    for file in request.files:
         create_folder(file.parent)
         if file.suffix.lower() == WHOLE:
             found.save(file)
@@ -256,18 +214,18 @@ def _written(found: Calibration, asked: Asked, line: Any) -> list[Path]:
         else:
             continue
         files.append(file)
-    if asked.plot is not None:
+    if request.plot is not None:
         from sagline import plot
 
         line.stage("drawing")
-        create_folder(asked.plot.parent)
-        plot.save(plot.calibration(found), asked.plot)
-        files.append(asked.plot)
+        create_folder(request.plot.parent)
+        plot.save(plot.calibration(found), request.plot)
+        files.append(request.plot)
     return files
 
 
 def _show_lines(text: Callable[[int], str]) -> None:
-    """A text that is written for a width, in that of the terminal where it is narrow."""
+    """Print a text that is made for the width of a narrow terminal."""
     from sagline.calibration import summary
 
     show_pieces(
@@ -281,7 +239,7 @@ def _tell_files(files: list[Path]) -> None:
 
 
 def _tell_offset(found: Calibration, files: list[Path]) -> None:
-    """What no robot file keeps: lengths that were read say nothing of the winches' own zeros."""
+    """Print a note on the zeros of lengths that were read, which no robot file keeps."""
     robots = [file.name for file in files if file.suffix.lower() in ROBOTS]
     if robots and found.length_offset.any():
         whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)

@@ -7,10 +7,8 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from sagline.cli.entries import FORWARD, INVERSE
-from sagline.cli.options import RobotArgument
+from sagline.cli.options import ModbusOption, RobotArgument, flag, option
 from sagline.cli.terminal import working
 
 if TYPE_CHECKING:
@@ -20,15 +18,10 @@ if TYPE_CHECKING:
 
 def control(
     name: RobotArgument,
-    plc: Annotated[
-        str, typer.Option("--plc", metavar="ADDRESS,...", help="host or host:port of each group's PLC, in order.")
-    ],
-    modbus: Annotated[bool, typer.Option("--modbus", help="Speak Modbus TCP instead of S7.")] = False,
-    shadow: Annotated[bool, typer.Option("--shadow", help="Read and log only: nothing is ever sent.")] = False,
-    log: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write everything to an MCAP file, run.mcap.", show_default=False),
-    ] = None,
+    plc: Annotated[str, option("ADDRESS,...", "host or host:port of each group's PLC, in order.", "--plc")],
+    modbus: ModbusOption = False,
+    shadow: Annotated[bool, flag("Read and log only: nothing is ever sent.", "--shadow")] = False,
+    log: Annotated[Path | None, option("FILE", "Write everything to an MCAP file, run.mcap.")] = None,
 ) -> int:
     """Be the controller: connect, home, follow paths, until quit.
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import typer
 
 from sagline.cli.entries import FORWARD, INVERSE
-from sagline.cli.options import Format
+from sagline.cli.options import FileOption, argument, option
 from sagline.cli.terminal import note, show_data, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
@@ -21,6 +21,14 @@ if TYPE_CHECKING:
     from sagline.files.robot_xml import Imported
     from sagline.robot.robot import Robot
 
+
+class Format(StrEnum):
+    """Formats of the converted robot."""
+
+    ROBOT = "robot"
+    MJCF = "mjcf"
+
+
 LEAST = 1e-6  # m: a distance that is told is no smaller
 ENDINGS = {Format.ROBOT: (".yaml", ".yml"), Format.MJCF: (".xml", ".mjcf")}
 
@@ -28,30 +36,22 @@ ENDINGS = {Format.ROBOT: (".yaml", ".yml"), Format.MJCF: (".xml", ".mjcf")}
 def convert(
     source: Annotated[
         str,
-        typer.Argument(
-            metavar="SOURCE",
-            help="A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset.",
+        argument(
+            "SOURCE", "A WireX file, robot.wcrfx; the folder of a CASPR robot, or its .xml; a robot file; or a preset."
         ),
     ],
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write. Default: stdout.")] = None,
+    out: FileOption = None,
     form: Annotated[
-        Format,
-        typer.Option(
-            "--format", metavar="FORMAT", help="robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables."
-        ),
+        Format, option("FORMAT", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--format")
     ] = Format.ROBOT,
     linear_density: Annotated[
-        str | None, typer.Option(metavar="QUANTITY", help="Mass of all cables per length, '65 g/m' for instance.")
+        str | None, option("QUANTITY", "Mass of all cables per length, '65 g/m' for instance.")
     ] = None,
-    axial_stiffness: Annotated[
-        str | None, typer.Option(metavar="QUANTITY", help="EA of all cables, '700 kN' for instance.")
-    ] = None,
-    cable_set: Annotated[
-        str | None, typer.Option(metavar="NAME", help="CASPR: which set of cables. Default: the file's own.")
-    ] = None,
+    axial_stiffness: Annotated[str | None, option("QUANTITY", "EA of all cables, '700 kN' for instance.")] = None,
+    cable_set: Annotated[str | None, option("NAME", "CASPR: which set of cables. Default: the file's own.")] = None,
     at: Annotated[
         tuple[str, str, str] | None,
-        typer.Option(metavar="X Y Z", help="MuJoCo: where the platform starts, in m. Default: middle of the test box."),
+        option("X Y Z", "MuJoCo: where the platform starts, in m. Default: middle of the test box."),
     ] = None,
 ) -> None:
     r"""Convert a robot of CASPR or WireX to a robot file, or any robot to a MuJoCo model.

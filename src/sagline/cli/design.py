@@ -5,14 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import typer
-
 from sagline.cli.entries import INVERSE, SIGNED_MARGINS, VIBRATION
-from sagline.cli.options import JsonOption, RobotArgument
-from sagline.cli.results import figure_files, listed, write_figures
-from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.options import JsonOption, RobotArgument, argument, figures_flag, option
+from sagline.cli.output import Grid, Output, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.files.writing import check_files
 
 if TYPE_CHECKING:
     from sagline.optimization.front import Front
@@ -24,19 +20,12 @@ MOST_ROWS: Final = 12  # of the table; front.csv has all
 
 def design(
     robot: RobotArgument,
-    file: Annotated[
-        Path, typer.Argument(metavar="DESIGN", help="What may change and what should be better, design.yaml.")
-    ],
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for what is found; a search in it is gone on with.")
-    ] = Path("front"),
-    evaluations: Annotated[
-        str | None,
-        typer.Option(metavar="NUMBER", help="Robots that are tried. Default: as the file says.", show_default=False),
-    ] = None,
-    figures: Annotated[
-        bool, typer.Option("--figures/--no-figures", help="Draw what was tried and found, as PNG and SVG.")
-    ] = True,
+    file: Annotated[Path, argument("DESIGN", "What may change and what should be better, design.yaml.")],
+    out: Annotated[Path, option("DIR", "Folder for what is found; a search in it is gone on with.", "--out")] = Path(
+        "front"
+    ),
+    evaluations: Annotated[str | None, option("NUMBER", "Robots that are tried. Default: as the file says.")] = None,
+    figures: Annotated[bool, figures_flag("Draw what was tried and found, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> None:
     r"""Search for a better robot: anchors, cables and limits that may change, and goals, stand in a file.
@@ -60,8 +49,7 @@ def design(
     first, asked = load_robot(robot), load_design(file)
     if evaluations is not None:
         asked["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
-    drawn = figure_files([FIGURE]) if figures else []
-    check_files(out, [FRONT, *drawn])
+    output = Output(out, [FRONT], [FIGURE] * figures)
     rated = [0]
     with working(f"{first.name}: rating robots", *_needed(asked["goals"])) as line:
 
@@ -74,18 +62,18 @@ def design(
         except KeyboardInterrupt:
             note("", f"{rated[0]:,} robots are rated, and kept in {out}: the same command goes on from there.")
             raise
-        files = front.save(out)
+        output.files = front.save(out)
         if figures:
             from sagline import plot
 
             line.stage("drawing")
-            files += write_figures({FIGURE: plot.front(front)}, out)
+            output.draw(plot.front(front))
     if as_json:
-        show_json({**_record(front), "files": files})
+        show_json({**_record(front), "files": output.files})
         return
     show_table(_table(front))
     show(front.text)
-    show(f"In {out.resolve()}: {listed(files)}", whole=True)
+    output.show()
 
 
 def _needed(goals: list[Goal]) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""How a command ends: with an exit code and, if something went wrong, with one line on stderr that says what."""
+"""End of a command: its exit code, and one line on stderr for an error."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the
 REPORT = "the authors of sagline"
 
 
-def ended(command: Callable[[], object], *, debug: bool = False, last: bool = False) -> int:
-    """Run a command and turn whatever goes wrong into one message and an exit code.
+def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bool = False) -> int:
+    """Run a command and turn every error into one message and an exit code.
 
     Args:
-        command: Does the work; what it returns is the exit code, None for 0.
-        debug: Whether an error shows its traceback before its message.
-        last: Whether the process ends then: Ctrl-C does nothing any more.
+        command: The work; returns the exit code, None for 0.
+        debug: Whether the traceback of an error is printed before its message.
+        last: Whether the process ends afterwards; then Ctrl-C stays without effect.
 
     Returns:
-        The exit code: BAD_INPUT for what sagline or the system refuses, UNEXPECTED for what nobody thought of,
-        INTERRUPTED for Ctrl-C, even where Python lost it, CUT_OFF if nobody reads the output any more.
+        The exit code: BAD_INPUT for an error of sagline or the system, UNEXPECTED for a mistake in the program,
+        INTERRUPTED for Ctrl-C, even where Python lost it, CUT_OFF if the output has no reader any more.
     """
     interrupts = Interrupts()
     code = UNEXPECTED
@@ -37,22 +37,22 @@ def ended(command: Callable[[], object], *, debug: bool = False, last: bool = Fa
         try:
             code = _finished(command)
         finally:
-            interrupts.deafen()
+            interrupts.ignore()
     except BaseException as error:  # an interrupt may come in the line above
-        interrupts.deafen()
-        if not interrupts.heard:
-            code = _told(error, debug)
-    if interrupts.heard or code == INTERRUPTED:
+        interrupts.ignore()
+        if not interrupts.received:
+            code = _report(error, debug)
+    if interrupts.received or code == INTERRUPTED:
         code = _interrupted()
     if not last:
         interrupts.restore()
     return code
 
 
-def tell_thread(failed: ExceptHookArgs) -> None:
-    """Say in one line what ended a thread other than the first."""
+def report_thread(failed: ExceptHookArgs) -> None:
+    """Print one line on the error that ended a thread other than the first."""
     if failed.exc_value is not None:
-        _told(failed.exc_value, debug=False)
+        _report(failed.exc_value, debug=False)
 
 
 def _finished(command: Callable[[], object]) -> int:
@@ -62,8 +62,8 @@ def _finished(command: Callable[[], object]) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _told(error: BaseException, debug: bool) -> int:
-    """Say what went wrong; the exit code."""
+def _report(error: BaseException, debug: bool) -> int:
+    """Print the message of an error; returns the exit code."""
     _give_up_unwritable()
     if isinstance(error, BrokenPipeError) or isinstance(error.__context__, BrokenPipeError):  # the latter by typer
         return CUT_OFF
@@ -139,7 +139,7 @@ def _interrupted() -> int:
 
 
 def _give_up_unwritable() -> None:
-    """Where stdout takes no more, throw away what it still holds: Python would try again at its end, and complain."""
+    """Drop the buffer of a stdout that cannot be written: Python would try again at its end, and complain."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -151,30 +151,30 @@ def _give_up_unwritable() -> None:
 
 
 class Interrupts:
-    """Listens to Ctrl-C in the main thread, unless whoever started the process told it not to."""
+    """Handler of Ctrl-C in the main thread, unless the process was started with SIGINT ignored."""
 
     def __init__(self) -> None:
-        """Begin to listen."""
-        self.heard = False
+        """Install the handler."""
+        self.received = False
         main = threading.current_thread() is threading.main_thread()
         self._before: Any = signal.getsignal(signal.SIGINT) if main else None
-        self._listens = main and self._before is signal.default_int_handler
+        self._handles = main and self._before is signal.default_int_handler
         self._hook = sys.unraisablehook
-        if self._listens:
-            signal.signal(signal.SIGINT, self._hear)
+        if self._handles:
+            signal.signal(signal.SIGINT, self._receive)
 
-    def _hear(self, number: int, frame: FrameType | None) -> None:
-        self.heard = True
+    def _receive(self, number: int, frame: FrameType | None) -> None:
+        self.received = True
         sys.unraisablehook = lambda _: None  # what half-made objects say when they are thrown away helps nobody
         signal.default_int_handler(number, frame)
 
-    def deafen(self) -> None:
-        """From here on Ctrl-C does nothing: all is done, or being told."""
-        if self._listens:
+    def ignore(self) -> None:
+        """Ignore Ctrl-C from here on."""
+        if self._handles:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def restore(self) -> None:
-        """Leave everything as it was before."""
+        """Restore the handlers of before."""
         sys.unraisablehook = self._hook
-        if self._listens:
+        if self._handles:
             signal.signal(signal.SIGINT, self._before)

@@ -1,13 +1,15 @@
-"""What is compiled when it is first asked for: in words, how large it is, and how to have it compiled."""
+"""Table of the kernels that Python calls: words for the user, the size of each, and a call that compiles it."""
 
 from __future__ import annotations
 
 import gc
 from collections.abc import Callable
 from importlib import import_module
+from math import nan
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
+    from sagline.cables.model import CableModel
     from sagline.robot.equilibrium import Equilibrium
     from sagline.tension.method import TensionMethod
 
@@ -21,20 +23,20 @@ class Entry(NamedTuple):
     """An entry of the kernels.
 
     Attributes:
-        words: What it is for.
+        words: Its purpose, for the user; the key of the table.
         path: Module below `sagline.kernels`, and function.
-        kernels: How many kernels are compiled for it where nothing is compiled yet.
-        seconds: How long that takes one core of an ordinary machine [s]; only the proportions matter.
-        solve: Solves as little as can be, for which it must be compiled.
-        version: Which of the versions for different types: the second is compiled after the first.
-        after: Words of the entry that is compiled for it first, if any; its time is not in `seconds`.
+        kernels: Number of kernels that are compiled for it with an empty cache.
+        seconds: Time to compile it on one core of an ordinary machine [s]; only the proportions matter.
+        solve: Calls the public function that needs it, with `sagline`, on the smallest problem.
+        version: 1 or 2: versions for different argument types; the second is compiled after the first.
+        after: Words of the entry that is compiled before it, if any; its time is not in `seconds`.
     """
 
     words: str
     path: str
     kernels: int
     seconds: float
-    solve: Callable[[], object]
+    solve: Callable[[Any], object]
     version: int = 1
     after: str | None = None
 
@@ -46,40 +48,39 @@ class Entry(NamedTuple):
         return found
 
     def compile(self) -> None:
-        """Have it compiled. Meanwhile nobody looks for garbage, of which numba makes little: a seventh of its time."""
+        """Compile it, after its first version; without the garbage collector, which takes a seventh of the time."""
+        import sagline
+
         collects = gc.isenabled()
         gc.disable()
         try:
-            self.solve()
+            if self.version > 1 and self.after is not None:
+                ENTRIES[self.after].solve(sagline)
+            self.solve(sagline)
         finally:
             if collects:
                 gc.enable()
 
     @property
     def is_compiled(self) -> bool:
-        """Whether its machine code is on disk."""
+        """True if its machine code is on disk."""
         from sagline.kernels.jit import is_compiled
 
         return is_compiled(self.function, self.version)
 
 
-def _inverse() -> None:
-    import sagline as sl
-
-    sl.inverse(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL))
+def _inverse(sl: Any, **options: Any) -> None:
+    sl.inverse(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL), **options)
 
 
-def _other_sharing() -> None:
-    import sagline as sl
-
-    _inverse()
-    sl.inverse(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL), tension=sl.Centroid())
+def _forward(sl: Any, model: CableModel, name: str = ROBOT) -> None:
+    robot = sl.load_robot(name)
+    sl.forward(robot, [nan] * robot.cable_count, sl.Pose(PLACE, LEVEL), model)
 
 
-def _verdicts() -> None:
+def _verdicts(sl: Any) -> None:
     import numpy as np
 
-    import sagline as sl
     from sagline.core.arrays import locked
     from sagline.kernels.codes import POSE_INFEASIBLE
     from sagline.kinematics.inverse_rows import InverseRows, decide_rows
@@ -93,169 +94,38 @@ def _verdicts() -> None:
     decide_rows(robot, options, pose_rows(sl.Pose(PLACE, LEVEL)), locked(np.zeros((1, 6))), found)
 
 
-def _forward(straight: bool = False, name: str = ROBOT) -> None:
-    import numpy as np
-
-    import sagline as sl
-
-    robot = sl.load_robot(name)
-    model = sl.Straight() if straight else sl.Catenary()
-    sl.forward(robot, np.full(robot.cable_count, np.nan), sl.Pose(PLACE, LEVEL), model)
-
-
-def _forward_over_pulleys() -> None:
-    _forward()
-    _forward(name=OVER_PULLEYS)
-
-
-def _margins() -> None:
-    import sagline as sl
-
-    sl.capacity_margin(_unknown_state())
-
-
-def _signed_margins() -> None:
-    import sagline as sl
-
-    sl.margin(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL))
-
-
-def _proofs() -> None:
-    import sagline as sl
-
-    sl.prove(sl.load_robot(ROBOT), sl.PoseBox(PLACE, PLACE))
-
-
-def _polygon() -> None:
-    import sagline as sl
+def _polygon(sl: Any) -> None:
     from sagline.kinematics.polygon import polygon_at
     from sagline.tension.options import kernel_options
 
-    robot, state = sl.load_robot(ROBOT), _unknown_state()
+    robot, state = sl.load_robot(ROBOT), _unknown_state(sl)
     options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
     unknown = state.cables.chord_tension
     polygon_at(robot, state.pose, options, state.wrench, unknown, unknown, feasible=False)
 
 
-def _vibration() -> None:
-    import sagline as sl
-
-    sl.modes(_unknown_state())
-
-
-def _vibration_over_pulleys() -> None:
-    import sagline as sl
-
-    _vibration()
-    sl.modes(_unknown_state(OVER_PULLEYS))
-
-
-def _modes() -> None:
-    import sagline as sl
-
-    sl.vibration(_hung_state(), up_to=3.0)
-
-
-def _losses() -> None:
-    import sagline as sl
-
-    sl.vibration(_hung_state(), up_to=3.0, damping=sl.Damping(loss_time=1e-3))
-
-
-def _answers() -> None:
-    import sagline as sl
-
-    _modes()
-    sl.dynamic_stiffness(_hung_state(), 1.0, sl.Damping(modal_damping=0.01))
-
-
-def _periods() -> None:
-    import sagline as sl
-
-    state = _hung_state()
+def _period(sl: Any) -> None:
+    state = _hanging_state(sl)
     sl.Simulator(state.one_robot, state, winches="ideal").step(state.unstrained_length, 0.01)
 
 
-def _simulation(name: str = ROBOT) -> None:
-    import sagline as sl
-
-    sl.simulate(_hung_state(name), duration=0.01)
-
-
-def _simulation_over_pulleys() -> None:
-    _simulation()
-    _simulation(OVER_PULLEYS)
-
-
-def _chains() -> None:
-    import sagline as sl
-
-    sl.simulate(_hung_state(), duration=1e-4, cable_mass="lumped", nodes=4)
-
-
-def _hung_state(name: str = ROBOT) -> Equilibrium:
-    """Cables that hang, all at one tension: nearly in balance, and none of what solves for it is needed."""
+def _readings(sl: Any, name: str = ROBOT) -> None:
     import numpy as np
 
-    import sagline as sl
-    from sagline.core.arrays import locked
-    from sagline.robot.equilibrium import Contact
-
-    robot, pose = sl.load_robot(name), sl.Pose(PLACE, LEVEL)
-    run = pose.transform(robot.platform_anchors) - robot.frame_anchors
-    cables = sl.Catenary().from_tension(robot.cables, np.hypot(*run[:, :2].T), run[:, 2], 150.0, robot.gravity)
-    none = locked(np.zeros(robot.cable_count))
-    contact = None
-    if robot.winches is not None:
-        contact = Contact(none, none, none, cables.chord_tension, locked(cables.rise / cables.chord))
-    return sl.Equilibrium(robot, pose, locked(np.zeros(6)), cables, contact)
-
-
-def _unknown_state(name: str = ROBOT) -> Equilibrium:
-    """Cables of which nothing is known: whatever is asked of them is soon answered."""
-    import numpy as np
-
-    import sagline as sl
-    from sagline.core.arrays import locked
-
-    robot = sl.load_robot(name)
-    unknown: Any = locked(np.full(robot.cable_count, np.nan))
-    status = locked(np.zeros(robot.cable_count, dtype=np.int8))
-    geometry, forces = (unknown, unknown, unknown), (unknown, unknown, unknown)
-    cables = sl.CableState(sl.Catenary(), robot.cables, robot.gravity, *geometry, *forces, status)
-    return sl.Equilibrium(robot, sl.Pose(PLACE, LEVEL), locked(np.zeros(6)), cables)
-
-
-def _clearances() -> None:
-    import sagline as sl
-
-    sl.clearance(_unknown_state())
-
-
-def _readings(name: str = ROBOT) -> None:
-    import numpy as np
-
-    import sagline as sl
     from sagline.calibration.observations import predicted_rows
     from sagline.calibration.parameters import parameters_of
     from sagline.core.arrays import locked
     from sagline.statics.tables import pose_rows
 
-    state, sensors = _hung_state(name), sl.Sensors()
+    state, sensors = _hanging_state(sl, name), sl.Sensors()
     parameters = parameters_of(state.one_robot, ["mass"], sensors, counted=False)
     lengths = locked(np.atleast_2d(state.unstrained_length))
     predicted_rows(state.one_robot, sl.Catenary(), parameters, sensors, pose_rows(state.pose), lengths)
 
 
-def _readings_over_pulleys() -> None:
-    _readings()
-    _readings(OVER_PULLEYS)
-
-
-def _starting_lengths() -> None:
+def _starting_lengths(sl: Any) -> None:
     import numpy as np
 
-    import sagline as sl
     from sagline.core.arrays import locked
     from sagline.kernels.calibration.starting_lengths import starting_lengths
     from sagline.kernels.memory import memory_for
@@ -266,6 +136,87 @@ def _starting_lengths() -> None:
     held = locked(np.full((1, m), 100.0)), memory_for(m), np.empty((1, m))
     tables = robot.freedom, cable_table(robot)[0], body_table(robot)[0], pose_rows(sl.Pose(PLACE, LEVEL))
     starting_lengths(sl.Catenary().terms(robot.gravity), *tables, *held)
+
+
+def _other_methods(sl: Any) -> None:
+    _inverse(sl, tension=sl.Centroid())
+
+
+def _forward_over_pulleys(sl: Any) -> None:
+    _forward(sl, sl.Catenary(), OVER_PULLEYS)
+
+
+def _signed_margins(sl: Any) -> None:
+    sl.margin(sl.load_robot(ROBOT), sl.Pose(PLACE, LEVEL))
+
+
+def _proofs(sl: Any) -> None:
+    sl.prove(sl.load_robot(ROBOT), sl.PoseBox(PLACE, PLACE))
+
+
+def _vibration_over_pulleys(sl: Any) -> None:
+    sl.modes(_unknown_state(sl, OVER_PULLEYS))
+
+
+def _clearances(sl: Any) -> None:
+    sl.clearance(_unknown_state(sl))
+
+
+def _readings_over_pulleys(sl: Any) -> None:
+    _readings(sl, OVER_PULLEYS)
+
+
+def _modes(sl: Any) -> None:
+    sl.vibration(_hanging_state(sl), up_to=3.0)
+
+
+def _losses(sl: Any) -> None:
+    sl.vibration(_hanging_state(sl), up_to=3.0, damping=sl.Damping(loss_time=1e-3))
+
+
+def _stiffness_with_losses(sl: Any) -> None:
+    sl.dynamic_stiffness(_hanging_state(sl), 1.0, sl.Damping(modal_damping=0.01))
+
+
+def _simulation_over_pulleys(sl: Any) -> None:
+    sl.simulate(_hanging_state(sl, OVER_PULLEYS), duration=0.01)
+
+
+def _chains(sl: Any) -> None:
+    sl.simulate(_hanging_state(sl), duration=1e-4, cable_mass="lumped", nodes=4)
+
+
+def _hanging_state(sl: Any, name: str = ROBOT) -> Equilibrium:
+    """Catenaries of one tension, nearly in balance: no kernel that solves for the balance is needed."""
+    import numpy as np
+
+    from sagline.core.arrays import locked
+    from sagline.robot.equilibrium import Contact
+
+    robot, pose = sl.load_robot(name), sl.Pose(PLACE, LEVEL)
+    run = pose.transform(robot.platform_anchors) - robot.frame_anchors
+    cables = sl.Catenary().from_tension(robot.cables, np.hypot(*run[:, :2].T), run[:, 2], 150.0, robot.gravity)
+    none = locked(np.zeros(robot.cable_count))
+    contact = None
+    if robot.winches is not None:
+        contact = Contact(none, none, none, cables.chord_tension, locked(cables.rise / cables.chord))
+    made: Equilibrium = sl.Equilibrium(robot, pose, locked(np.zeros(6)), cables, contact)
+    return made
+
+
+def _unknown_state(sl: Any, name: str = ROBOT) -> Equilibrium:
+    """Cables with NaN everywhere: all results are found at once."""
+    import numpy as np
+
+    from sagline.core.arrays import locked
+
+    robot = sl.load_robot(name)
+    unknown: Any = locked(np.full(robot.cable_count, np.nan))
+    status = locked(np.zeros(robot.cable_count, dtype=np.int8))
+    geometry, forces = (unknown, unknown, unknown), (unknown, unknown, unknown)
+    cables = sl.CableState(sl.Catenary(), robot.cables, robot.gravity, *geometry, *forces, status)
+    made: Equilibrium = sl.Equilibrium(robot, sl.Pose(PLACE, LEVEL), locked(np.zeros(6)), cables)
+    return made
 
 
 INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
@@ -285,16 +236,16 @@ ENTRIES = {
     entry.words: entry
     for entry in (
         Entry(INVERSE, "inverse.poses.inverse_poses", 39, 18.0, _inverse),
-        Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_sharing, 2, INVERSE),
+        Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_methods, 2, INVERSE),
         Entry(VERDICTS, "inverse.verdicts.decide_poses", 56, 40.0, _verdicts),
-        Entry(FORWARD, "forward.forward.forward_poses", 82, 14.0, _forward),
+        Entry(FORWARD, "forward.forward.forward_poses", 82, 14.0, lambda sl: _forward(sl, sl.Catenary())),
         Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, 2, FORWARD),
-        Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda: _forward(straight=True)),
-        Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, _margins),
+        Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda sl: _forward(sl, sl.Straight())),
+        Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, lambda sl: sl.capacity_margin(_unknown_state(sl))),
         Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 48, 16.0, _signed_margins),
         Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 66, 17.0, _proofs),
         Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
-        Entry(VIBRATION, DESCRIBE, 57, 6.0, _vibration),
+        Entry(VIBRATION, DESCRIBE, 57, 6.0, lambda sl: sl.modes(_unknown_state(sl))),
         Entry(VIBRATION_OVER_PULLEYS, DESCRIBE, 39, 4.0, _vibration_over_pulleys, 2, VIBRATION),
         Entry(CLEARANCES, "interference.catenary_distance.least_distances", 33, 5.0, _clearances),
         Entry(READINGS, "calibration.observe.observe", 70, 9.0, _readings),
@@ -302,17 +253,17 @@ ENTRIES = {
         Entry(STARTING_LENGTHS, "calibration.starting_lengths.starting_lengths", 30, 4.0, _starting_lengths),
         Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes, after=VIBRATION),
         Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses, after=MODES),
-        Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _answers, 2, MODES),
-        Entry(SIMULATION, "dynamics.motion.run", 65, 16.0, _simulation),
+        Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _stiffness_with_losses, 2, MODES),
+        Entry(SIMULATION, "dynamics.motion.run", 65, 16.0, lambda sl: sl.simulate(_hanging_state(sl), duration=0.01)),
         Entry(SIMULATION_OVER_PULLEYS, "dynamics.motion.run", 33, 14.0, _simulation_over_pulleys, 2, SIMULATION),
-        Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _periods, after=SIMULATION),
+        Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _period, after=SIMULATION),
         Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
     )
 }
 
 
 def needed_for(tension: TensionMethod) -> tuple[str, ...]:
-    """Entries that the inverse kinematics need with a way of sharing."""
+    """Entries of the inverse kinematics with a tension distribution method."""
     from sagline.tension.options import takes_default_kernel
 
     return (INVERSE,) if takes_default_kernel(tension) else (INVERSE, SHARING)

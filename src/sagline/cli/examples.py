@@ -8,8 +8,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated
 
-import typer
-
+from sagline.cli.options import flag, option
 from sagline.cli.terminal import show
 from sagline.core.errors import FileError
 from sagline.files.writing import atomic_file, check_folder, create_folder
@@ -18,10 +17,10 @@ KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 
 
 def examples(
-    folder: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for the files; created if missing.")
-    ] = Path("sagline-examples"),
-    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+    folder: Annotated[Path, option("DIR", "Folder for the files; created if missing.", "--out")] = Path(
+        "sagline-examples"
+    ),
+    force: Annotated[bool, flag("Replace files that exist.", "--force")] = False,
 ) -> None:
     """Write the files that the documentation's commands work with: a robot, a path, lengths, measurements, scripts.
 

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
-import typer
 
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
-from sagline.cli.options import JsonOption, OutOption
+from sagline.cli.options import JsonOption, OutOption, SeedOption, argument, flag, option
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.core.numbers import n
@@ -25,20 +24,18 @@ PARTS: Final = 1000  # of the whole, as progress is told
 
 
 def experiment(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="article: ten points, Table 2 and figures 25-27.")],
+    name: Annotated[str, argument("NAME", "article: ten points, Table 2 and figures 25-27.")],
     waits: Annotated[
-        bool,
-        typer.Option("--in-process", help="Let the twin's clock wait: half a minute instead of 14, and no network."),
+        bool, flag("Let the twin's clock wait: half a minute instead of 14, and no network.", "--in-process")
     ] = False,
     true: Annotated[
         str | None,
-        typer.Option(
-            metavar="ROBOT",
-            help="The robot as it really is, where that is another one; the controller still knows article-prototype.",
-            show_default=False,
+        option(
+            "ROBOT",
+            "The robot as it really is, where that is another one; the controller still knows article-prototype.",
         ),
     ] = None,
-    seed: Annotated[str, typer.Option(metavar="NUMBER", help="Of the load cells' noise.")] = "1",
+    seed: SeedOption = "1",
     folder: OutOption = Path("output"),
     as_json: JsonOption = False,
 ) -> None:

@@ -5,20 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from sagline.cli.entries import INVERSE
-from sagline.cli.options import RobotArgument
+from sagline.cli.options import RobotArgument, flag, option
 from sagline.cli.terminal import note, show, working
 
 
 def export_c(
     robot: RobotArgument,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="The source, sagline.c; header and SCL text stand beside it.")
-    ] = Path("sagline.c"),
+    out: Annotated[Path, option("FILE", "The source, sagline.c; header and SCL text stand beside it.", "--out")] = Path(
+        "sagline.c"
+    ),
     single_precision: Annotated[
-        bool, typer.Option("--float", help="Single precision, for controllers that compute no other in hardware.")
+        bool, flag("Single precision, for controllers that compute no other in hardware.", "--float")
     ] = False,
 ) -> None:
     """Write C99 that finds a robot's tensions and lengths on a microcontroller, and a cable's length in SCL for a PLC.
@@ -45,7 +43,7 @@ def export_c(
 
 def export_scl(
     robot: RobotArgument,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="The source.")] = Path("plc.scl"),
+    out: Annotated[Path, option("FILE", "The source.", "--out")] = Path("plc.scl"),
 ) -> None:
     """Write the PLCs' side of a robot as SCL source for TIA Portal: data blocks, limits, and the program of a group.
 

@@ -6,12 +6,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import typer
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FIT, FORWARD
-from sagline.cli.options import JsonOption, Model, ModelOption, OutOption, PayloadOption, RobotArgument, WrenchOption
-from sagline.cli.tables import Grid, csv_text, show_table, written
+from sagline.cli.options import (
+    JsonOption,
+    Model,
+    ModelOption,
+    OutOption,
+    PayloadOption,
+    RobotArgument,
+    WrenchOption,
+    argument,
+    flag,
+)
+from sagline.cli.output import Grid, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.files.writing import check_files, create_folder, write_text
 
@@ -27,12 +36,9 @@ Cell = float | str
 
 def forward(
     name: RobotArgument,
-    file: Annotated[
-        Path, typer.Argument(metavar="CSV", help="Columns L0, L1, ... and perhaps time; units in brackets: L0 [mm].")
-    ],
+    file: Annotated[Path, argument("CSV", "Columns L0, L1, ... and perhaps time; units in brackets: L0 [mm].")],
     counts: Annotated[
-        bool,
-        typer.Option("--counts", help="The columns are C0, C1, ...: counts of the encoders of the robot's winches."),
+        bool, flag("The columns are C0, C1, ...: counts of the encoders of the robot's winches.", "--counts")
     ] = False,
     model: ModelOption = Model.CATENARY,
     wrench: WrenchOption = None,
@@ -50,15 +56,14 @@ def forward(
         sagline forward cogiro lengths.csv --out poses
         sagline forward my_robot.yaml counts.csv --counts
     """
-    from sagline.cli.values import loaded
+    from sagline.cli.values import robot_with
     from sagline.files.pose_text import wrench_of
-    from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
     from sagline.kinematics.forward import forward as solve
     from sagline.kinematics.status import ForwardStatus
 
     load = wrench_of(wrench)
-    robot = loaded(load_robot(name), payload)
+    robot = robot_with(name, payload)
     lengths = _counted(file, robot) if counts else _measured(file, robot)
     target = folder / f"{file_stem(robot.name, 'poses')}.csv"
     check_files(folder, [target.name])

@@ -1,47 +1,92 @@
-"""A robot on a page of its own until Ctrl-C."""
+"""The server of `sagline view`, and the first run of the viewer.
+
+Cables can be dragged as soon as they are compiled; further readings are compiled by another process meanwhile.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
+import threading
 import webbrowser
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from sagline.cli.compilation import (
+    CompilerProcess,
+    Stage,
+    available_cores,
+    compilation_events,
+    first_run_text,
+    not_compiled,
+)
+from sagline.cli.entries import (
+    ANSWERS,
+    ENTRIES,
+    FORWARD,
+    MARGINS,
+    MODES,
+    POLYGON,
+    SHARING,
+    SIGNED_MARGINS,
+    SIMULATION,
+    VERDICTS,
+    VIBRATION,
+)
 from sagline.cli.terminal import note, show, working
-from sagline.core.arrays import Array
 from sagline.core.errors import FileError
-from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from sagline.calibration.result import Calibration
-    from sagline.viewer.player import Beside, Played
-    from sagline.viewer.state_code import Source
+    from sagline.viewer.feature import Reading
     from sagline.viewer.viewer import Viewer
 
 LATER = "trimesh"  # what the viewer loads when somebody asks for it
+ENTRY_OF = {  # by the names of the viewer's readings
+    "MARGIN": MARGINS,
+    "POLYGON": POLYGON,
+    "SHARING": SHARING,
+    "FREQUENCIES": VIBRATION,
+    "REST": FORWARD,
+    "MODES": ANSWERS,  # the modes, and the response
+    "SIMULATION": SIMULATION,
+    "WORKSPACE": SIGNED_MARGINS,
+    "VERDICTS": VERDICTS,
+}
+ORDER = (
+    SIGNED_MARGINS,  # where the platform may go is there with its cables
+    MARGINS,
+    POLYGON,
+    SHARING,
+    VIBRATION,
+    VERDICTS,
+    MODES,
+    ANSWERS,
+    FORWARD,
+    SIMULATION,
+)  # as they are looked at
+PATIENCE = 5.0  # s: how long the end may wait for a compilation
 
 
-class Start(NamedTuple):
-    """How a robot is shown at first.
+class Address(NamedTuple):
+    """Address of the page.
 
     Attributes:
-        pose: Where its platform is; None for its home.
-        mode: Name of the mode that moves, "" for none.
-        wrench: On the platform, shape (6,); None for none.
+        host: Address to listen on.
+        port: Port; 0 for any that is free.
+        browser: Whether to open one here.
     """
 
-    pose: Pose | None = None
-    mode: str = ""
-    wrench: Array | None = None
+    host: str
+    port: int
+    browser: bool
 
 
 def check_viewer() -> None:
-    """Find out that the packages of the viewer are there.
+    """Check that the packages of the viewer are installed.
 
     Raises:
         FileError: If one is not.
@@ -54,53 +99,37 @@ def check_viewer() -> None:
         raise FileError.not_installed(LATER, "The viewer needs it", "viewer")
 
 
-def hosted(
-    machine: Robot,
-    course: Played | None,
-    host: str,
-    port: int,
+def serve(
+    robot: Robot,
+    address: Address,
     *,
-    browser: bool,
-    start: Start | None = None,
-    found: Calibration | None = None,
-    source: Source | None = None,
-    other: Beside | None = None,
-    beside: Callable[[Viewer], AbstractContextManager[None]] = lambda _: nullcontext(),
+    meanwhile: Callable[[Viewer], AbstractContextManager[None]] = lambda _: nullcontext(),
+    **page: Any,
 ) -> int:
-    """Serve a robot until Ctrl-C; returns the exit code.
+    """Serve a page until Ctrl-C; returns the exit code.
 
     Args:
-        machine: The robot.
-        course: What is played; None for the robot alone.
-        host: Address to listen on.
-        port: Port; 0 for any that is free.
-        browser: Whether to open one here.
-        start: How the robot is shown at first; None for its home.
-        found: A calibration to show with it; None for none.
-        source: Where all this came from; None if nobody knows.
-        other: What is played with the same clock; None for nothing.
-        beside: What goes on beside the viewer, as long as it serves.
+        robot: The robot.
+        address: Where to listen.
+        meanwhile: What goes on beside the viewer, as long as it serves.
+        page: What is on the page, as `Viewer` takes it: played, wrench, pose, mode, found, source, beside.
     """
-    from sagline.cli.readings import Readings
     from sagline.viewer import server as web
     from sagline.viewer.viewer import Viewer
 
-    start = start or Start()
-    server = web.started(host, port, machine.name)
+    server = web.started(address.host, address.port, robot.name)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is how one ends, and no failure
     try:
-        address = web.url(server, host)
-        show(f"{machine.name} is at {address}   (Ctrl-C stops it)", whole=True)
-        if host not in ("127.0.0.1", "::1", "localhost"):
+        url = web.url(server, address.host)
+        show(f"{robot.name} is at {url}   (Ctrl-C stops it)", whole=True)
+        if address.host not in ("127.0.0.1", "::1", "localhost"):
             note("Note: ", "everyone who can reach this machine can look at it and drag it.", style="bold")
         readings = Readings()
-        viewer = Viewer(
-            server, machine, course, readings.ready, start.wrench, start.pose, start.mode, found, source, other
-        )
-        if browser and has_display():
-            webbrowser.open(address)
-        with working("") if readings.cold else nullcontext(), readings.compiled_beside(viewer), beside(viewer):
+        viewer = Viewer(server, robot, ready=readings.ready, **page)
+        if address.browser and has_display():
+            webbrowser.open(url)
+        with working("") if readings.missing else nullcontext(), readings.compiled_for(viewer), meanwhile(viewer):
             viewer.serve()
     except KeyboardInterrupt:
         note("", "Stopped.")
@@ -110,5 +139,69 @@ def hosted(
 
 
 def has_display() -> bool:
-    """Whether a browser could open: over SSH it would open in the terminal, in the way."""
+    """True if there is a display for a browser; over SSH it would open in the terminal."""
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+
+
+class Readings:
+    """The readings of the viewer that need no compilation any more.
+
+    Attributes:
+        missing: Words of the entries that are still to be compiled.
+    """
+
+    def __init__(self) -> None:
+        """Find the entries that are not compiled."""
+        self.missing = not_compiled(ORDER)  # replaced as a whole, by the thread that compiles
+
+    def ready(self, reading: Reading) -> bool:
+        """True if a reading needs no compilation."""
+        return ENTRY_OF[reading.name] not in self.missing
+
+    @contextmanager
+    def compiled_for(self, viewer: Viewer) -> Iterator[None]:
+        """Compile what is missing in another process while inside, and refresh the viewer after each entry.
+
+        The page shows only what the calling thread, which serves it, has to wait for.
+        """
+        serving = threading.get_ident()
+
+        def tell(stage: Stage) -> None:
+            if threading.get_ident() == serving:  # what is compiled beside makes nobody wait
+                viewer.wait(first_run_text([stage]))
+
+        ended = threading.Event()
+        thread = threading.Thread(target=self._compile, args=(viewer, ended), daemon=True)
+        thread.start()
+        try:
+            with compilation_events(tell):
+                yield
+        finally:
+            ended.set()
+            thread.join(PATIENCE)
+
+    def _compile(self, viewer: Viewer, ended: threading.Event) -> None:
+        if available_cores() < 2:
+            while not (viewer.shown.wait(0.1) or ended.is_set()):
+                pass
+        if ended.is_set() or not self.missing:
+            return
+        with suppress(OSError), CompilerProcess(self.missing) as side:
+
+            def end() -> None:
+                ended.wait()
+                side.kill()
+
+            threading.Thread(target=end, daemon=True).start()
+            for stage in side.stages():
+                if stage.finished and not ended.is_set():
+                    side.move_kernels()
+                    self._arrived(stage.words, viewer)
+        for name in self.missing:  # the other process failed: dragging is slow until it is made up for
+            if not ended.is_set():
+                ENTRIES[name].compile()
+                self._arrived(name, viewer)
+
+    def _arrived(self, name: str, viewer: Viewer) -> None:
+        self.missing = [each for each in self.missing if each != name]
+        viewer.refresh()

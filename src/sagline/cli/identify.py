@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
-import typer
 
-from sagline.cli.options import JsonOption, TensionPlace
-from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.options import JsonOption, argument, choice, flag, option
+from sagline.cli.output import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.numbers import n
 
@@ -18,26 +18,28 @@ if TYPE_CHECKING:
     from sagline.article.identify_cable import CableFit
     from sagline.files.measurements import Measurements
 
+
+class TensionPlace(StrEnum):
+    """Points of a cable at which its tension is measured."""
+
+    FRAME_END = "frame-end"
+    PLATFORM_END = "platform-end"
+    CHORD = "chord"
+
+
 STEPS = 25  # along each axis of the working range
 TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm
 
 
 def identify(
-    file: Annotated[
-        Path, typer.Argument(metavar="CSV", help="Columns span, rise, length, tension; units in brackets: span [mm].")
-    ],
-    length_error: Annotated[
-        str, typer.Option(metavar="LENGTH", help="Standard error of a length, 0.002 or '2 mm'.")
-    ] = "0.001",
-    tension_error: Annotated[str, typer.Option(metavar="FORCE", help="Standard error of a tension, 5 or '5 N'.")] = "1",
+    file: Annotated[Path, argument("CSV", "Columns span, rise, length, tension; units in brackets: span [mm].")],
+    length_error: Annotated[str, option("LENGTH", "Standard error of a length, 0.002 or '2 mm'.")] = "0.001",
+    tension_error: Annotated[str, option("FORCE", "Standard error of a tension, 5 or '5 N'.")] = "1",
     tension_at: Annotated[
-        TensionPlace,
-        typer.Option(
-            metavar="PLACE", help=f"Where the tension is measured: {', '.join(each.value for each in TensionPlace)}."
-        ),
+        TensionPlace, choice("PLACE", "Where the tension is measured", TensionPlace)
     ] = TensionPlace.FRAME_END,
     offset: Annotated[
-        bool, typer.Option("--offset/--no-offset", help="Find the zero of the lengths too, as one more unknown.")
+        bool, flag("Find the zero of the lengths too, as one more unknown.", "--offset/--no-offset")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -62,7 +64,7 @@ def identify(
             *data,
             length_error=length_deviation,
             tension_error=tension_deviation,
-            tension_at=tension_at.key,
+            tension_at=cast(Any, tension_at.value.replace("-", "_")),
             unknowns=["linear_density", "axial_stiffness", *["length_offset"] * offset],
         )
         model = _model(cable, data)

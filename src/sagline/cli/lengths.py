@@ -1,18 +1,18 @@
-"""`sagline lengths` and `sagline encoder`: what a run winds, as `sagline forward` and controllers read it."""
+"""`sagline lengths` and `sagline encoder`: lengths and counts of a run, for `sagline forward` and controllers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import typer
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import needed_for
-from sagline.cli.options import Winding
-from sagline.cli.tables import csv_text
+from sagline.cli.options import FileOption, argument, option
+from sagline.cli.output import csv_text
 from sagline.cli.terminal import note, show_data, working
 from sagline.core.errors import FileError
 from sagline.files.writing import write_text
@@ -21,12 +21,15 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
-RunArgument = Annotated[
-    Path, typer.Argument(metavar="RUN.nc", help="A run written by sagline track.", show_default=False)
-]
-FileOption = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE", help="File to write. Default: stdout.", show_default=False)
-]
+
+class Winding(StrEnum):
+    """Models of the cable that is wound on the drums."""
+
+    CONSTANT = "constant"
+    REMEMBERED = "remembered"
+
+
+RunArgument = Annotated[Path, argument("RUN.nc", "A run written by sagline track.")]
 
 
 def lengths(
@@ -49,9 +52,9 @@ def encoder(
     file: RunArgument,
     winding: Annotated[
         Winding,
-        typer.Option(
-            metavar="WINDING",
-            help="What lies on the drums: constant, cable at the winches' winding_tension; remembered, cable wound "
+        option(
+            "WINDING",
+            "What lies on the drums: constant, cable at the winches' winding_tension; remembered, cable wound "
             "along the run at the tension it had there.",
         ),
     ] = Winding.CONSTANT,
@@ -114,7 +117,7 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
 
 
 def _plan_of(file: Path, out: Path | None) -> Plan:
-    """The plan in a run, some of which is feasible; the file to write is another one."""
+    """The plan in a run; refused if no sample is feasible, or if the run would be overwritten."""
     from sagline.files.plan_file import load_plan
 
     if out is not None and out.exists() and out.resolve() == file.resolve():
@@ -126,7 +129,7 @@ def _plan_of(file: Path, out: Path | None) -> Plan:
 
 
 def plan_text(plan: Plan) -> str:
-    """A whole plan as CSV: time, pose, lengths, tensions and how each sample ended; empty where it has no answer."""
+    """A whole plan as CSV: time, pose, lengths, tensions and status of each sample; empty cells for NaN."""
     from sagline.kinematics.status import PoseStatus
 
     pose, lengths, tensions = plan.state.pose, plan.unstrained_length, plan.chord_tension

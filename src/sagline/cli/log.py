@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
-import typer
 
-from sagline.cli.options import JsonOption
-from sagline.cli.tables import Grid, show_table
+from sagline.cli.options import JsonOption, argument, option
+from sagline.cli.output import Grid, show_table
 from sagline.cli.terminal import show, show_json, working
 from sagline.core.numbers import n
 from sagline.files.writing import check_file
@@ -24,45 +23,22 @@ MOST_EVENTS: Final = 20  # that are listed
 MOST_PLANS: Final = 100_000
 # a cycle that began later than one and no later than the next [s]
 LATE: Final = (0.0, 1e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 1e-1, np.inf)
+EXTREME: Final = ("name", "value", "unit", "time", "cable")
 BAR: Final = 30  # characters of the longest bar
 
 
-class Extreme(NamedTuple):
-    """The largest of something.
-
-    Attributes:
-        name: What it is.
-        value: How large.
-        unit: Its unit.
-        time: When, since the first cycle [s].
-        cable: Of which; None where it is the platform's, or the loop's.
-    """
-
-    name: str
-    value: float
-    unit: str
-    time: float
-    cable: int | None = None
-
-
 def log(
-    file: Annotated[Path, typer.Argument(metavar="RUN.mcap", help="A log, also one of a process that was killed.")],
+    file: Annotated[Path, argument("RUN.mcap", "A log, also one of a process that was killed.")],
     to: Annotated[
         Path | None,
-        typer.Option(
-            "--to",
-            metavar="FILE",
-            help="Write it to this file and tell nothing else: .nc is a data set with the plan in it, .mcap a log "
+        option(
+            "FILE",
+            "Write it to this file and tell nothing else: .nc is a data set with the plan in it, .mcap a log "
             "with its end.",
-            show_default=False,
+            "--to",
         ),
     ] = None,
-    plan: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NUMBER", help="Only the cycles of one of its plans, from 0. Default: all.", show_default=False
-        ),
-    ] = None,
+    plan: Annotated[str | None, option("NUMBER", "Only the cycles of one of its plans, from 0. Default: all.")] = None,
     as_json: JsonOption = False,
 ) -> int:
     """Tell what a log of the controller holds: states, largest errors, late cycles, events.
@@ -100,8 +76,8 @@ def _tell(done: Execution) -> None:
     show(f"{done.status.name}: {done.reason or done.status.text}")
     show_table(Grid(["state", "time [s]", "cycles"], _states(done)))
     largest = [
-        [one.name, n(one.value, ".3g", one.unit), "–" if one.cable is None else str(one.cable), f"{one.time:.2f}"]
-        for one in _extremes(done)
+        [name, n(value, ".3g", unit), "–" if cable is None else str(cable), f"{time:.2f}"]
+        for name, value, unit, time, cable in _extremes(done)
     ]
     show_table(Grid(["largest", "value", "cable", "at [s]"], largest))
     show_table(Grid(["cycles that began late by", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
@@ -121,7 +97,7 @@ def _row(done: Execution, event: Event) -> list[str]:
 
 
 def _states(done: Execution) -> list[list[str]]:
-    """How long the controller was in which state, in the order of the states."""
+    """Time and cycles in each state of the controller."""
     from sagline.control.states import State
 
     codes, counts = np.unique(done.state, return_counts=True)
@@ -131,8 +107,8 @@ def _states(done: Execution) -> list[list[str]]:
     ]
 
 
-def _extremes(done: Execution) -> list[Extreme]:
-    """The largest errors; those of which there is one."""
+def _extremes(done: Execution) -> list[tuple[str, float, str, float, int | None]]:
+    """Name, value, unit, time [s] and cable of the largest errors; None for a cable where it is the platform's."""
     from sagline.control.execution import position_error
 
     errors: list[tuple[str, Array, str]] = [
@@ -151,12 +127,12 @@ def _extremes(done: Execution) -> list[Extreme]:
             continue
         place = np.unravel_index(int(np.nanargmax(np.where(np.isfinite(size), size, -1.0))), size.shape)
         cable = int(place[1]) if size.ndim == 2 and size.shape[1] == done.robot.cable_count else None
-        found.append(Extreme(name, float(size[place]), unit, _since(done, done.time[place[0]]), cable))
+        found.append((name, float(size[place]), unit, _since(done, done.time[place[0]]), cable))
     return found
 
 
 def _histogram(done: Execution) -> list[list[str]]:
-    """How many cycles began how late; empty ends are left out."""
+    """Histogram of the delays of cycles, without the empty classes at its end."""
     counts = [int(np.count_nonzero(done.late <= 0.0))]
     counts += [int(np.count_nonzero((done.late > low) & (done.late <= high))) for low, high in pairwise(LATE)]
     names = [
@@ -182,7 +158,7 @@ def _record(done: Execution, to: Path | None) -> dict[str, Any]:
         "status": done.status.name,
         "reason": done.reason,
         "states_s": counts,
-        "largest": [one._asdict() for one in _extremes(done)],
+        "largest": [dict(zip(EXTREME, one, strict=True)) for one in _extremes(done)],
         "late_s": {"p50": _quantile(done, 0.5), "p99.9": _quantile(done, 0.999)},
         "events": [{**event._asdict(), "state": event.state.name} for event in done.events],
         "file": to,

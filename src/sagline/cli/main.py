@@ -1,45 +1,31 @@
-"""The command `sagline`: its subcommands, and how all of them begin and end."""
+"""The command `sagline`: its subcommands, loaded when they are needed, and the start and end of all of them."""
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from importlib import import_module
 from importlib.metadata import version
 from inspect import cleandoc
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+from typer.main import get_command_from_info
+from typer.models import CommandInfo
 
-from sagline.cli.article import article
-from sagline.cli.calibrate import calibrate
-from sagline.cli.control import control
-from sagline.cli.convert import convert
-from sagline.cli.design import design
-from sagline.cli.ending import ended
-from sagline.cli.examples import examples
-from sagline.cli.experiment import experiment
-from sagline.cli.export import export_c, export_scl
-from sagline.cli.forward import forward
-from sagline.cli.identify import identify
-from sagline.cli.lengths import encoder, lengths
-from sagline.cli.log import log
-from sagline.cli.new import new
-from sagline.cli.robots import robots, show
-from sagline.cli.run import run
-from sagline.cli.share import share
-from sagline.cli.simulate import simulate
-from sagline.cli.sweep import sweep
-from sagline.cli.tension import tension
-from sagline.cli.track import track
-from sagline.cli.twin import twin
-from sagline.cli.vibrate import vibrate
-from sagline.cli.view import view
-from sagline.cli.workspace import workspace
+from sagline.cli.ending import exit_code_of
 from sagline.files.writing import finished_files
 
+NAMES = (
+    *("track", "lengths", "encoder", "run", "article", "identify", "forward", "tension", "vibrate", "simulate"),
+    *("workspace", "sweep", "design", "calibrate", "robots", "show", "examples", "new", "convert", "export-c"),
+    *("export-scl", "view", "share", "twin", "control", "experiment", "log"),
+)
+MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # else of their names
 DEBUG = "--debug"
 MOST_NAMES = 6  # of files, told when something failed after them
 START = """\
@@ -71,10 +57,10 @@ Start here:
 
 
 class Command(TyperCommand):
-    """A subcommand that takes no empty text, and whose help names its arguments as its examples do, without braces."""
+    """A subcommand that refuses empty texts; its help names arguments without braces."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The arguments; one that is empty is told by its name, before a path makes the current folder of it."""
+        """Parse the arguments; an empty one is refused by its name: as a path it would mean the current folder."""
         if not ctx.resilient_parsing:  # which is the shell's, for completion
             given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
             parameter: Any  # typer has a kind of its own
@@ -94,8 +80,31 @@ class Command(TyperCommand):
         return f"{re.sub(r'[{}]', '', usage)}\n\n{rest}"
 
 
+class Commands(Mapping[str, Command]):
+    """The subcommands by name; the module of each is imported when it is asked for."""
+
+    def __getitem__(self, name: str) -> Command:
+        """A subcommand."""
+        if name not in NAMES:
+            raise KeyError(name)
+        return _load_command(name)
+
+    def __iter__(self) -> Iterator[str]:
+        """Names, in the order of the help."""
+        return iter(NAMES)
+
+    def __len__(self) -> int:
+        """Number of subcommands."""
+        return len(NAMES)
+
+
 class Group(TyperGroup):
-    """The subcommands; whatever goes wrong in one of them ends in one line and an exit code."""
+    """The subcommands; each error in one of them ends in one line and an exit code."""
+
+    def __init__(self, **attributes: Any) -> None:
+        """Take the attributes of typer."""
+        super().__init__(**attributes)
+        self.commands: Any = Commands()
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run one of them; `--debug` may stand anywhere."""
@@ -116,7 +125,7 @@ class Group(TyperGroup):
                         error.add_note(_before(finished))
                     raise
 
-        return sys.exit(ended(command, debug=debug)) if alone else command()
+        return sys.exit(exit_code_of(command, debug=debug)) if alone else command()
 
 
 app = typer.Typer(
@@ -128,8 +137,18 @@ app = typer.Typer(
 )
 
 
+@cache
+def _load_command(name: str) -> Command:
+    """Import a subcommand and read its options from its signature."""
+    function = getattr(import_module(f"sagline.cli.{MODULES.get(name, name)}"), name.replace("-", "_"))
+    text = _help(function.__doc__)
+    info = CommandInfo(name=name, cls=Command, callback=function, help=text, short_help=text.partition("\n\n")[0])
+    made: Any = get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
+    return cast(Command, made)
+
+
 def _before(finished: Sequence[Path]) -> str:
-    """What was written before something failed."""
+    """Names of the files that were complete before an error."""
     names = ", ".join(file.name for file in finished[:MOST_NAMES])
     more = f" and {len(finished) - MOST_NAMES} more" if len(finished) > MOST_NAMES else ""
     return f"Written before, and whole: {names}{more} in {finished[0].parent}"
@@ -142,7 +161,7 @@ def _print_version(wanted: bool) -> None:
 
 
 def _help(text: str | None) -> str:
-    """A docstring as help: what is indented stays as it is."""
+    """A docstring as help; indented paragraphs keep their lines."""
     paragraphs = cleandoc(text or "").split("\n\n")
     return "\n\n".join(f"\b\n{paragraph}" if paragraph.startswith(" ") else paragraph for paragraph in paragraphs)
 
@@ -160,12 +179,4 @@ def sagline(
         bool, typer.Option(DEBUG, help="Show where an error happened; may stand after a command too.")
     ] = False,
 ) -> None:
-    """Hold the options of all subcommands."""
-
-
-for command in (
-    track, lengths, encoder, run, article, identify, forward, tension, vibrate, simulate, workspace, sweep, design,
-    calibrate, robots, show, examples, new, convert, export_c, export_scl, view, share, twin, control, experiment, log,
-):  # fmt: skip
-    text = _help(command.__doc__)
-    app.command(cls=Command, help=text, short_help=text.partition("\n\n")[0])(command)
+    """Define the options of all subcommands."""

@@ -6,12 +6,13 @@ import re
 import sys
 from pathlib import Path
 from shlex import quote
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
 
 from sagline.cli.entries import INVERSE
+from sagline.cli.options import argument, flag, option
 from sagline.cli.terminal import note, show, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
@@ -33,51 +34,28 @@ _BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # of the frame's edges, tried in this o
 ROPE_NAMES = "dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19"
 
 
-class Question(NamedTuple):
-    """One thing to be told.
-
-    Attributes:
-        key: Its option.
-        text: How it is asked.
-        default: What is taken where nothing is said.
-    """
-
-    key: str
-    text: str
-    default: str
-
-
-QUESTIONS = (
-    Question("frame", "Frame, length x width x height", "6 x 4 x 3 m"),
-    Question("layout", "Cables from the top, or mixed from above and below (top, mixed)", "top"),
-    Question("cables", "Number of cables (6 to 8)", "8"),
-    Question("platform", "Platform, length x width x height", "0.5 x 0.5 x 0.4 m"),
-    Question("mass", "Mass of the platform with its load", "30 kg"),
-    Question("rope", f"Rope ({ROPE_NAMES})", "dyneema-sk78"),
-    Question("diameter", "Diameter of the rope", "4 mm"),
-)
+QUESTIONS = {  # text and default by the name of the option
+    "frame": ("Frame, length x width x height", "6 x 4 x 3 m"),
+    "layout": ("Cables from the top, or mixed from above and below (top, mixed)", "top"),
+    "cables": ("Number of cables (6 to 8)", "8"),
+    "platform": ("Platform, length x width x height", "0.5 x 0.5 x 0.4 m"),
+    "mass": ("Mass of the platform with its load", "30 kg"),
+    "rope": (f"Rope ({ROPE_NAMES})", "dyneema-sk78"),
+    "diameter": ("Diameter of the rope", "4 mm"),
+}
 
 
 def new(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, my_robot.yaml.")],
-    frame: Annotated[str | None, typer.Option(metavar="SIZE", help='Edges of the frame, "6 x 4 x 3 m".')] = None,
-    layout: Annotated[
-        str | None, typer.Option(metavar="LAYOUT", help="Cables from the top, or mixed: from above and below.")
-    ] = None,
-    cables: Annotated[str | None, typer.Option(metavar="NUMBER", help="Number of cables, 6 to 8.")] = None,
-    platform: Annotated[
-        str | None, typer.Option(metavar="SIZE", help='Edges of the platform, "0.5 x 0.5 x 0.4 m".')
-    ] = None,
-    mass: Annotated[
-        str | None, typer.Option(metavar="MASS", help='Mass of the platform with its load, "30 kg".')
-    ] = None,
-    rope: Annotated[
-        str | None,
-        typer.Option(metavar="ROPE", help=f"What the cables are: {ROPE_NAMES}."),
-    ] = None,
-    diameter: Annotated[str | None, typer.Option(metavar="LENGTH", help='Diameter of the rope, "4 mm".')] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
-    look: Annotated[bool, typer.Option("--view", help="Look at it in the browser afterwards.")] = False,
+    file: Annotated[Path, argument("FILE", "The robot file to write, my_robot.yaml.")],
+    frame: Annotated[str | None, option("SIZE", 'Edges of the frame, "6 x 4 x 3 m".')] = None,
+    layout: Annotated[str | None, option("LAYOUT", "Cables from the top, or mixed: from above and below.")] = None,
+    cables: Annotated[str | None, option("NUMBER", "Number of cables, 6 to 8.")] = None,
+    platform: Annotated[str | None, option("SIZE", 'Edges of the platform, "0.5 x 0.5 x 0.4 m".')] = None,
+    mass: Annotated[str | None, option("MASS", 'Mass of the platform with its load, "30 kg".')] = None,
+    rope: Annotated[str | None, option("ROPE", f"What the cables are: {ROPE_NAMES}.")] = None,
+    diameter: Annotated[str | None, option("LENGTH", 'Diameter of the rope, "4 mm".')] = None,
+    force: Annotated[bool, flag("Replace the file if it exists.", "--force")] = False,
+    look: Annotated[bool, flag("Look at it in the browser afterwards.", "--view")] = False,
 ) -> int:
     r"""Make a robot file of your own: asks for what no option says, checks it, explains it.
 
@@ -89,7 +67,6 @@ def new(
         sagline new my_robot.yaml --frame "15 x 11 x 6 m" --mass "50 kg" \
             --rope steel-6x19 --diameter "3 mm"
     """
-    from sagline.cli.view import serve
     from sagline.files.robot_file import dump_robot, parse_robot
 
     answers = {
@@ -117,7 +94,10 @@ def new(
         show(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
     if not look:
         return 0
-    return serve(made, file, "127.0.0.1", 8080, browser=True)
+    from sagline.cli.hosting import Address
+    from sagline.cli.view import view_robot
+
+    return view_robot(made, file, Address("127.0.0.1", 8080, browser=True))
 
 
 def _refuse_existing(file: Path, *, force: bool) -> None:
@@ -128,41 +108,42 @@ def _refuse_existing(file: Path, *, force: bool) -> None:
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
-    """The design and what it was made from; on a terminal a wrong answer is told, and the question asked again."""
+    """The design and the answers it is made from; on a terminal a question with a wrong answer is asked again."""
     asks = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     said: dict[str, str] = {}
-    for question in QUESTIONS:
-        given = answers.get(question.key)
-        while question.key not in said:
-            text = given if given is not None else _asked(question) if asks else _read(question)
+    for key, (question, default) in QUESTIONS.items():
+        given = answers.get(key)
+        while key not in said:
+            if given is not None:
+                text = given
+            elif asks:
+                text = str(typer.prompt(question, default=default, err=True))
+            else:
+                text = _read(key, question, default)
             try:
-                design = _design(name, {**said, question.key: text})
+                design = _design(name, {**said, key: text})
             except InvalidValueError as error:
                 if given is not None or not asks:
                     raise
                 note("No: ", str(error), style="bold red")
             else:
-                said[question.key] = text
+                said[key] = text
     return design, said
 
 
-def _asked(question: Question) -> str:
-    return str(typer.prompt(question.text, default=question.default, err=True))
-
-
-def _read(question: Question) -> str:
-    """The answer of a program or file on the other end: a line, an empty one for the default."""
+def _read(key: str, question: str, default: str) -> str:
+    """An answer from a pipe or a file: a line, an empty one for the default."""
     line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
     if line:
-        return line.strip() or question.default
-    option = f"--{question.key}"
-    allowed = f'an option, or a line that answers "{question.text}"'
-    step = f'Add {option} "{question.default}", for instance.'
+        return line.strip() or default
+    option = f"--{key}"
+    allowed = f'an option, or a line that answers "{question}"'
+    step = f'Add {option} "{default}", for instance.'
     raise InvalidValueError(option, "missing: the input ended", allowed, step)
 
 
 def _design(name: str, said: dict[str, str]) -> Design:
-    """The design as far as it has been answered; the rest stands in for what is not known yet, and cannot be wrong."""
+    """The design from the answers so far; valid values stand for those that are not known yet."""
     from sagline.cables.rope import ROPES
     from sagline.cli.values import quantity
     from sagline.robot.design import COUNTS, LAYOUTS, Design
@@ -234,7 +215,7 @@ def _header(said: dict[str, str]) -> str:
 
 
 def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
-    """What there is to say of the robot, and the feasible share of the poses in its middle."""
+    """Lines on the robot, and the feasible share of the poses in the middle of its frame."""
     from sagline.cables.rope import ROPES, SAFETY
     from sagline.robot.design import SLACK_LIMIT
 

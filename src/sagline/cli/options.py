@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -29,47 +30,12 @@ class Model(StrEnum):
         return MODELS[self.value.title().replace("-", "")]()
 
 
-class Direction(StrEnum):
-    """Along which axis a force acts, or about which a moment."""
-
-    X = "x"
-    Y = "y"
-    Z = "z"
-    ABOUT_X = "about x"
-    ABOUT_Y = "about y"
-    ABOUT_Z = "about z"
-
-
-class CableMass(StrEnum):
-    """How cables have mass in motion."""
-
-    NONE = "none"
-    LUMPED = "lumped"
-    MODAL = "modal"
-
-
-class ShaperKind(StrEnum):
-    """What shapes a path so that it excites no vibration."""
-
-    NONE = "none"
-    ZV = "zv"
-    ZVD = "zvd"
-    EI = "ei"
-
-
 class Variable(StrEnum):
     """Tensions in which the load can be shared."""
 
     CHORD = "chord"
     HORIZONTAL = "horizontal"
     FRAME_END = "frame_end"
-
-
-class Winding(StrEnum):
-    """What lies on the drums of winches."""
-
-    CONSTANT = "constant"
-    REMEMBERED = "remembered"
 
 
 class Tension(StrEnum):
@@ -94,31 +60,6 @@ class Tension(StrEnum):
         return METHODS[self.value.title().replace("-", "")](variable.value)
 
 
-class TensionPlace(StrEnum):
-    """Where a cable's tension is measured."""
-
-    FRAME_END = "frame-end"
-    PLATFORM_END = "platform-end"
-    CHORD = "chord"
-
-    @property
-    def key(self) -> Literal["frame_end", "platform_end", "chord"]:
-        """As the library spells it."""
-        places: dict[TensionPlace, Literal["frame_end", "platform_end", "chord"]] = {
-            TensionPlace.FRAME_END: "frame_end",
-            TensionPlace.PLATFORM_END: "platform_end",
-            TensionPlace.CHORD: "chord",
-        }
-        return places[self]
-
-
-class Format(StrEnum):
-    """What a robot can be converted to."""
-
-    ROBOT = "robot"
-    MJCF = "mjcf"
-
-
 def robot_completions(incomplete: str) -> list[str]:
     """Presets and robot files that begin so, for the shell."""
     from glob import escape, glob
@@ -129,57 +70,60 @@ def robot_completions(incomplete: str) -> list[str]:
     return [name for name in robot_names() if name.startswith(incomplete)] + files
 
 
+def argument(metavar: str, text: str, completion: Callable[[str], list[str]] | None = None) -> Any:
+    """An argument."""
+    return typer.Argument(metavar=metavar, help=text, autocompletion=completion)
+
+
+def option(metavar: str, text: str, *names: str) -> Any:
+    """An option with a value; without names its name is that of the parameter."""
+    return typer.Option(*names, metavar=metavar, help=text)
+
+
+def choice(metavar: str, text: str, choices: type[StrEnum]) -> Any:
+    """An option whose value is one of a few words, which its help lists."""
+    return typer.Option(metavar=metavar, help=f"{text}: {', '.join(each.value for each in choices)}.")
+
+
+def flag(text: str, *names: str) -> Any:
+    """An option without a value."""
+    return typer.Option(*names, help=text)
+
+
+def figures_flag(text: str) -> Any:
+    """`--figures/--no-figures`; the text says what is drawn."""
+    return flag(text, "--figures/--no-figures")
+
+
 RobotArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="ROBOT",
-        help="A preset (see sagline robots) or a robot file, robot.yaml.",
-        autocompletion=robot_completions,
-    ),
+    str, argument("ROBOT", "A preset (see sagline robots) or a robot file, robot.yaml.", robot_completions)
 ]
-OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files; created if missing.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print the numbers as JSON and nothing else on stdout.")]
-ModelOption = Annotated[
-    Model, typer.Option(metavar="MODEL", help=f"Cable model: {', '.join(model.value for model in Model)}.")
-]
-VariableOption = Annotated[
-    Variable,
-    typer.Option(
-        metavar="VARIABLE", help=f"The tension in which it is shared: {', '.join(each.value for each in Variable)}."
-    ),
-]
+OutOption = Annotated[Path, option("DIR", "Folder for the files; created if missing.", "--out")]
+FileOption = Annotated[Path | None, option("FILE", "File to write. Default: stdout.", "--out")]
+JsonOption = Annotated[bool, flag("Print the numbers as JSON and nothing else on stdout.", "--json")]
+ModelOption = Annotated[Model, choice("MODEL", "Cable model", Model)]
+VariableOption = Annotated[Variable, choice("VARIABLE", "The tension in which it is shared", Variable)]
 WrenchOption = Annotated[
     str | None,
-    typer.Option(
-        metavar="FX,FY,FZ[,MX,MY,MZ]",
-        help="Force [N] and moment [N m] that act on the platform besides its weight: at its center of mass, along "
+    option(
+        "FX,FY,FZ[,MX,MY,MZ]",
+        "Force [N] and moment [N m] that act on the platform besides its weight: at its center of mass, along "
         "the world's axes.",
     ),
 ]
 PayloadOption = Annotated[
     str | None,
-    typer.Option(
-        metavar="MASS",
-        help="Mass that the platform carries besides its own, 20 or '20 kg'; its inertia grows in proportion.",
-    ),
+    option("MASS", "Mass that the platform carries besides its own, 20 or '20 kg'; its inertia grows in proportion."),
 ]
 PoseOption = Annotated[
     str | None,
-    typer.Option(
-        metavar="X,Y,Z[,A,B,C]",
-        help="Position [m] and angles about z, y, x [degrees]. Default: the middle of the robot's test box.",
+    option(
+        "X,Y,Z[,A,B,C]",
+        "Position [m] and angles about z, y, x [degrees]. Default: the middle of the robot's test box.",
     ),
 ]
-TensionOption = Annotated[
-    Tension,
-    typer.Option(
-        metavar="METHOD",
-        help=f"How the load is shared among redundant cables: {', '.join(each.value for each in Tension)}.",
-    ),
-]
-LossTimeOption = Annotated[
-    str, typer.Option(metavar="TIME", help="Loss time [s] of the cables' stretch: EA (1 + i omega TIME).")
-]
-AirDampingOption = Annotated[
-    str, typer.Option(metavar="NUMBER", help="Force of the air on a cable over its velocity, a meter [N s/m^2].")
-]
+TensionOption = Annotated[Tension, choice("METHOD", "How the load is shared among redundant cables", Tension)]
+LossTimeOption = Annotated[str, option("TIME", "Loss time [s] of the cables' stretch: EA (1 + i omega TIME).")]
+AirDampingOption = Annotated[str, option("NUMBER", "Force of the air on a cable over its velocity, a meter [N s/m^2].")]
+ModbusOption = Annotated[bool, flag("Speak Modbus TCP instead of S7.", "--modbus")]
+SeedOption = Annotated[str, option("NUMBER", "Of the load cells' noise.")]

@@ -1,4 +1,4 @@
-"""`sagline robots` and `sagline show`: what there is, and what is in it."""
+"""`sagline robots` and `sagline show`: the presets, and the values of a robot."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sagline.cli.options import JsonOption, RobotArgument
-from sagline.cli.tables import Grid, show_table
+from sagline.cli.output import Grid, show_table
 from sagline.cli.terminal import show as show_text
 from sagline.cli.terminal import show_json
 
@@ -178,7 +178,7 @@ def _deviations(deviations: Mapping[str, Array], head: str) -> Grid:
 
 
 def _parts(winches: Winch) -> dict[str, Any]:
-    """What is known of the winches, each with its unit."""
+    """Known values of the winches, each with its unit."""
     from sagline.core.fields import units
     from sagline.robot.winch import Winch
 

@@ -1,15 +1,16 @@
-"""The operator's place of `sagline control`: lines that come in while the cycles go on."""
+"""Session of `sagline control`: reads the lines of an operator or a pipe while the controller runs its cycles."""
 
 from __future__ import annotations
 
+import shutil
 import sys
+import time
 from collections.abc import Callable
 from functools import partial
 from queue import Empty, SimpleQueue
 from threading import Thread
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, Self
 
-from sagline.cli.status_line import PROMPT, StatusLine
 from sagline.cli.terminal import note, show
 from sagline.cli.values import middle_of, quantity, whole_of
 from sagline.control.controller import Controller
@@ -21,6 +22,8 @@ from sagline.files.path_file import load_path
 from sagline.files.pose_text import pose_of
 from sagline.robot.pose import Pose
 
+EVERY: Final = 0.2  # s between two updates of the status line
+PROMPT: Final = "> "
 FAILED: Final = 1  # exit code where a fault ended it
 LATE: Final = 0.02  # s, of which a note at the end tells
 AXES: Final = ("x", "y", "z")
@@ -39,66 +42,112 @@ HELP: Final = (
 )
 
 
-class Word(NamedTuple):
-    """What a word begins: how the rest of its line is understood, and what is done with that."""
+class StatusLine:
+    """Last line of a terminal, which does not scroll with the lines above; without effect elsewhere."""
 
-    parse: Callable[[str], Any]
-    act: Callable[[Any], object]
+    def __init__(self, *, shown: bool) -> None:
+        """Use stdout, if `shown` and if it is a terminal."""
+        self._shown = shown and sys.stdout is not None and sys.stdout.isatty()
+        self._next, self._size = 0.0, (0, 0)
+
+    def __enter__(self) -> Self:
+        """Exclude the last line from scrolling."""
+        if self._shown:
+            self._fit()
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        """Let the whole terminal scroll again."""
+        if self._shown:
+            _, rows = self._size
+            self._say(f"\x1b7\x1b[r\x1b[{rows};1H\x1b[2K\x1b8")
+
+    def update(self, text: str) -> None:
+        """Show a text, shortened to the line, at most every `EVERY` seconds."""
+        if not self._shown or time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + EVERY
+        if shutil.get_terminal_size() != self._size:
+            self._fit()
+        columns, rows = self._size
+        shown = text if len(text) < columns else text[: columns - 2] + "…"
+        self._say(f"\x1b7\x1b[{rows};1H\x1b[7m{shown.ljust(columns - 1)}\x1b[0m\x1b8")
+
+    def ask(self) -> None:
+        """Show the prompt."""
+        if self._shown:
+            self._say(f"\r\x1b[K{PROMPT}")
+
+    def clear(self) -> None:
+        """Remove the prompt."""
+        if self._shown:
+            self._say("\r\x1b[K")
+
+    def _fit(self) -> None:
+        """Set the scrolling region to all lines but the last."""
+        self._size = shutil.get_terminal_size()
+        rows = self._size[1]
+        self._say(f"\n\x1b7\x1b[1;{max(rows - 1, 1)}r\x1b8\x1b[A")
+
+    def _say(self, text: str) -> None:
+        sys.stdout.write(text)
+        sys.stdout.flush()
 
 
 class Line(NamedTuple):
-    """A line that was understood, or not: then doing it tells why. No text: the end of all lines."""
+    """A line that was read: its text, None at the end of the input, and its action, which raises what is wrong."""
 
     text: str | None
     act: Callable[[], object]
 
 
 class Session:
-    """Lines that come in, cycles that go on, and what is told."""
+    """Lines that are read, cycles of the controller, and events that are printed."""
 
     def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
-        """Begin.
+        """Prepare a session.
 
         Args:
-            controller: What is driven.
-            alone: Whether nobody types: lines wait for one another, and one that is refused ends it.
-            shadow: Whether nothing is asked, as it only reads.
+            controller: The controller.
+            alone: Whether the lines come from a pipe: they wait for one another, and the first error ends it.
+            shadow: Whether the controller only reads and no lines are taken.
         """
         self.control, self._alone, self._shadow = controller, alone, shadow
-        self._told = 0
-        self._ended = self._pressed = False
+        self._event_count = 0
+        self._ended = self._is_interrupted = False
         self._wait = 0  # cycles
         self._lines: SimpleQueue[Line] = SimpleQueue()
         self._line = StatusLine(shown=not alone)
-        self._words: dict[str, Word] = {
-            "home": Word(self._home_pose, self.control.home),
-            "goto": Word(partial(_pose, "goto"), lambda pose: self.control.start(self.control.path_to(pose))),
-            "run": Word(load_path, self.control.start),
-            "jog": Word(self._jog, lambda jog: jog()),
-            "pause": Word(_nothing, lambda _: self.control.pause()),
-            "resume": Word(_nothing, lambda _: self.control.resume()),
-            "stop": Word(_nothing, lambda _: self.control.stop()),
-            "wait": Word(self._cycles, self._wait_for),
-            "state": Word(_nothing, lambda _: self._tell_state()),
-            "ack": Word(_nothing, lambda _: self.control.acknowledge()),
-            "connect": Word(_nothing, lambda _: self.control.connect()),
-            "off": Word(_nothing, lambda _: self.control.off()),
-            "help": Word(_nothing, lambda _: self._tell_help()),
-            "quit": Word(_nothing, lambda _: self._end()),
+        # how the rest of a line is understood, and its action, by the first word
+        self._words: dict[str, tuple[Callable[[str], Any], Callable[[Any], object]]] = {
+            "home": (self._home_pose, self.control.home),
+            "goto": (partial(_pose, "goto"), lambda pose: self.control.start(self.control.path_to(pose))),
+            "run": (load_path, self.control.start),
+            "jog": (self._jog, lambda jog: jog()),
+            "pause": (_nothing, lambda _: self.control.pause()),
+            "resume": (_nothing, lambda _: self.control.resume()),
+            "stop": (_nothing, lambda _: self.control.stop()),
+            "wait": (self._cycles, self._wait_for),
+            "state": (_nothing, lambda _: self._show_state()),
+            "ack": (_nothing, lambda _: self.control.acknowledge()),
+            "connect": (_nothing, lambda _: self.control.connect()),
+            "off": (_nothing, lambda _: self.control.off()),
+            "help": (_nothing, lambda _: self._show_help()),
+            "quit": (_nothing, lambda _: self._end()),
         }
 
     def run(self) -> int:
-        """Go on until the end; returns the exit code."""
+        """Run until the end; returns the exit code."""
         try:
-            with interrupt_calls(self._press), self._line:
+            with interrupt_calls(self._interrupt), self._line:
                 self._begin()
-                while not self._ended and not self._pressed:
+                while not self._ended and not self._is_interrupted:
                     self._cycle()
-                    if (line := self._due()) is not None:
-                        self._do(line)
+                    if (line := self._next_line()) is not None:
+                        self._carry_out(line)
         finally:
             with interrupt_calls(lambda: None):
-                self._leave()
+                self._disconnect()
         return FAILED if self.control.state is State.EMERGENCY or self._failed else 0
 
     @property
@@ -110,21 +159,21 @@ class Session:
             show("Reads only: nothing is sent. Ctrl-C ends it.")
             return
         self.control.connect()
-        self._tell_events()
+        self._show_events()
         if not self._alone:
             show("help lists what there is to say; home comes first.")
         Thread(target=self._read, name="sagline lines", daemon=True).start()
         self._line.ask()
 
     def _read(self) -> None:
-        """All that the thread does: what is typed or comes through a pipe, and the numbers and files in it."""
+        """Read lines, and the numbers and files in them, in a thread of its own."""
         for line in sys.stdin:
             for part in line.split(";"):
-                self._lines.put(self._understood(part.strip()))
+                self._lines.put(self._parse(part.strip()))
         self._lines.put(Line(None, self._end))
 
-    def _understood(self, text: str) -> Line:
-        """What a line asks for, or why that is not understood."""
+    def _parse(self, text: str) -> Line:
+        """Parse a line; an error is raised by its action."""
         word, _, rest = text.partition(" ")
         if not word or word.startswith("#"):
             return Line("", lambda: None)
@@ -138,22 +187,22 @@ class Session:
         except SaglineError as error:
             return Line(text, partial(_refuse, error))
 
-    def _press(self) -> None:
-        self._pressed = True
+    def _interrupt(self) -> None:
+        self._is_interrupted = True
         self.control.stop()
 
     def _end(self) -> None:
         self._ended = True
 
-    def _leave(self) -> None:
-        """Lead rates to zero, and give the machine back, whatever ended it."""
+    def _disconnect(self) -> None:
+        """Stop the motion and disconnect."""
         control = self.control
         control.stop()
         while control.moving:
             control.cycle()
         if control.state not in (State.OFF, State.EMERGENCY):
             control.off()
-        self._tell_events()
+        self._show_events()
         pace = control.pace
         if pace is not None and pace.lateness.longest > LATE:
             often = f"{1e3 * pace.lateness.quantile(0.999):.1f} ms in 999 of 1000 cycles"
@@ -162,11 +211,11 @@ class Session:
     def _cycle(self) -> None:
         self.control.cycle()
         self._wait = max(self._wait - 1, 0)
-        self._tell_events()
+        self._show_events()
         self._line.update(self._status)
 
-    def _due(self) -> Line | None:
-        """The line to be done now: at once where somebody types, else when nothing moves any more."""
+    def _next_line(self) -> Line | None:
+        """The next line: at once if an operator types, from a pipe when the platform is at rest."""
         if self._wait or (self._alone and self.control.moving):
             return None
         if self._alone and self.control.state in (State.FAULT, State.EMERGENCY):
@@ -177,8 +226,8 @@ class Session:
         except Empty:
             return None
 
-    def _do(self, line: Line) -> None:
-        """Do what a line says; what is refused is told, and ends it where nobody types."""
+    def _carry_out(self, line: Line) -> None:
+        """Carry out a line; an error is printed, or ends the session of a pipe."""
         if self._alone and line.text:
             show(f"{PROMPT}{line.text}", whole=True)
         try:
@@ -187,7 +236,7 @@ class Session:
             if self._alone:
                 raise
             note("Error: ", str(error), style="bold red")
-        self._tell_events()
+        self._show_events()
         self._line.ask()
 
     def _home_pose(self, text: str) -> Pose:
@@ -208,7 +257,7 @@ class Session:
 
     @property
     def _status(self) -> str:
-        """What the last line of a terminal shows."""
+        """Text of the status line."""
         control, sample = self.control, self.control.sample
         parts = [control.state.name + " (degraded)" * control.degraded]
         if control.homed:
@@ -221,16 +270,16 @@ class Session:
             parts.append(f"{done:.1f} of {whole:.1f} s")
         return "  ".join(parts)
 
-    def _tell_events(self) -> None:
-        events = self.control.events_from(self._told)
-        self._told += len(events)
+    def _show_events(self) -> None:
+        events = self.control.events_from(self._event_count)
+        self._event_count += len(events)
         for event in events:
             self._line.clear()
-            show(_told(event))
+            show(_event_text(event))
         if events:
             self._line.ask()
 
-    def _tell_state(self) -> None:
+    def _show_state(self) -> None:
         control, sample = self.control, self.control.sample
         show(self._status)
         if sample is None:
@@ -242,7 +291,7 @@ class Session:
             often, most = control.pace.lateness.quantile(0.999), control.pace.lateness.longest
             show(f"cycles late      {1e3 * often:.1f} ms (999 of 1000), {1e3 * most:.1f} ms at most")
 
-    def _tell_help(self) -> None:
+    def _show_help(self) -> None:
         wide = max(len(words) for words, _ in HELP)
         for words, sense in HELP:
             show(f"{words.ljust(wide)}  {sense}")
@@ -263,6 +312,6 @@ def _refuse(error: SaglineError) -> None:
     raise error
 
 
-def _told(event: Event) -> str:
+def _event_text(event: Event) -> str:
     name = f"{event.name}: " if event.kind is not EventKind.NOTE else ""
     return f"{event.time:9.2f} s  {name}{event.text}"

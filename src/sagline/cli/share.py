@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-import typer
-
 from sagline.cli.entries import INVERSE
-from sagline.cli.options import robot_completions
+from sagline.cli.options import argument, option, robot_completions
 from sagline.cli.terminal import show, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import check_file, write_text
@@ -24,17 +22,14 @@ HEAD: Final = 2000  # bytes of a page, in which it says who made it
 def share(
     what: Annotated[
         str,
-        typer.Argument(
-            metavar="WHAT",
-            help="A run, a simulation, run.nc, or a log of the controller, run.mcap: it plays. A preset (see sagline "
+        argument(
+            "WHAT",
+            "A run, a simulation, run.nc, or a log of the controller, run.mcap: it plays. A preset (see sagline "
             "robots) or a robot file, robot.yaml: its platform can be dragged.",
-            autocompletion=robot_completions,
+            robot_completions,
         ),
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE.html", help="Default: its name, here: run.html.", show_default=False),
-    ] = None,
+    out: Annotated[Path | None, option("FILE.html", "Default: its name, here: run.html.", "--out")] = None,
 ) -> None:
     """Make one page of a robot or a run, that needs no server and no network: for a phone, a mail, a lecture.
 

@@ -3,36 +3,36 @@
 from __future__ import annotations
 
 import re
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import typer
 
 from sagline.cli.entries import CHAINS, SIMULATION, SIMULATION_OVER_PULLEYS, VIBRATION, needed_for
 from sagline.cli.options import (
     AirDampingOption,
-    CableMass,
     JsonOption,
     LossTimeOption,
     PayloadOption,
     RobotArgument,
-    ShaperKind,
     Tension,
     TensionOption,
     Variable,
     WrenchOption,
+    argument,
+    choice,
+    figures_flag,
+    option,
 )
-from sagline.cli.results import figure_files, listed, write_figures
-from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.output import Grid, Output, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.cli.track import check_unit
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.writing import check_files, create_folder
 
 if TYPE_CHECKING:
-    from sagline.cli.line import Line
+    from sagline.cli.progress import ProgressLine
     from sagline.core.arrays import Array
     from sagline.dynamics.simulation.results import Break, Simulation
     from sagline.kinematics.plan import Plan
@@ -40,6 +40,24 @@ if TYPE_CHECKING:
     from sagline.robot.equilibrium import Equilibrium
     from sagline.robot.robot import Robot
     from sagline.tension.method import TensionMethod
+
+
+class ShaperKind(StrEnum):
+    """Input shapers of a path against vibration."""
+
+    NONE = "none"
+    ZV = "zv"
+    ZVD = "zvd"
+    EI = "ei"
+
+
+class CableMass(StrEnum):
+    """Models of the cables' mass in motion."""
+
+    NONE = "none"
+    LUMPED = "lumped"
+    MODAL = "modal"
+
 
 BREAK = re.compile(r"([0-9]{1,3})@([^@]+)")
 STEP = "Give the cable and when it breaks: --break 3@2.5s."
@@ -50,42 +68,26 @@ def simulate(
     name: RobotArgument,
     path: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="PATH",
-            help="Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box.",
-            show_default=False,
+        argument(
+            "PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box."
         ),
     ] = None,
-    shaper: Annotated[
-        ShaperKind,
-        typer.Option(metavar="SHAPER", help=f"Shapes the path: {', '.join(each.value for each in ShaperKind)}."),
-    ] = ShaperKind.NONE,
-    cable_mass: Annotated[
-        CableMass,
-        typer.Option(metavar="KIND", help=f"Mass of the cables: {', '.join(each.value for each in CableMass)}."),
-    ] = CableMass.NONE,
+    shaper: Annotated[ShaperKind, choice("SHAPER", "Shapes the path", ShaperKind)] = ShaperKind.NONE,
+    cable_mass: Annotated[CableMass, choice("KIND", "Mass of the cables", CableMass)] = CableMass.NONE,
     breaks: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--break", metavar="CABLE@TIME", help="A cable breaks: 3@2.5s. May be given again.", show_default=False
-        ),
+        list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. May be given again.", "--break")
     ] = None,
-    after: Annotated[str, typer.Option(metavar="TIME", help="How long it goes on after the path's end [s].")] = "3",
-    step: Annotated[
-        str | None, typer.Option(metavar="TIME", help="Of the integrator [s]. Default: as the robot needs it.")
-    ] = None,
+    after: Annotated[str, option("TIME", "How long it goes on after the path's end [s].")] = "3",
+    step: Annotated[str | None, option("TIME", "Of the integrator [s]. Default: as the robot needs it.")] = None,
     tension: TensionOption = Tension.CLOSEST,
     loss_time: LossTimeOption = "0",
     air_damping: AirDampingOption = "0",
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="File to write. Default: ROBOT-simulation.nc in output."),
+        Path | None, option("FILE", "File to write. Default: ROBOT-simulation.nc in output.", "--out")
     ] = None,
-    figures: Annotated[
-        bool, typer.Option("--figures/--no-figures", help="Draw the balance of energy beside it, as PNG and SVG.")
-    ] = True,
+    figures: Annotated[bool, figures_flag("Draw the balance of energy beside it, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
     """Move a robot in time along a path, vibrating as it does, with cables that may break.
@@ -98,15 +100,14 @@ def simulate(
         sagline simulate article-suspended own_path.yaml --shaper zvd
         sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
     """
-    from sagline.cli.values import damping_of, loaded, quantity
+    from sagline.cli.values import damping_of, quantity, robot_with
     from sagline.dynamics.simulation.simulate import simulate as integrated
     from sagline.files.path_file import load_path
     from sagline.files.pose_text import wrench_of
-    from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
     from sagline.robot.batch import has_routing
 
-    load, robot = wrench_of(wrench), loaded(load_robot(name), payload)
+    load, robot = wrench_of(wrench), robot_with(name, payload)
     events = tuple(_break(text, robot) for text in breaks or ())
     rest = quantity(after, "--after", "s", low=0.0)
     size = None if step is None else quantity(step, "--step", "s", above=0.0)
@@ -115,7 +116,7 @@ def simulate(
     if file.suffix != ".nc":
         raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")
     drawing = f"{file.stem}-energy"
-    check_files(file.parent, [file.name, *figure_files([drawing] * figures)])
+    output = Output(file.parent, [file.name], [drawing] * figures)
     if path is None and shaper is not ShaperKind.NONE:
         advice = "Give a path, or leave --shaper out."
         raise InvalidValueError("--shaper", f"{shaper.value} without a path", "none without a path", advice)
@@ -132,19 +133,17 @@ def simulate(
         line.stage(f"{robot.name}: {end:g} s in time, {_cables(cable_mass.value)}")
         kind: Any = cable_mass.value
         simulation = integrated(start, duration=end, step=size, cable_mass=kind, events=events, damping=damping)
-        create_folder(file.parent)
-        simulation.save(file)
-        files = [file]
+        simulation.save(output.file(file.name))
         if figures:
             from sagline import plot
 
             line.stage("drawing")
-            files += write_figures({drawing: plot.energy(simulation)}, file.parent)
+            output.draw(plot.energy(simulation))
     if as_json:
-        show_json({**_record(simulation), "files": files})
+        show_json({**_record(simulation), "files": output.files})
     else:
         _tell(simulation)
-        show(f"In {file.parent.resolve()}: {listed(files)}", whole=True)
+        output.show()
     return 0
 
 
@@ -168,7 +167,7 @@ def _start(
     shaper: ShaperKind,
     cable_mass: CableMass,
     load: Array | None,
-    line: Line,
+    line: ProgressLine,
 ) -> Plan | Equilibrium:
     """A plan along the path, shaped if asked for; or the robot at rest."""
     from sagline.cli.values import middle_of
@@ -200,12 +199,12 @@ def _duration(start: Plan | Equilibrium) -> float:
 
 
 def _cables(cable_mass: str) -> str:
-    """Which cables, in words."""
+    """Model of the cables' mass, in words."""
     return "massless" if cable_mass == CableMass.NONE else f"with cable mass ({cable_mass})"
 
 
 def _residual(simulation: Simulation) -> float:
-    """How far the platform is from its mean at most, in the last second [m]."""
+    """Largest distance of the platform from its mean position in the last second [m]."""
     last = simulation.time >= simulation.time[-1] - LAST
     place = simulation.pose.position[last]
     return float(np.linalg.norm(place - place.mean(axis=0), axis=1).max())

@@ -1,25 +1,22 @@
-"""One run of a robot along a path: planned, confirmed, and summed up in a few numbers."""
+"""Run of a robot along a path: the plan, its confirmation, and a summary in a few numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path as FilePath
 from textwrap import fill
 from time import perf_counter
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.results import listed
-from sagline.cli.tables import Grid, show_table, written
-from sagline.cli.terminal import note, show, show_json
+from sagline.cli.output import Grid, Output, show_table, written
+from sagline.cli.terminal import note, show_json
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.core.progress import Progress
-from sagline.files.writing import create_folder, file_stem
+from sagline.files.writing import file_stem
 from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Gap, Plan
@@ -27,6 +24,9 @@ from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
+
+if TYPE_CHECKING:
+    from sagline.cli.progress import ProgressLine
 
 ROWS = {  # of a summary: what a person reads, and how its number is written
     "position_error_max_mm": ("position error, largest [mm]", ".3g"),
@@ -46,19 +46,12 @@ WIDEN = " Move the path, or widen the tension limits."
 SAME_PLACE = 1e-6  # m: far above rounding, far below any second equilibrium
 
 
-class Stages(Protocol):
-    """Told of each part of the work, it gives what to call with how much of it is done."""
-
-    def stage(self, what: str) -> Progress:
-        """A new part begins."""
-
-
 class Run(NamedTuple):
     """A confirmed plan along a path.
 
     Attributes:
-        confirmation: The plan, and where its lengths really lead.
-        seconds: Time the inverse kinematics took, compiled [s].
+        confirmation: The plan, and the equilibria with its lengths.
+        seconds: Time of the inverse kinematics, compiled [s].
     """
 
     confirmation: Confirmation
@@ -76,35 +69,20 @@ class Run(NamedTuple):
 
     @property
     def lost(self) -> int:
-        """Number of planned poses in which the platform would not stay: its equilibrium there is none, or unstable."""
+        """Number of planned poses without a stable equilibrium of the platform."""
         stays = self.confirmation.held
         if isinstance(self.plan.state.cables.model, Catenary):  # planned exactly: it rests elsewhere only if it left
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
         return int(np.sum(self.plan.feasible & ~stays))
 
 
-class Summary(NamedTuple):
-    """The numbers of one run; over its feasible poses, NaN if there are none. Units are in the names."""
-
-    position_error_max_mm: float
-    position_error_mean_mm: float
-    chord_tension_min_n: float
-    chord_tension_max_n: float
-    unstrained_length_min_m: float
-    unstrained_length_max_m: float
-    adjusting_length_min_mm: float
-    adjusting_length_max_mm: float
-    feasible_share_percent: float
-    inverse_us_per_pose: float
-
-
 def run_name(robot: Robot, model: CableModel) -> str:
-    """How the files of a run are named, without a suffix."""
+    """Name of the files of a run, without suffix."""
     return file_stem(robot.name, type(model).__name__.lower())
 
 
 def run_along(
-    robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: Stages, wrench: Array | None = None
+    robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: ProgressLine, wrench: Array | None = None
 ) -> Run:
     """Plan a path, and confirm the plan with exact cables.
 
@@ -113,7 +91,7 @@ def run_along(
         path: The path.
         model: Cable model the lengths are planned with.
         tension: How the load is shared.
-        line: Told of planning and confirming.
+        line: Shows the progress of planning and confirming.
         wrench: External wrench, shape (6,), as `inverse` takes it; None for none.
 
     Raises:
@@ -128,26 +106,24 @@ def run_along(
     return Run(confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
 
 
-def summary(run: Run) -> Summary:
-    """The run in numbers."""
+def summary(run: Run) -> dict[str, float]:
+    """The numbers of a run over its feasible poses, by the keys of ROWS; NaN if there are none."""
     plan = run.plan
     error = 1e3 * np.linalg.norm(run.confirmation.position_error, axis=-1)
-    largest, mean = (
-        float(f(error[~np.isnan(error)])) if not np.isnan(error).all() else np.nan for f in (np.max, np.mean)
-    )
-    return Summary(
-        largest,
-        mean,
+    known = error[~np.isnan(error)]
+    numbers = (
+        *((float(known.max()), float(known.mean())) if known.size else (np.nan, np.nan)),
         *_range(plan.chord_tension),
         *_range(plan.unstrained_length),
         *_range(1e3 * plan.state.cables.adjusting_length),
         100.0 * float(np.mean(plan.feasible)),
         1e6 * run.seconds / plan.status.size,
     )
+    return dict(zip(ROWS, numbers, strict=True))
 
 
 def gap_text(gap: Gap, plan: Plan) -> str:
-    """When a path leaves the feasible region, by how much, and which cables stand against it."""
+    """Time, shortfall and limiting cables of a part of a path outside the feasible region."""
     assert plan.path is not None
     first, last = (f"{plan.path.time[k]:g} s" for k in (gap.first, gap.last))
     when = f"from {first} to {last}" if gap.last > gap.first else f"at {first}"
@@ -163,13 +139,13 @@ def gap_text(gap: Gap, plan: Plan) -> str:
     return f"{when}: {short}; limits of {cables}"
 
 
-def tell(runs: Sequence[Run], files: Sequence[FilePath], folder: FilePath, *, as_json: bool) -> int:
-    """Print the numbers and what went wrong; returns the exit code."""
+def tell(runs: Sequence[Run], output: Output, *, as_json: bool) -> int:
+    """Print the summary and where the paths cannot be followed; returns the exit code."""
     if as_json:
-        show_json({"runs": [_record(run) for run in runs], "files": list(files)})
+        show_json({"runs": [_record(run) for run in runs], "files": output.files})
     else:
         show_table(summary_grid(runs))
-        show(f"In {folder.resolve()}: {listed(files)}", whole=True)
+        output.show()
     return max((_complaints(run) for run in runs), default=0)
 
 
@@ -179,15 +155,13 @@ def summary_grid(runs: Sequence[Run]) -> Grid:
     for run in runs:
         name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)
         heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}")
-    numbers: list[Summary] = [summary(run) for run in runs]
-    rows = [
-        [label, *(written(getattr(column, field), form) for column in numbers)] for field, (label, form) in ROWS.items()
-    ]
+    numbers = [summary(run) for run in runs]
+    rows = [[label, *(written(column[field], form) for column in numbers)] for field, (label, form) in ROWS.items()]
     return Grid(heads, rows)
 
 
 def _complaints(run: Run) -> int:
-    """Say where the path cannot be followed; the exit code of this run."""
+    """Print where the path cannot be followed; returns the exit code of this run."""
     name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
     for gap in gaps[:MOST_GAPS]:
         note(f"{name}: ", f"the path leaves the feasible region {gap_text(gap, plan)}", style="bold red")
@@ -211,7 +185,7 @@ def _record(run: Run) -> dict[str, Any]:
         "tension": type(plan.tension).__name__,
         "tension_variable": plan.tension.variable,
         "poses": plan.status.size,
-        **summary(run)._asdict(),
+        **summary(run),
         "poses_not_stable": run.lost,
         "gaps": [
             {
@@ -229,12 +203,3 @@ def _record(run: Run) -> dict[str, Any]:
 def _range(values: Array) -> tuple[float, float]:
     finite = values[~np.isnan(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
-
-
-def write_plans(runs: Sequence[Run], folder: FilePath) -> list[FilePath]:
-    """Save the plan of each run; returns the files."""
-    create_folder(folder)
-    files = [folder / f"{run.name}.nc" for run in runs]
-    for run, file in zip(runs, files, strict=True):
-        run.plan.save(file)
-    return files

@@ -6,12 +6,10 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, SHARING, VERDICTS
-from sagline.cli.options import JsonOption
-from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.options import JsonOption, argument, option
+from sagline.cli.output import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import counted
@@ -31,32 +29,17 @@ ENDS = {
 
 
 def sweep(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SWEEP.yaml", help="Robots, poses, wrenches and what is asked of each.", show_default=False
-        ),
-    ],
+    file: Annotated[Path, argument("SWEEP.yaml", "Robots, poses, wrenches and what is asked of each.")],
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            help="Folder of the sweep; one that holds a part of it is taken up. Default: SWEEP in output.",
-            show_default=False,
+        option(
+            "DIR", "Folder of the sweep; one that holds a part of it is taken up. Default: SWEEP in output.", "--out"
         ),
     ] = None,
-    workers: Annotated[
-        str | None,
-        typer.Option(metavar="COUNT", help="Processes of this machine. Default: one a processor.", show_default=False),
-    ] = None,
+    workers: Annotated[str | None, option("COUNT", "Processes of this machine. Default: one a processor.")] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(
-            metavar="tcp://HOST:PORT",
-            help="Use the workers of this Dask scheduler instead. All of them must see the folder.",
-            show_default=False,
-        ),
+        option("tcp://HOST:PORT", "Use the workers of this Dask scheduler instead. All of them must see the folder."),
     ] = None,
     as_json: JsonOption = False,
 ) -> int:

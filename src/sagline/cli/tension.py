@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import typer
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
@@ -21,13 +20,12 @@ from sagline.cli.options import (
     Variable,
     VariableOption,
     WrenchOption,
+    figures_flag,
 )
-from sagline.cli.results import figure_files, write_figures
-from sagline.cli.tables import Grid, show_table
+from sagline.cli.output import Grid, Output, show_table
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.files.writing import check_files, create_folder
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
@@ -47,7 +45,7 @@ def tension(
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the polygon, as PNG and SVG.")] = True,
+    figures: Annotated[bool, figures_flag("Draw the polygon, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
     """Share the load of one pose in nine ways, and draw the polygon of feasible tensions with all of them in it.
@@ -60,9 +58,8 @@ def tension(
         sagline tension article-mixed --pose 1,0.5,2.5
         sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
-    from sagline.cli.values import loaded, middle_of
+    from sagline.cli.values import middle_of, robot_with
     from sagline.files.pose_text import pose_of, wrench_of
-    from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.polygon import tension_polygon
@@ -70,12 +67,10 @@ def tension(
     from sagline.tension.methods import METHODS, MinimumNorm
 
     load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
-    robot = loaded(load_robot(name), payload)
+    robot = robot_with(name, payload)
     place = middle_of(robot) if place is None else place
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
-    name_of_figure = file_stem(robot.name, "tension")
-    if drawn:
-        check_files(folder, figure_files([name_of_figure]))
+    output = Output(folder, (), [file_stem(robot.name, "tension")] * drawn)
     with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
         least = inverse(robot, place, model.build(), MinimumNorm(variable.value), load)  # refuses what none can share
         plans = {
@@ -91,27 +86,24 @@ def tension(
     if not any(plan is not None and plan.feasible for plan in plans.values()):
         note("No tensions: ", reason, style="bold red")
         return OUTSIDE
-    files: list[Path] = []
     if shape is not None:
-        create_folder(folder)
         from sagline import plot
 
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
-        files = write_figures({name_of_figure: plot.polygon(shape, points)}, folder)
+        output.draw(plot.polygon(shape, points))
     if as_json:
-        show_json(
-            {"capacity_margin": margin, "tensions": {k: _record(plan) for k, plan in plans.items()}, "files": files}
-        )
+        tensions = {title: _record(plan) for title, plan in plans.items()}
+        show_json({"capacity_margin": margin, "tensions": tensions, "files": output.files})
         return 0
     show_table(_grid(robot, plans))
     show(f"Extra force in the worst direction before no tensions balance it: {n(margin, unit='N')}")
-    if files:
-        show(f"In {folder.resolve()}: {', '.join(file.name for file in files)}", whole=True)
+    if output.files:
+        show(f"In {folder.resolve()}: {', '.join(file.name for file in output.files)}", whole=True)
     return 0
 
 
 def _plan(robot: Robot, pose: Pose, model: Model, method: TensionMethod, wrench: Array | None) -> Plan | None:
-    """None where the method cannot share among the robot's cables."""
+    """The plan of a method; None if the method is not defined for the robot."""
     from sagline.kinematics.inverse import inverse
 
     try:

@@ -1,4 +1,4 @@
-"""What the commands say: results on stdout, everything else on stderr, nothing that a terminal would obey."""
+"""Output of the commands: results on stdout, all else on stderr, without control characters for the terminal."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagline.core.numbers import SPACE
 from sagline.files.writing import json_text
 
 if TYPE_CHECKING:
-    from sagline.cli.line import Line
+    from sagline.cli.progress import ProgressLine
 
 FREE = 1 << 16  # columns of a file or a pipe
 
@@ -29,23 +29,23 @@ _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 @contextmanager
-def working(what: str, *needed: str) -> Iterator[Line]:
-    """Say what is being done while it is done, where a person watches; and what is compiled, whoever watches.
+def working(what: str, *needed: str) -> Iterator[ProgressLine]:
+    """Show a piece of work while it is done, on a terminal, and in any case what is compiled for it.
 
     Args:
-        what: What is being done.
-        needed: Entries of the kernels (`sagline.cli.entries`) that it needs: compiled before it begins.
+        what: The work.
+        needed: Entries of the kernels (`sagline.cli.entries`), which are compiled before it begins.
     """
-    from sagline.cli.line import shown
+    from sagline.cli.progress import progress_line
 
-    with shown(_err, what) as line:
+    with progress_line(_err, what) as line:
         line.compile(needed)
         yield line
 
 
 @contextmanager
 def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None]]:
-    """The same for parts that have names: how many of how many are done, and which one comes next."""
+    """The same for parts with names; yields a function of the number done, their total and the name of the next."""
     with working(what, *needed) as line:
 
         def tell(done: int, total: int, name: str) -> None:
@@ -57,7 +57,7 @@ def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None
 
 @contextmanager
 def notices() -> Iterator[None]:
-    """While inside, what sagline warns of is a note on stderr."""
+    """Print the warnings of sagline as notes on stderr while inside."""
     with warnings.catch_warnings():
         others = warnings.showwarning
 
@@ -80,19 +80,19 @@ def notices() -> Iterator[None]:
 
 
 def note(head: str, text: str, style: str = "") -> None:
-    """One line beside the result, on stderr; paths in it are not broken into lines."""
+    """Print one line on stderr; paths in it are not broken into lines."""
     with suppress(OSError):  # where nobody can be told, nothing is said
         _err.print(Text.assemble((printable(head), style), printable(text).replace(SPACE, " ")), soft_wrap=True)
 
 
 def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
-    """Part of the result, for a person; its lines are broken between words where the terminal ends.
+    """Print a part of the result for a person; lines are broken between words at the width of the terminal.
 
     Args:
         what: The text.
         indent: Columns before each line.
         style: Of rich.
-        whole: Whether its line stays one, so that paths and commands in it can be copied.
+        whole: Whether it stays one line, so that paths and commands in it can be copied.
     """
     if whole:
         _emit(Text(printable(what), style))
@@ -102,10 +102,10 @@ def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) ->
 
 
 def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
-    """Parts of the result that fit the terminal; outside a terminal the width is free.
+    """Print parts of the result that are made for the width of the terminal; elsewhere the width is free.
 
     Args:
-        pieces: Gives, for a console and its width, what to print and how many columns that needs at the least.
+        pieces: Function of a console and its width; gives what to print, each with the least number of columns.
     """
     console = _out if _out.is_terminal else _wide
     for piece, least in pieces(console, console.width):
@@ -113,12 +113,12 @@ def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, 
 
 
 def show_json(what: Any) -> None:
-    """The result, for a program: one JSON document; null stands for what is not finite."""
+    """Print the result for a program: one JSON document; null stands for what is not finite."""
     _write("".join(c if _fits(c) else json.dumps(c)[1:-1] for c in json_text(what)) + "\n")
 
 
 def show_data(text: str) -> None:
-    """A file on stdout: in UTF-8 to the letter, but for a terminal, which gets nothing that it would obey."""
+    """Print the text of a file: in UTF-8 unchanged, but without control characters on a terminal."""
     if sys.stdout is None or sys.stdout.isatty():
         _write(printable(text, "\n\t"))
         return
@@ -129,7 +129,7 @@ def show_data(text: str) -> None:
 
 
 def _fits(character: str) -> bool:
-    """Whether a character of a JSON text may go out as it is."""
+    """True if stdout can encode a character."""
     try:
         character.encode(_encoding())
     except UnicodeEncodeError:
@@ -146,7 +146,7 @@ def _emit(what: RenderableType, width: int | None = None) -> None:
 
 
 def _write(text: str) -> None:
-    """The one way to stdout."""
+    """Write to stdout; all output goes through here or `show_data`."""
     with _refused():
         sys.stdout.write(text.encode(_encoding(), "backslashreplace").decode(_encoding()))
         sys.stdout.flush()
@@ -154,10 +154,10 @@ def _write(text: str) -> None:
 
 @contextmanager
 def _refused() -> Iterator[None]:
-    """Turn what the system says of stdout into an error.
+    """Turn errors of the system on stdout into one of ours.
 
     Raises:
-        FileError: If it is closed or full; not if nobody reads it any more, which is no error.
+        FileError: If it is closed or full; a pipe without reader stays a BrokenPipeError.
     """
     try:
         if sys.stdout is None:
@@ -170,7 +170,7 @@ def _refused() -> Iterator[None]:
 
 
 def unwritable(error: OSError) -> FileError:
-    """What to say where stdout takes nothing."""
+    """The error of a stdout that cannot be written."""
     reason = "it is closed" if error.errno == errno.EBADF else error.strerror or error
     return FileError(
         "standard output", f"cannot be written ({reason})", "Give it a file with space, a pipe or a terminal."

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import typer
 
 from sagline.cli.entries import FORWARD, needed_for
 from sagline.cli.lengths import plan_text
@@ -22,11 +21,14 @@ from sagline.cli.options import (
     Variable,
     VariableOption,
     WrenchOption,
+    argument,
+    figures_flag,
+    flag,
 )
-from sagline.cli.results import figure_files, write_figures
+from sagline.cli.output import Output
 from sagline.cli.terminal import working
 from sagline.core.errors import FileError
-from sagline.files.writing import check_files, write_text
+from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,12 +45,7 @@ FIGURES = ("path", "velocity", "cables", "error")
 def track(
     robot: RobotArgument,
     path: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="PATH",
-            help="Waypoints in .yaml, or time and pose in .csv. Default: the article's path.",
-            show_default=False,
-        ),
+        Path | None, argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: the article's path.")
     ] = None,
     model: ModelOption = Model.CATENARY,
     tension: TensionOption = Tension.CLOSEST,
@@ -56,9 +53,9 @@ def track(
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw figures, as PNG and SVG.")] = True,
+    figures: Annotated[bool, figures_flag("Draw figures, as PNG and SVG.")] = True,
     table: Annotated[
-        bool, typer.Option("--csv", help="Write the plan as DIR/ROBOT-MODEL.csv too: poses, lengths, tensions.")
+        bool, flag("Write the plan as DIR/ROBOT-MODEL.csv too: poses, lengths, tensions.", "--csv")
     ] = False,
     as_json: JsonOption = False,
 ) -> int:
@@ -73,33 +70,31 @@ def track(
         sagline track own_robot.yaml own_path.yaml --model empirical --out results
         sagline track cogiro own_samples.csv --payload 20 --csv
     """
-    from sagline.cli.study import run_along, run_name, tell, write_plans
-    from sagline.cli.values import loaded
+    from sagline.cli.study import run_along, run_name, tell
+    from sagline.cli.values import robot_with
     from sagline.files.path_file import load_path
     from sagline.files.pose_text import wrench_of
-    from sagline.files.robot_file import load_robot
     from sagline.motion.rest_to_rest import article_path
 
     load = wrench_of(wrench)
-    machine = loaded(load_robot(robot), payload)
+    machine = robot_with(robot, payload)
     way = article_path() if path is None else load_path(path)
     if path is not None:
         check_unit(path, way, machine)
     cable = model.build()
     name = run_name(machine, cable)
-    drawn = [f"{name}-{figure}" for figure in FIGURES] if figures else []
-    check_files(folder, [f"{name}.nc", *[f"{name}.csv"] * table, *figure_files(drawn)])
+    drawn = [f"{name}-{figure}" for figure in FIGURES if figures]
+    output = Output(folder, [f"{name}.nc", *[f"{name}.csv"] * table], drawn)
     shared = tension.build(variable)
     with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(shared), FORWARD) as line:
         run = run_along(machine, way, cable, shared, line, load)
     with working("writing"):
-        files = write_plans([run], folder)
+        run.plan.save(output.file(f"{name}.nc"))
         if table:
-            files.append(folder / f"{name}.csv")
-            write_text(files[-1], plan_text(run.plan))
+            write_text(output.file(f"{name}.csv"), plan_text(run.plan))
         if figures:
-            files += write_figures(dict(zip(drawn, _figures(run), strict=True)), folder)
-    return tell([run], files, folder, as_json=as_json)
+            output.draw(*_figures(run))
+    return tell([run], output, as_json=as_json)
 
 
 def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:

@@ -9,10 +9,8 @@ from pathlib import Path
 from socket import gethostname
 from typing import TYPE_CHECKING, Annotated, Final
 
-import typer
-
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
-from sagline.cli.options import RobotArgument
+from sagline.cli.options import ModbusOption, RobotArgument, SeedOption, option
 from sagline.cli.terminal import note, show, working
 
 if TYPE_CHECKING:
@@ -38,35 +36,26 @@ STATUS: Final = {  # the first that holds, by the names of `GroupStatus`
 def twin(
     name: RobotArgument,
     true: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ROBOT",
-            help="The robot as it really is, where that is another one; the PLCs still know ROBOT.",
-            show_default=False,
-        ),
+        str | None, option("ROBOT", "The robot as it really is, where that is another one; the PLCs still know ROBOT.")
     ] = None,
     port: Annotated[
-        str, typer.Option(metavar="NUMBER", help="Of the first group, the others follow; 0 takes any that are free.")
+        str, option("NUMBER", "Of the first group, the others follow; 0 takes any that are free.")
     ] = "11021",
     host: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Address to listen on; 0.0.0.0 is every one of this machine.")
+        str, option("ADDRESS", "Address to listen on; 0.0.0.0 is every one of this machine.")
     ] = "127.0.0.1",
-    modbus: Annotated[bool, typer.Option("--modbus", help="Speak Modbus TCP instead of S7.")] = False,
-    seed: Annotated[str, typer.Option(metavar="NUMBER", help="Of the load cells' noise.")] = "0",
+    modbus: ModbusOption = False,
+    seed: SeedOption = "0",
     faults: Annotated[
         list[str] | None,
-        typer.Option(
-            "--fault",
-            metavar="TEXT",
-            help="What goes wrong, and when: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; "
+        option(
+            "TEXT",
+            "What goes wrong, and when: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; "
             "parts count from 0. May be given again.",
-            show_default=False,
+            "--fault",
         ),
     ] = None,
-    log: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE.mcap", help="Write where the platform truly is, until Ctrl-C.", show_default=False),
-    ] = None,
+    log: Annotated[Path | None, option("FILE.mcap", "Write where the platform truly is, until Ctrl-C.")] = None,
 ) -> int:
     """Be the machine: plant, drives and PLCs of a robot, in real time, until Ctrl-C.
 
@@ -124,14 +113,10 @@ def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
 
 
 class Watch:
-    """Tells what the PLCs do, and writes where the platform is."""
+    """Prints changes of the PLCs and records the motion of the platform."""
 
     def __init__(self, machine: Machine) -> None:
-        """Begin with what is.
-
-        Args:
-            machine: Which.
-        """
+        """Watch a machine from its present state."""
         self.recorder: Recorder | None = None
         self._stopped = ""
         self._machine = machine
@@ -139,12 +124,7 @@ class Watch:
         self._next = 0.0
 
     def __call__(self, time: float, reading: Reading) -> None:
-        """Look at the machine after a scan.
-
-        Args:
-            time: On its clock [s].
-            reading: What is true.
-        """
+        """Record the true state after a scan at a time [s], and print what has changed."""
         if self.recorder is not None:
             self.recorder.truth(time, reading.position.copy(), reading.quaternion.copy())
         if time >= self._next:
@@ -167,7 +147,7 @@ class Watch:
 
 
 def _doing(report: Report) -> str:
-    """What a PLC does, in a few words."""
+    """State of a PLC, in a few words."""
     from sagline.control.link import GroupStatus, fault_text
 
     state = next((words for name, words in STATUS.items() if report.status & GroupStatus[name]), "not ready")

@@ -1,24 +1,33 @@
-"""Numbers as the command line gives them."""
+"""Numbers, loads and boxes of the command line: "20 kg", "2 %", "±100 N, ±20 N m", "-2..2, -1..1, 1..3 m"."""
 
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
+from sagline.files.pose_text import FARTHEST, wrench_of
 from sagline.files.quantity import in_si
 from sagline.robot.inertia import with_mass
-from sagline.robot.pose import Pose
+from sagline.robot.pose import Pose, PoseBox
 
 if TYPE_CHECKING:
     from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.robot.robot import Robot
+    from sagline.workspaces.wrench_sets import WrenchSet
 
 LAST_PORT = 65535
 HEAVIEST = 1e12  # kg: beyond all machines, far below what overflows
+
+_KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # of loads, and their units
+_SIGN: Final = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
+_SPAN: Final = re.compile(r"(.*?)(?:\.\.|\bto\b)(.*)", re.DOTALL)
+_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # and no exponent
+_STEP: Final = "Give forces, moments and accelerations with units: --wrench '±100 N, ±20 N m'."
+_LONGEST: Final = 200  # letters of either
 
 
 def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
@@ -108,16 +117,99 @@ def middle_of(robot: Robot) -> Pose:
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
 
 
-def loaded(robot: Robot, payload: str | None) -> Robot:
-    """A robot whose platform carries a mass besides its own; the inertia grows in proportion.
-
-    Args:
-        robot: The robot.
-        payload: Such as "20" or "20 kg"; None for nothing.
+def robot_with(name: str, payload: str | None) -> Robot:
+    """A robot by its name or file, whose platform carries a payload; its inertia grows in proportion.
 
     Raises:
-        InvalidValueError: If it is no mass.
+        InvalidValueError: If the payload is no mass.
     """
+    from sagline.files.robot_file import load_robot
+
+    robot = load_robot(name)
     if payload is None:
         return robot
     return with_mass(robot, robot.mass + quantity(payload, "--payload", "kg", low=0.0))
+
+
+def wrenches_of(text: str | None) -> WrenchSet | None:
+    """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]"; None for none.
+
+    One number of a kind counts along all axes, three along x, y and z.
+
+    Args:
+        text: Of `--wrench`.
+
+    Raises:
+        InvalidValueError: If it is none of these.
+    """
+    if text is None:
+        return None
+    from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope
+
+    if len(text) > _LONGEST or not _SIGN.match(text):
+        if "±" in text or len(text) > _LONGEST:
+            raise InvalidValueError("--wrench", repr(text), "each with ±, or none", _STEP)
+        one = wrench_of(text)
+        return WrenchPolytope([one if one is not None else np.zeros(6)])
+    found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
+    for part in text.split(","):
+        kind, size = _load_of(part)
+        found[kind].append(size)
+    for kind, sizes in found.items():
+        most = (0, 1, 3) if kind in ("force", "moment") else (0, 1)
+        if len(sizes) not in most:
+            allowed = f"{' or '.join(map(str, most[1:]))} of the unit {_KINDS[kind]}"
+            raise InvalidValueError("--wrench", f"{text!r} with {len(sizes)}", allowed, _STEP)
+    box = {kind: found[kind] if len(found[kind]) > 1 else sum(found[kind]) for kind in ("force", "moment")}
+    whole: WrenchSet = WrenchBox(box["force"], box["moment"])
+    if found["linear"] or found["angular"]:
+        whole = whole + Accelerations(sum(found["linear"]), sum(found["angular"]))
+    return whole
+
+
+def _load_of(part: str) -> tuple[str, float]:
+    """The kind of a load, and its size in SI."""
+    sign = _SIGN.match(part)
+    if sign is not None and _UNIT.search(part) is not None:
+        for kind, unit in _KINDS.items():
+            try:
+                size = in_si(part[sign.end() :], unit, "--wrench")
+            except InvalidValueError:
+                continue
+            if isinstance(size, float) and 0.0 <= size < np.inf:
+                return kind, size
+    units = ", ".join(_KINDS.values())
+    raise InvalidValueError("--wrench", repr(part.strip()), f"± and a number with one of the units {units}", _STEP)
+
+
+def box_of(text: str, item: str, tilt: float = 0.0) -> PoseBox:
+    """A box of positions from "-2..2, -1..1, 1..3 m"; one number stands for a plane.
+
+    Args:
+        text: The text.
+        item: What it is, for messages.
+        tilt: How far the platform is tilted there [rad].
+
+    Raises:
+        InvalidValueError: If it is none.
+    """
+    step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
+    parts = text.replace("−", "-").split(",")
+    if len(parts) != 3 or len(text) > _LONGEST:
+        raise InvalidValueError(item, repr(text), "three spans between commas", step)
+    unit = _UNIT.search(_ends_of(parts[2])[1])
+    ends = []
+    for part in parts:
+        own = _ends_of(part)
+        last = _UNIT.search(own[1]) or unit
+        shared = " m" if last is None else f" {last[0]}"
+        ends.append([quantity(end if _UNIT.search(end) else end + shared, item, "m") for end in own])
+    low, high = np.array(ends).T
+    if (low > high).any() or np.abs(ends).max() > FARTHEST:
+        raise InvalidValueError(item, repr(text), f"from low to high, up to {FARTHEST:g} m", step)
+    return PoseBox(low, high, tilt)
+
+
+def _ends_of(part: str) -> tuple[str, str]:
+    span = _SPAN.fullmatch(part.strip())
+    return (span[1].strip(), span[2].strip()) if span else (part.strip(), part.strip())

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
+from enum import StrEnum
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import typer
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import ANSWERS, INVERSE, MODES, VIBRATION
 from sagline.cli.options import (
     AirDampingOption,
-    Direction,
     JsonOption,
     LossTimeOption,
     OutOption,
@@ -20,21 +22,42 @@ from sagline.cli.options import (
     PoseOption,
     RobotArgument,
     WrenchOption,
+    choice,
+    figures_flag,
+    option,
 )
-from sagline.cli.results import figure_files, listed, write_figures
-from sagline.cli.tables import Grid, csv_text, show_table, written
+from sagline.cli.output import Grid, Output, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
-from sagline.files.writing import check_files, create_folder, write_text
+from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
+    from sagline.dynamics.vibration.dynamic_stiffness import Damping
+    from sagline.dynamics.vibration.frequency_map import FrequencyMap
     from sagline.dynamics.vibration.mode_list import ListedMode
     from sagline.dynamics.vibration.vibration import Vibration
     from sagline.robot.equilibrium import Equilibrium
+    from sagline.robot.pose import Pose
+    from sagline.robot.robot import Robot
+
+
+class Direction(StrEnum):
+    """Along which axis a force acts, or about which a moment."""
+
+    X = "x"
+    Y = "y"
+    Z = "z"
+    ABOUT_X = "about x"
+    ABOUT_Y = "about y"
+    ABOUT_Z = "about z"
+
 
 LEAST_SHARE = 0.05  # of the platform in a mode that is shown; the file has them all
+HEADER = ("mode", "kind", "frequency [Hz]", "platform_share", "cable", "cable_share", "damping_ratio")
 LOWEST = 3  # modes that are shown whatever swings
-FRAME_TIME = 0.08  # s, of a film
+POINTS = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")
+MOST_POSES = 1_000_000  # of a map
+FIGURES = ("frequency", "peak")  # of a map
 
 
 def vibrate(
@@ -42,30 +65,24 @@ def vibrate(
     pose: PoseOption = None,
     grid: Annotated[
         str | None,
-        typer.Option(
+        option(
+            "NXxNYxNZ",
+            "Lowest frequency and strongest answer at so many poses all over the test box, instead of one pose.",
             "--map",
-            metavar="NXxNYxNZ",
-            help="Lowest frequency and strongest answer at so many poses all over the test box, instead of one pose.",
-            show_default=False,
         ),
     ] = None,
-    up_to: Annotated[str, typer.Option(metavar="HZ", help="Frequency below which all modes are found.")] = "20",
+    up_to: Annotated[str, option("HZ", "Frequency below which all modes are found.")] = "20",
     damping: Annotated[
-        str, typer.Option(metavar="RATIO", help="Damping ratio of every mode, 0.01 or '1 %', besides the cables'.")
+        str, option("RATIO", "Damping ratio of every mode, 0.01 or '1 %', besides the cables'.")
     ] = "0.01",
     loss_time: LossTimeOption = "0",
     air_damping: AirDampingOption = "0",
-    force: Annotated[
-        Direction,
-        typer.Option(metavar="AXIS", help=f"Of the response figure: {', '.join(each.value for each in Direction)}."),
-    ] = Direction.X,
-    film: Annotated[
-        int | None, typer.Option(metavar="MODE", help="Film this mode, ten seconds of it, as GIF.", show_default=False)
-    ] = None,
+    force: Annotated[Direction, choice("AXIS", "Of the response figure", Direction)] = Direction.X,
+    film: Annotated[int | None, option("MODE", "Film this mode, ten seconds of it, as GIF.")] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, typer.Option("--figures/--no-figures", help="Draw the response, as PNG and SVG.")] = True,
+    figures: Annotated[bool, figures_flag("Draw the response, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
     """Find all natural frequencies of a pose: of the platform, and of the strings that its cables are.
@@ -80,12 +97,10 @@ def vibrate(
         sagline vibrate article-suspended --damping "2 %" --force z --film 1
         sagline vibrate cogiro --map 8x6x4 --out maps
     """
-    from sagline.cli.maps import counts_of, vibrate_all_over
-    from sagline.cli.values import damping_of, loaded, middle_of, quantity
+    from sagline.cli.values import damping_of, middle_of, quantity, robot_with
     from sagline.dynamics.vibration.mode_list import listed_modes
     from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
     from sagline.files.pose_text import pose_of, wrench_of
-    from sagline.files.robot_file import load_robot
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.status import PoseStatus
@@ -93,14 +108,16 @@ def vibrate(
     limit = quantity(up_to, "--up-to", "Hz", above=0.0)
     losses = damping_of(loss_time, air_damping, damping)
     load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
-    counts = None if grid is None else counts_of(grid)
-    robot = loaded(load_robot(name), payload)
-    if counts is not None:
-        _check_alone(pose=pose, film=film, wrench=wrench)
-        return vibrate_all_over(robot, counts, limit, losses, folder, figures=figures, as_json=as_json)
+    points = None if grid is None else _points_of(grid)
+    robot = robot_with(name, payload)
+    if points is not None:
+        for item, value in (("--pose", pose), ("--film", film), ("--wrench", wrench)):
+            if value is not None:
+                raise InvalidValueError(item, "given with --map", "one of both", "A map is of the whole test box.")
+        return _vibrate_in_box(robot, points, limit, losses, folder, figures=figures, as_json=as_json)
     table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
-    check_files(folder, [f"{table}.csv", *figure_files([drawing] * figures), *[reel] * (film is not None)])
+    output = Output(folder, [f"{table}.csv", *[reel] * (film is not None)], [drawing] * figures)
     place = middle_of(robot) if place is None else place
     with working(f"{robot.name}: modes up to {limit:g} Hz", INVERSE, VIBRATION, MODES, *[ANSWERS] * figures) as line:
         plan = inverse(robot, place, wrench=load)
@@ -113,34 +130,26 @@ def vibrate(
             return OUTSIDE
         modes = listed_modes(found)
         _check_film(film, modes)
-        create_folder(folder)
-        files = [folder / f"{table}.csv"]
-        write_text(files[0], csv_text(_rows(modes)))
+        rows = [["" if value is None else value for value in _numbers(mode).values()] for mode in modes]
+        write_text(output.file(f"{table}.csv"), csv_text([HEADER, *rows]))
         if figures and found.status is VibrationStatus.SOLVED and found.frequency.size:
             from sagline import plot
 
             line.stage("drawing the response")
-            files += write_figures({drawing: plot.response(found, force.value)}, folder)
+            output.draw(plot.response(found, force.value))
         if film is not None:
             from sagline import plot
 
-            files.append(folder / reel)
-            plot.film(found, film, files[-1], progress=line.stage(f"filming mode {film}"))
+            plot.film(found, film, output.file(reel), progress=line.stage(f"filming mode {film}"))
     if as_json:
-        show_json({**_record(found, modes), "files": files})
+        show_json({**_record(found, modes), "files": output.files})
     else:
         _tell(found, modes, plan.state)
-        show(f"In {folder.resolve()}: {listed(files)}", whole=True)
+        output.show()
     if found.status is VibrationStatus.FOLDED:
         slack = ", ".join(map(str, found.slack_cables))
         note(f"Cables {slack}: ", found.status.text, style="bold")
     return 0
-
-
-def _check_alone(**others: object) -> None:
-    for item, value in others.items():
-        if value is not None:
-            raise InvalidValueError(f"--{item}", "given with --map", "one of both", "A map is of the whole test box.")
 
 
 def _check_film(film: int | None, modes: list[ListedMode]) -> None:
@@ -210,23 +219,16 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
         show("A massless frequency stands beside the mode that has the largest part of its motion.")
 
 
-def _rows(modes: list[ListedMode]) -> list[list[Any]]:
-    header = ["mode", "kind", "frequency [Hz]", "platform_share", "cable", "cable_share", "damping_ratio"]
-    return [
-        header,
-        *(
-            [
-                mode.number,
-                mode.kind,
-                mode.frequency,
-                mode.platform_share,
-                "" if mode.cable is None else mode.cable,
-                mode.cable_share,
-                mode.loss,
-            ]
-            for mode in modes
-        ),
-    ]
+def _numbers(mode: ListedMode) -> dict[str, Any]:
+    return {
+        "mode": mode.number,
+        "kind": mode.kind,
+        "frequency_hz": mode.frequency,
+        "platform_share": mode.platform_share,
+        "cable": mode.cable,
+        "cable_share": mode.cable_share,
+        "damping_ratio": mode.loss,
+    }
 
 
 def _record(found: Vibration, modes: list[ListedMode]) -> dict[str, Any]:
@@ -236,16 +238,92 @@ def _record(found: Vibration, modes: list[ListedMode]) -> dict[str, Any]:
         "up_to_hz": found.up_to,
         "status": found.status.name,
         "complete": found.complete,
-        "modes": [
-            {
-                "mode": mode.number,
-                "kind": mode.kind,
-                "frequency_hz": mode.frequency,
-                "platform_share": mode.platform_share,
-                "cable": mode.cable,
-                "cable_share": mode.cable_share,
-                "damping_ratio": mode.loss if np.isfinite(mode.loss) else None,
-            }
-            for mode in modes
-        ],
+        "modes": [_numbers(mode) for mode in modes],
+    }
+
+
+def _points_of(text: str) -> tuple[int, ...]:
+    """Numbers of points along x, y and z, from "20x15x8"."""
+    found = POINTS.fullmatch(text.strip())
+    points = tuple(map(int, found.groups())) if found else (0,)
+    if not 0 < prod(points) <= MOST_POSES:
+        step = "Give the points along x, y and z: --map 20x15x8."
+        raise InvalidValueError("--map", repr(text), f"NXxNYxNZ, 1 to {MOST_POSES:,} poses", step)
+    return points
+
+
+def _vibrate_in_box(
+    robot: Robot, points: Sequence[int], limit: float, damping: Damping, folder: Path, *, figures: bool, as_json: bool
+) -> int:
+    """Compute the map over the test box, write and draw it; returns the exit code."""
+    from sagline.dynamics.vibration.frequency_map import frequency_map
+    from sagline.files.writing import file_stem
+
+    poses = _grid(robot, points)
+    name = file_stem(robot.name, "vibration-map")
+    output = Output(folder, [f"{name}.nc"], [f"{name}-{figure}" for figure in FIGURES if figures])
+    what = f"{robot.name}: modes at {len(poses):,} poses"
+    with working(what, INVERSE, VIBRATION, MODES) as line:
+        found = frequency_map(robot, poses, up_to=limit, damping=damping, progress=line.progress)
+        found.save(output.file(f"{name}.nc"))
+        if figures:
+            from sagline import plot
+
+            line.stage("drawing")
+            output.draw(*(plot.frequency_map(found, figure) for figure in FIGURES))
+    known = np.isfinite(found.frequency)
+    if as_json:
+        show_json({**_record_of_map(found), "files": output.files})
+    else:
+        if known.any():
+            show_table(_table_of_map(found))
+        show(f"{int(known.sum()):,} of {known.size:,} poses have modes below {limit:g} Hz.")
+        output.show()
+    if known.any():
+        return 0
+    note("No modes: ", "no pose of the box is held with a mode below --up-to; raise it", style="bold red")
+    return OUTSIDE
+
+
+def _grid(robot: Robot, points: Sequence[int]) -> Pose:
+    """Level poses evenly over the test box, its middle where there is one point."""
+    from sagline.robot.pose import Pose
+
+    box = robot.test_box
+    if box is None:
+        raise InvalidValueError("--map", "of a robot that names no box of poses", "one with a test_box", "Add it.")
+    axes = [
+        np.linspace(low, high, count) if count > 1 else np.array([0.5 * (low + high)])
+        for low, high, count in zip(box.low, box.high, points, strict=True)
+    ]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return Pose.from_euler(places, 0.0, 0.0, 0.0)
+
+
+def _table_of_map(found: FrequencyMap) -> Grid:
+    """Least and greatest of each, and where."""
+    rows = []
+    for label, values, form in (
+        ("lowest, with cable mass [Hz]", found.frequency, ".3f"),
+        ("lowest, massless [Hz]", found.massless_frequency, ".3f"),
+        ("strongest answer [mm/N]", 1e3 * found.peak, ".3g"),
+    ):
+        first, last = int(np.nanargmin(values)), int(np.nanargmax(values))
+        rows.append([label, *(text for k in (first, last) for text in (written(values[k], form), _place(found, k)))])
+    return Grid(["", "least", "at x, y, z [m]", "greatest", "at x, y, z [m]"], rows, found.robot.name)
+
+
+def _place(found: FrequencyMap, k: int) -> str:
+    return ", ".join(written(value, ".2f") for value in found.pose.position[k])
+
+
+def _record_of_map(found: FrequencyMap) -> dict[str, object]:
+    return {
+        "robot": found.robot.name,
+        "up_to_hz": found.up_to,
+        "position_m": found.pose.position.tolist(),
+        "frequency_with_cable_mass_hz": found.frequency.tolist(),
+        "frequency_massless_hz": found.massless_frequency.tolist(),
+        "strongest_answer_m_per_n": found.peak.tolist(),
+        "strongest_answer_at_hz": found.peak_frequency.tolist(),
     }

@@ -3,64 +3,66 @@
 from __future__ import annotations
 
 import re
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import typer
-
-from sagline.cli.options import PayloadOption, WrenchOption, robot_completions
-from sagline.core.errors import InvalidValueError
+from sagline.cli.entries import FORWARD
+from sagline.cli.options import PayloadOption, WrenchOption, argument, flag, option, robot_completions
+from sagline.cli.terminal import note, working
+from sagline.core.errors import FileError, InvalidValueError, SaglineError
 
 if TYPE_CHECKING:
-    from sagline.cli.hosting import Start
+    from sagline.cli.hosting import Address
     from sagline.robot.robot import Robot
+    from sagline.viewer.player import Beside, Played
+    from sagline.viewer.session import LogFollower, Session
+    from sagline.viewer.viewer import Viewer
+
+LOG: Final = ".mcap"
+LOOK: Final = 0.5  # s, between two looks at a file that grows
 
 
 def view(
     robot: Annotated[
         str,
-        typer.Argument(
-            metavar="ROBOT",
-            help="A preset (see sagline robots) or a robot file, robot.yaml; a log of the controller, run.mcap; or a "
+        argument(
+            "ROBOT",
+            "A preset (see sagline robots) or a robot file, robot.yaml; a log of the controller, run.mcap; or a "
             "calibration, found.nc.",
-            autocompletion=robot_completions,
+            robot_completions,
         ),
     ],
     run: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="RUN",
-            help="To play: a run of this robot, written by sagline track, a simulation, or a log of the controller; "
+        argument(
+            "RUN",
+            "To play: a run of this robot, written by sagline track, a simulation, or a log of the controller; "
             "or a calibration to show.",
         ),
     ] = None,
     beside: Annotated[
-        Path | None,
-        typer.Option(metavar="RUN", help="Another run of the same robot beside it, with the same clock, as a ghost."),
+        Path | None, option("RUN", "Another run of the same robot beside it, with the same clock, as a ghost.")
     ] = None,
-    live: Annotated[bool, typer.Option("--live", help="Follow a log that is still written.")] = False,
+    live: Annotated[bool, flag("Follow a log that is still written.", "--live")] = False,
     truth: Annotated[
-        Path | None,
-        typer.Option(metavar="TWIN.mcap", help="Beside a log: the twin's own, where the platform truly was."),
+        Path | None, option("TWIN.mcap", "Beside a log: the twin's own, where the platform truly was.")
     ] = None,
     pose: Annotated[
         str | None,
-        typer.Option(
-            metavar="X,Y,Z[,A,B,C]",
-            help="Where the platform is at first: position [m] and angles about z, y, x [degrees].",
-        ),
+        option("X,Y,Z[,A,B,C]", "Where the platform is at first: position [m] and angles about z, y, x [degrees]."),
     ] = None,
-    mode: Annotated[
-        str | None,
-        typer.Option(metavar="NUMBER", help="Natural mode that moves at first: 1, 2, ...; 'massless 1'."),
-    ] = None,
+    mode: Annotated[str | None, option("NUMBER", "Natural mode that moves at first: 1, 2, ...; 'massless 1'.")] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     host: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Address to listen on; 0.0.0.0 is every one, for others to look.")
+        str, option("ADDRESS", "Address to listen on; 0.0.0.0 is every one, for others to look.")
     ] = "127.0.0.1",
-    port: Annotated[str, typer.Option(metavar="NUMBER", help="Port to listen on; 0 takes any that is free.")] = "8080",
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open it in a browser here.")] = True,
+    port: Annotated[str, option("NUMBER", "Port to listen on; 0 takes any that is free.")] = "8080",
+    browser: Annotated[bool, flag("Open it in a browser here.", "--browser/--no-browser")] = True,
 ) -> int:
     """Look at a robot in the browser: drag its platform, and the cables follow.
 
@@ -78,14 +80,11 @@ def view(
         sagline view run.mcap --live
         sagline view run.mcap --truth twin.mcap
     """
-    from sagline.cli.hosting import Start
-    from sagline.cli.played import LOG
-    from sagline.cli.values import loaded, port_of
-    from sagline.cli.view_log import view_log
+    from sagline.cli.hosting import Address
+    from sagline.cli.values import port_of, robot_with
     from sagline.files.pose_text import pose_of, wrench_of
-    from sagline.files.robot_file import load_robot
 
-    number = port_of(port)
+    address = Address(host, port_of(port), browser)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
     if log is None and (live or truth is not None):
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
@@ -101,104 +100,186 @@ def view(
         step = "Give both: sagline view cogiro run_a.nc --beside run_b.nc"
         raise InvalidValueError("--beside", "given without a run", "two runs of one robot", step)
     if log is not None:
-        name = robot if log is run else None
-        return view_log(log, name, live, truth, host, number, browser=browser, beside=beside)
+        return view_log(log, robot if log is run else None, address, live=live, truth=truth, beside=beside)
     if found is not None:
-        return view_calibration(found, robot if found is run else None, host, number, browser=browser)
-    start = Start(None if pose is None else pose_of(pose), _mode(mode), wrench_of(wrench))
-    machine = loaded(load_robot(robot), payload)
+        return view_calibration(found, robot if found is run else None, address)
+    start = {"pose": None if pose is None else pose_of(pose), "mode": _mode(mode), "wrench": wrench_of(wrench)}
+    machine = robot_with(robot, payload)
     if run is not None:
-        return view_run(machine, run, host, number, browser=browser, beside=beside)
-    mass = None if payload is None else machine.mass
-    return serve(machine, robot, host, number, browser=browser, start=start, mass=mass)
+        return view_run(machine, run, address, beside)
+    return view_robot(machine, robot, address, None if payload is None else machine.mass, **start)
 
 
-def serve(
-    robot: Robot,
-    name: str | Path,
-    host: str,
-    port: int,
-    *,
-    browser: bool,
-    start: Start | None = None,
-    mass: float | None = None,
-) -> int:
+def view_robot(robot: Robot, name: str | Path, address: Address, mass: float | None = None, **start: Any) -> int:
     """Serve a robot until Ctrl-C; returns the exit code.
 
     Args:
         robot: The robot.
         name: Its name or file.
-        host: Address to listen on.
-        port: Port to listen on.
-        browser: Whether to open one here.
-        start: How it is shown at first; None for its home.
+        address: Where to listen.
         mass: Its mass with a payload [kg]; None for its own.
-
-    Raises:
-        SaglineError: If nothing can listen there.
+        start: Pose, mode and wrench at first, as the viewer takes them.
     """
-    from sagline.cli.hosting import check_viewer, hosted
+    from sagline.cli.hosting import check_viewer, serve
 
     check_viewer()
     from sagline.viewer.state_code import Source
 
-    return hosted(robot, None, host, port, browser=browser, start=start, source=Source.of_robot(name, mass))
+    return serve(robot, address, source=Source.of_robot(name, mass), **start)
 
 
-def view_run(robot: Robot, file: Path, host: str, port: int, *, browser: bool, beside: Path | None = None) -> int:
-    """Serve a run or a simulation of a robot until Ctrl-C; returns the exit code.
-
-    Args:
-        robot: Whose it should be.
-        file: The run or the simulation.
-        host: Address to listen on.
-        port: Port to listen on.
-        browser: Whether to open one here.
-        beside: What is played beside it; None for nothing.
-
-    Raises:
-        SaglineError: If the file cannot be read, or nothing can listen there.
-    """
-    from sagline.cli.hosting import check_viewer, hosted
-    from sagline.cli.played import played_beside, played_in
+def view_run(robot: Robot, file: Path, address: Address, beside: Path | None = None) -> int:
+    """Serve a run or a simulation of a robot, perhaps another one beside it, until Ctrl-C; returns the exit code."""
+    from sagline.cli.hosting import check_viewer, serve
     from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT
 
     check_viewer()
     from sagline.viewer.state_code import Source
 
-    course = played_in(robot, file)
-    other = None if beside is None else played_beside(course.robot, file, beside)
+    played = played_in(robot, file)
+    other = None if beside is None else played_beside(played.robot, file, beside)
     source = Source.of_simulation(file) if is_of(file, FORMAT) else Source.of_plan(file)
-    return hosted(course.robot, course, host, port, browser=browser, source=source, other=other)
+    return serve(played.robot, address, played=played, source=source, beside=other)
 
 
-def view_calibration(file: Path, robot: str | None, host: str, port: int, *, browser: bool) -> int:
-    """Serve a calibrated robot with what was found until Ctrl-C; returns the exit code.
-
-    Args:
-        file: The calibration.
-        robot: Whose it should be; None for whosever it is.
-        host: Address to listen on.
-        port: Port to listen on.
-        browser: Whether to open one here.
-
-    Raises:
-        SaglineError: If a file cannot be read, or nothing can listen there.
-    """
-    from sagline.cli.hosting import check_viewer, hosted
-    from sagline.cli.played import check_robot
+def view_calibration(file: Path, robot: str | None, address: Address) -> int:
+    """Serve a calibrated robot with its calibration until Ctrl-C; a robot that is named must be the same."""
+    from sagline.cli.hosting import check_viewer, serve
     from sagline.files.calibration_file import load_calibration
     from sagline.files.robot_file import load_robot
 
     check_viewer()
     found = load_calibration(file)
     if robot is not None:
-        check_robot(file, "calibration", found.robot, load_robot(robot))
+        _check_robot(file, "calibration", found.robot, load_robot(robot))
     from sagline.viewer.state_code import Source
 
-    source = Source.of_calibration(file)
-    return hosted(found.robot, None, host, port, browser=browser, found=found, source=source)
+    return serve(found.robot, address, found=found, source=Source.of_calibration(file))
+
+
+def view_log(
+    file: Path,
+    robot: str | None,
+    address: Address,
+    *,
+    live: bool = False,
+    truth: Path | None = None,
+    beside: Path | None = None,
+) -> int:
+    """Serve a log of the controller until Ctrl-C; returns the exit code.
+
+    Args:
+        file: The log.
+        robot: Robot that it must be of; None for any.
+        address: Where to listen.
+        live: Whether it still grows.
+        truth: The log of the twin that was driven.
+        beside: What is played beside it.
+    """
+    from sagline.cli.hosting import check_viewer, serve
+    from sagline.files.robot_file import load_robot
+
+    check_viewer()
+    from sagline.viewer.session import LogFollower
+    from sagline.viewer.state_code import Source
+
+    follower = LogFollower(file, truth)
+    with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
+        session = _first_session(follower, [log for log in (file, truth) if log is not None], live=live)
+    if robot is not None:
+        _check_robot(file, "log", session.robot, load_robot(robot), alone=True)
+    other = None if beside is None else played_beside(session.robot, file, beside)
+    if not live and not follower.log.complete:
+        note("Note: ", f"{file} was cut off: what was recorded in its last second is not there.", style="bold")
+    return serve(
+        session.robot,
+        address,
+        meanwhile=lambda viewer: _following(follower, viewer) if live else nullcontext(),
+        played=session,
+        source=Source.of_log(file),
+        beside=other,
+    )
+
+
+def played_in(robot: Robot, file: Path) -> Played:
+    """The run, simulation or log in a file of a robot.
+
+    Raises:
+        FileError: If it cannot be read, or is another robot's.
+    """
+    from sagline.files.netcdf import is_of
+    from sagline.files.plan_file import load_plan
+    from sagline.files.simulation_file import FORMAT, load_simulation
+    from sagline.viewer.playback import Playback, Run
+    from sagline.viewer.session import LogFollower
+
+    if file.suffix.lower() == LOG:
+        session = _first_session(LogFollower(file), [file], live=False)
+        _check_robot(file, "log", session.robot, robot)
+        return session
+    if is_of(file, FORMAT):
+        simulation = load_simulation(file)
+        _check_robot(file, "simulation", simulation.robot, robot)
+        return Playback(simulation)
+    plan = load_plan(file)
+    made_for = plan.state.one_robot
+    _check_robot(file, "run", made_for, robot)
+    count = len(plan.state.pose) if plan.state.pose.shape else 1
+    with working(f"{made_for.name}: confirming {count:,} poses", FORWARD) as line:
+        return Run.of(plan, line.progress)
+
+
+def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
+    """The second run of a robot, played beside the first; both are named by their files."""
+    from sagline.viewer.player import Beside
+
+    names = (first.name, second.name) if first.name != second.name else (str(first), str(second))
+    return Beside(played_in(robot, second), names)
+
+
+def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot, *, alone: bool = False) -> None:
+    """Refuse a file of another robot; the advice names the file alone, or the robot too."""
+    if made_for.name != robot.name:
+        step = f"View it as: sagline view {file if alone else f'{made_for.name} {file}'}"
+        raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
+
+
+def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Session:
+    """The cycles in a log; of one that grows, as soon as all logs have begun and there is a cycle."""
+    from sagline.files.mcap_reader import has_begun
+
+    while live and not all(map(has_begun, logs)):
+        time.sleep(LOOK)
+    while (session := follower.more()) is None:
+        if not live:
+            file = follower.log.path
+            raise FileError(file, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+        time.sleep(LOOK)
+    return session
+
+
+@contextmanager
+def _following(follower: LogFollower, viewer: Viewer) -> Iterator[None]:
+    """While inside, what comes into the log comes onto the page."""
+    over = threading.Event()
+
+    def look() -> None:
+        try:
+            while not over.wait(LOOK):
+                session = follower.more()
+                if session is not None:
+                    viewer.extend(session)
+        except SaglineError as error:
+            note("Note: ", f"the log is followed no longer: {error}", style="bold")
+
+    thread = threading.Thread(target=look, name="sagline follows", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def _is_calibration(file: Path) -> bool:

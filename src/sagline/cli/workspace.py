@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-import typer
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import CLEARANCES, INVERSE, PROOFS, SIGNED_MARGINS, VIBRATION
-from sagline.cli.options import JsonOption, Model, ModelOption, OutOption, PayloadOption, RobotArgument
-from sagline.cli.results import figure_files, listed, write_figures
-from sagline.cli.tables import Grid, show_table, written
+from sagline.cli.options import (
+    JsonOption,
+    Model,
+    ModelOption,
+    OutOption,
+    PayloadOption,
+    RobotArgument,
+    figures_flag,
+    flag,
+    option,
+)
+from sagline.cli.output import Grid, Output, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
-from sagline.files.writing import check_files, create_folder
 
 if TYPE_CHECKING:
     from sagline.interference.pairs import Obstacle
@@ -28,70 +35,47 @@ if TYPE_CHECKING:
 MOST_LIMITS = 12  # shares that are told
 LoadsOption = Annotated[
     str | None,
-    typer.Option(
-        metavar="LOADS",
-        help="Loads that the platform bears all over it besides its weight: '±100 N, ±20 N m', accelerations "
+    option(
+        "LOADS",
+        "Loads that the platform bears all over it besides its weight: '±100 N, ±20 N m', accelerations "
         "'±2 m/s^2, ±1 rad/s^2', both, or one wrench FX,FY,FZ[,MX,MY,MZ].",
-        show_default=False,
     ),
 ]
 
 
-def _limit(metavar: str, text: str) -> typer.models.OptionInfo:
-    found: typer.models.OptionInfo = typer.Option(metavar=metavar, help=text, show_default=False)
-    return found
+def _criteria(robot: str, limits: dict[str, str | None], scene: str | None, *, in_frame: bool) -> list[Criterion]:
+    """The criteria of the options; a robot's own scene stands around it unless another one is given."""
+    from sagline.cli.values import quantity
+    from sagline.workspaces.criteria import (
+        Clearance,
+        InFrame,
+        LeastFrequency,
+        LeastMargin,
+        LeastStiffness,
+        MaximumSag,
+    )
 
-
-class Asked(NamedTuple):
-    """What has to be met, as texts of the command line; None for no such criterion."""
-
-    reserve: str | None
-    max_sag: str | None
-    min_stiffness: str | None
-    min_frequency: str | None
-    clearance: str | None
-    scene: str | None
-    in_frame: bool
-
-    def criteria(self, robot: str) -> list[Criterion]:
-        """The criteria.
-
-        Args:
-            robot: Name or file of the robot, whose scene stands around it.
-
-        Raises:
-            SaglineError: If one is none, or the scene cannot be read.
-        """
-        from sagline.cli.values import quantity
-        from sagline.workspaces.criteria import (
-            Clearance,
-            InFrame,
-            LeastFrequency,
-            LeastMargin,
-            LeastStiffness,
-            MaximumSag,
-        )
-
-        found: list[Criterion] = []
-        if self.reserve is not None:
-            found.append(LeastMargin(quantity(self.reserve, "--reserve", "N", low=0.0)))
-        if self.max_sag is not None:
-            found.append(MaximumSag(quantity(self.max_sag, "--max-sag", "m", above=0.0)))
-        if self.min_stiffness is not None:
-            found.append(LeastStiffness(quantity(self.min_stiffness, "--min-stiffness", "N/m", above=0.0)))
-        if self.min_frequency is not None:
-            found.append(LeastFrequency(quantity(self.min_frequency, "--min-frequency", "Hz", above=0.0)))
-        if self.clearance is not None:
-            limit = quantity(self.clearance, "--clearance", "m", above=0.0)
-            found.append(Clearance(limit, around(robot if self.scene is None else self.scene)))
-        elif self.scene is not None:
-            step = 'Say how near things may come: --clearance "3 cm".'
-            raise InvalidValueError("--scene", f"{self.scene!r} without --clearance", "both", step)
-        return found + [InFrame()] * self.in_frame
+    kinds: dict[str, tuple[Callable[[float], Criterion], str]] = {
+        "reserve": (LeastMargin, "N"),
+        "max_sag": (MaximumSag, "m"),
+        "min_stiffness": (LeastStiffness, "N/m"),
+        "min_frequency": (LeastFrequency, "Hz"),
+        "clearance": (lambda limit: Clearance(limit, around(robot if scene is None else scene)), "m"),
+    }
+    found: list[Criterion] = []
+    for name, text in limits.items():
+        if text is not None:
+            kind, unit = kinds[name]
+            bound = {"low" if name == "reserve" else "above": 0.0}
+            found.append(kind(quantity(text, f"--{name.replace('_', '-')}", unit, **bound)))
+    if scene is not None and limits["clearance"] is None:
+        step = 'Say how near things may come: --clearance "3 cm".'
+        raise InvalidValueError("--scene", f"{scene!r} without --clearance", "both", step)
+    return found + [InFrame()] * in_frame
 
 
 def around(name: str) -> tuple[Obstacle, ...]:
-    """What stands around: the scene of a robot file, a mesh file, nothing for a preset's name."""
+    """Obstacles: the scene of a robot file, a mesh file, none for the name of a preset."""
     from sagline.files.mesh_file import load_mesh
     from sagline.files.robot_file import load_scene
 
@@ -106,36 +90,29 @@ def workspace(
     wrench: LoadsOption = None,
     payload: PayloadOption = None,
     tilt: Annotated[
-        str | None, _limit("ANGLE", "The platform has to tilt so far about any axis, '10deg'. Default: it is level.")
+        str | None, option("ANGLE", "The platform has to tilt so far about any axis, '10deg'. Default: it is level.")
     ] = None,
     box: Annotated[
-        str | None, _limit("BOX", "Where to look: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.")
+        str | None, option("BOX", "Where to look: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.")
     ] = None,
-    reserve: Annotated[str | None, _limit("FORCE", "Margin that is left everywhere [N].")] = None,
-    max_sag: Annotated[str | None, _limit("LENGTH", "No cable sags further, '5 cm'.")] = None,
+    reserve: Annotated[str | None, option("FORCE", "Margin that is left everywhere [N].")] = None,
+    max_sag: Annotated[str | None, option("LENGTH", "No cable sags further, '5 cm'.")] = None,
     min_stiffness: Annotated[
-        str | None, _limit("NUMBER", "A force moves the platform no further than force over this [N/m].")
+        str | None, option("NUMBER", "A force moves the platform no further than force over this [N/m].")
     ] = None,
-    min_frequency: Annotated[str | None, _limit("HZ", "The platform swings no slower, cables without mass.")] = None,
-    clearance: Annotated[str | None, _limit("LENGTH", "Cables, and what they pass, stay so far apart, '3 cm'.")] = None,
+    min_frequency: Annotated[str | None, option("HZ", "The platform swings no slower, cables without mass.")] = None,
+    clearance: Annotated[str | None, option("LENGTH", "Cables, and what they pass, stay so far apart, '3 cm'.")] = None,
     scene: Annotated[
         str | None,
-        _limit("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
+        option("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
     ] = None,
-    in_frame: Annotated[bool, typer.Option("--in-frame", help="The whole platform stays within the frame.")] = False,
-    to_prove: Annotated[
-        str | None,
-        typer.Option("--prove", metavar="BOX", help="Prove that it can work in all of this box.", show_default=False),
-    ] = None,
-    budget: Annotated[str, typer.Option(metavar="TIME", help="Of the proof [s].")] = "10",
-    cells: Annotated[
-        int, typer.Option(metavar="NUMBER", help="Cells of the grid along the longest edge of the box.")
-    ] = 32,
+    in_frame: Annotated[bool, flag("The whole platform stays within the frame.", "--in-frame")] = False,
+    to_prove: Annotated[str | None, option("BOX", "Prove that it can work in all of this box.", "--prove")] = None,
+    budget: Annotated[str, option("TIME", "Of the proof [s].")] = "10",
+    cells: Annotated[int, option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
     model: ModelOption = Model.CATENARY,
     folder: OutOption = Path("output"),
-    figures: Annotated[
-        bool, typer.Option("--figures/--no-figures", help="Draw hull and slice, as PNG and SVG.")
-    ] = True,
+    figures: Annotated[bool, figures_flag("Draw hull and slice, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
     """Find where a robot can work: volume with its error bar, and what limits it where.
@@ -151,17 +128,21 @@ def workspace(
         sagline workspace article-suspended --prove "-2..2, -1..1, 1..3 m"
         sagline workspace ipanema-1 --max-sag "5 cm" --box "-1..1, -1..1, 0..2 m"
     """
-    from sagline.cli.regions import box_of, wrenches_of
-    from sagline.cli.values import loaded, quantity
-    from sagline.files.robot_file import load_robot
+    from sagline.cli.values import box_of, quantity, robot_with, wrenches_of
     from sagline.files.writing import file_stem
     from sagline.workspaces.orientations import Tilts
     from sagline.workspaces.proof import ProofVerdict, prove
     from sagline.workspaces.workspace import workspace
 
-    asked = Asked(reserve, max_sag, min_stiffness, min_frequency, clearance, scene, in_frame)
+    limits = {
+        "reserve": reserve,
+        "max_sag": max_sag,
+        "min_stiffness": min_stiffness,
+        "min_frequency": min_frequency,
+        "clearance": clearance,
+    }
     cable = model.build()
-    loads, criteria = wrenches_of(wrench), asked.criteria(name)
+    loads, criteria = wrenches_of(wrench), _criteria(name, limits, scene, in_frame=in_frame)
     angle = 0.0 if tilt is None else quantity(tilt, "--tilt", "rad", low=0.0)
     if angle > np.pi:  # a number alone counts in radians
         step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
@@ -169,11 +150,11 @@ def workspace(
     region = None if box is None else box_of(box, "--box")
     claim = None if to_prove is None else box_of(to_prove, "--prove", angle)
     seconds = quantity(budget, "--budget", "s", above=0.0)
-    robot = loaded(load_robot(name), payload)
+    robot = robot_with(name, payload)
     space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
-    drawn = [file_stem(robot.name, what) for what in ("workspace", "slice")] if figures else []
-    check_files(folder, [space_file, hull, *figure_files(drawn)])
-    with working(f"{robot.name}: workspace", *_needed(asked), *[PROOFS] * (claim is not None)) as line:
+    drawn = [file_stem(robot.name, what) for what in ("workspace", "slice") if figures]
+    output = Output(folder, [space_file, hull], drawn)
+    with working(f"{robot.name}: workspace", *_entries(limits), *[PROOFS] * (claim is not None)) as line:
         space = workspace(
             robot,
             region,
@@ -188,43 +169,36 @@ def workspace(
         if claim is not None:
             told = line.stage(f"{robot.name}: proof")
             proof = prove(robot, claim, loads, budget=seconds, model=cable, progress=told)
-        create_folder(folder)
-        files = [folder / space_file]
-        space.save(files[0])
+        space.save(output.file(space_file))
         if space.nearest is None:
-            files.append(folder / hull)
-            space.surface.export(files[-1])
+            space.surface.export(output.file(hull))
             if figures:
+                from sagline import plot
+
                 line.stage("drawing")
-                files += _drawn(space, drawn, folder)
+                output.draw(plot.workspace(space))
+                if space.unit == "m³":  # of a plane the first figure is the slice
+                    output.draw(plot.slice(space))
     if as_json:
-        show_json({**_record(space), "proof": None if proof is None else _record_of_proof(proof), "files": files})
+        show_json(
+            {**_record(space), "proof": None if proof is None else _record_of_proof(proof), "files": output.files}
+        )
     else:
         _tell(space)
         if proof is not None:
             _tell_proof(proof)
-        show(f"In {folder.resolve()}: {listed(files)}", whole=True)
+        output.show()
     if space.nearest is not None:
         note("Nowhere: ", space.nearest.reason, style="bold red")
     proved = proof is None or proof.verdict is ProofVerdict.PROVED_INSIDE
     return 0 if space.nearest is None and proved else OUTSIDE
 
 
-def _drawn(space: Workspace, names: Sequence[str], folder: Path) -> list[Path]:
-    """The figures, by their files."""
-    from sagline import plot
-
-    pictures: list[Any] = [plot.workspace(space)]
-    if space.unit == "m³":  # of a plane the first is the slice
-        pictures.append(plot.slice(space))
-    return write_figures(dict(zip(names, pictures, strict=False)), folder)
-
-
-def _needed(asked: Asked) -> tuple[str, ...]:
-    """Entries of the kernels."""
-    shaken = asked.min_stiffness is not None or asked.min_frequency is not None
-    near = asked.clearance is not None
-    tensions = shaken or near or asked.max_sag is not None
+def _entries(limits: dict[str, str | None]) -> tuple[str, ...]:
+    """Entries of the kernels for these limits."""
+    given = {name for name, text in limits.items() if text is not None}
+    shaken, near = bool(given & {"min_stiffness", "min_frequency"}), "clearance" in given
+    tensions = shaken or near or "max_sag" in given
     return (SIGNED_MARGINS, *[INVERSE] * tensions, *[VIBRATION] * shaken, *[CLEARANCES] * near)
 
 

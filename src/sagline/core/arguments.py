@@ -1,4 +1,4 @@
-"""The border between a caller's objects and ours: what is no number is checked here by its kind.
+"""Checks of arguments that are not numbers: instances, words, texts, whole numbers, callbacks, paths.
 
 Numbers and arrays of them come through `sagline.core.arrays`.
 """
@@ -21,7 +21,7 @@ from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 
-# How a caller comes by an object of a kind; every message that misses one ends with it.
+# The way to get an object of a kind; the end of every message about a missing one.
 HOW_TO_GET: Final = MappingProxyType(
     {
         "AnchorErrors": "Give AnchorErrors(deviation), 0.01 m for instance, or None.",
@@ -64,7 +64,7 @@ _PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", 
 
 
 class _Brief(Repr):
-    """What a person is shown of a value: its kind, where its text would not fit into a message."""
+    """Short text of a value for a message; its type if the text would be too long."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -176,7 +176,7 @@ def text(value: Any, item: str) -> str:
 
 
 def label(value: Any, item: str) -> str:
-    """What something is called: one line of text that a terminal, a figure and a file name can show.
+    """A name: one line of text that a terminal, a figure and a file name can show.
 
     Args:
         value: What was given.
@@ -294,7 +294,7 @@ def _a(name: str) -> str:
 
 
 def _step_to(value: object, kind: type) -> str:
-    """How to come from what was given to what is wanted."""
+    """The step from the value that was given to one of the kind that is needed."""
     if isinstance(value, type) and issubclass(value, kind):
         return f"Write {value.__name__}(), with parentheses: that makes one."
     if type(value).__module__.startswith("sagline"):

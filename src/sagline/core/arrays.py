@@ -184,7 +184,7 @@ def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
-    """Whether a value is an array as ours, and so is whatever holds its memory."""
+    """True if a value, and the owner of its memory, is a locked array of float64 in C order."""
     if not (type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous):
         return False
     holder: object = value
@@ -196,7 +196,7 @@ def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
 
 
 def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
-    """What numpy would strip without a word: masks, and units that need not be ours."""
+    """Refuse masked arrays and quantities with units, which numpy would strip silently."""
     if type(value) in (np.ndarray, int, list, tuple):
         return
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
@@ -222,7 +222,7 @@ def _from_other_kind(given: NDArray[Any], item: str) -> Array:
 
 
 def _listed(value: object) -> str:
-    """What a message shows of what is no number."""
+    """Text for a message about a value that is not a number."""
     return brief(value.item() if isinstance(value, np.ndarray) and value.size == 1 else value)
 
 
@@ -231,7 +231,7 @@ def _is_real(entry: object) -> bool:
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:
-    """Whether every value is finite and in range, found by two reductions; NaN propagates through both."""
+    """True if all values are finite and in range; two reductions, through which NaN propagates."""
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())
@@ -239,7 +239,7 @@ def _is_within(array: Array, *, low: float, above: float) -> bool:
 
 
 def _too_near(value: float, above: float) -> bool:
-    """Whether a value that must be more than zero is too small to divide by."""
+    """True if a value that must be positive is too small to divide by."""
     return above == 0.0 and 0.0 < value < SMALLEST
 
 

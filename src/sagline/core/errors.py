@@ -1,4 +1,4 @@
-"""What sagline raises: one family of exceptions that carry their data, each told in one line."""
+"""Exceptions and warnings of sagline: one family, each with its data and a message of one line."""
 
 from __future__ import annotations
 
@@ -84,11 +84,11 @@ class FileError(SaglineError):
 
     @classmethod
     def of(cls, path: Path | str, error: InvalidValueError) -> FileError:
-        """What is wrong with a value, told with the file that says it.
+        """The error of a value in a file.
 
         Args:
             path: The file.
-            error: What is wrong with a value in it.
+            error: The error of a value in it.
 
         Returns:
             The error, to be raised.
@@ -139,7 +139,7 @@ def printable(text: str, kept: str = "") -> str:
 
 
 def is_seen(character: str) -> bool:
-    """Whether a character shows, or is a space of any width.
+    """True for a character that is visible, or a space of any width.
 
     Args:
         character: One character.

@@ -1,4 +1,4 @@
-"""How much memory is free, asked before much of it is taken: a process that takes too much is killed without a word."""
+"""Free memory, checked before large allocations: a process that takes too much is killed without a message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers as a person reads them: no exponents, a prefix before the unit, and no digits that are rounding."""
+"""Numbers as text: prefixes of units instead of exponents, and no digits that are rounding errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Long work in blocks: between them an interrupt is heard, and somebody may be told how far it is."""
+"""Long work in blocks, between which an interrupt is handled and progress is reported."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Progress: TypeAlias = Callable[[int, int], None]  # told after each block: how m
 
 
 def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
-    """Slices of at most `size` of `count` rows, one after the other; each is told when it is done."""
+    """Slices of at most `size` of `count` rows; progress is reported after each."""
     for first in range(0, count, size):
         part = slice(first, min(first + size, count))
         yield part

@@ -56,7 +56,7 @@ class ByFields:
 
 
 class Result(ByFields, Shown):
-    """An answer: what cannot be changed, whatever process it comes from."""
+    """A result, which cannot be changed, also after pickling."""
 
     __slots__ = ()
 

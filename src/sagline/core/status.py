@@ -1,4 +1,4 @@
-"""What every status has in common: a code that kernels return, and a sentence about it."""
+"""Base class of status codes: an integer that kernels return, with a sentence about it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Self
 
 
 class Status(IntEnum):
-    """How a calculation ended; a member is written as its code and its sentence.
+    """End of a calculation; a member is written as its code and its sentence.
 
     Attributes:
         text: What it means and what to do, one sentence for a person.

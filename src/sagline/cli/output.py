@@ -1,4 +1,4 @@
-"""The tables that the commands print, of which no cell is ever cut, and tables of numbers as CSV."""
+"""Tables that the commands print, of which no cell is ever cut, tables as CSV, and the files that they write."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from io import StringIO
 from itertools import pairwise
 from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
@@ -16,8 +18,15 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from sagline.cli.terminal import FREE, show_pieces
+from sagline.cli.terminal import FREE, show, show_pieces
 from sagline.core.errors import printable
+from sagline.files.writing import check_files, create_folder
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SUFFIXES = ("png", "svg")  # of a figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,3 +131,46 @@ def csv_text(rows: Iterable[Sequence[object]]) -> str:
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
+
+
+class Output:
+    """The files that a command writes into a folder; it ends before any work where one could not be written."""
+
+    def __init__(self, folder: Path, names: Iterable[str], figures: Sequence[str] = ()) -> None:
+        """Check that all files can be written.
+
+        Args:
+            folder: The folder; made when the first file is written.
+            names: Names of the files that are no figures.
+            figures: Names of the figures, without suffix; each is written as PNG and SVG.
+
+        Raises:
+            FileError: If the folder or the place of a file is taken.
+        """
+        self.folder, self.files = folder, list[Path]()
+        self._figures = list(figures)
+        if every := [*names, *(f"{name}.{suffix}" for name in figures for suffix in SUFFIXES)]:
+            check_files(folder, every)
+
+    def file(self, name: str) -> Path:
+        """The path of a file that is about to be written."""
+        create_folder(self.folder)
+        self.files.append(self.folder / name)
+        return self.files[-1]
+
+    def draw(self, *figures: Figure | Axes) -> None:
+        """Save figures under the names that were checked, in their order."""
+        from sagline.plot import save
+
+        for figure in figures:
+            name = self._figures.pop(0)
+            for suffix in SUFFIXES:
+                save(figure, self.file(f"{name}.{suffix}"))
+
+    def show(self) -> None:
+        """Print the folder and the names of what was written in it; the two forms of a figure as one."""
+        suffixes: dict[str, list[str]] = {}
+        for file in self.files:
+            suffixes.setdefault(file.stem, []).append(file.suffix)
+        names = ", ".join(f"{stem}{'/'.join(found)}" for stem, found in suffixes.items())
+        show(f"In {self.folder.resolve()}: {names}", whole=True)

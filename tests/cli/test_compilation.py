@@ -14,8 +14,8 @@ import pytest
 from numba.core import event
 from rich.console import Console
 
-from sagline.cli import cold_start
-from sagline.cli.compiling import Stage, first_run_text, heard
+from sagline.cli import compilation
+from sagline.cli.compilation import Stage, compilation_events, first_run_text
 from sagline.cli.entries import (
     ANSWERS,
     ENTRIES,
@@ -32,7 +32,7 @@ from sagline.cli.entries import (
     VIBRATION,
 )
 from sagline.cli.examples import examples
-from sagline.cli.line import shown
+from sagline.cli.progress import progress_line
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses, measure_balance
 from sagline.kernels.jit import FOLDER, is_compiled
@@ -56,15 +56,15 @@ def compiling(function: Any, types: Any = ()) -> Any:
 def test_nothing_is_told_to_be_finished_before_its_machine_code_is_written(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def solve() -> None:
+    def solve(_: object) -> None:
         for function in (inverse_poses, forward_poses):
             with compiling(function, ("int64", "none")):
                 pass
             print(f"{function.__name__} written")  # numba saves what it has compiled when it has told of the end
 
-    monkeypatch.setattr(cold_start, "_end_with_parent", lambda: None)
+    monkeypatch.setattr(compilation, "_end_with_parent", lambda: None)
     monkeypatch.setitem(ENTRIES, INVERSE, ENTRIES[INVERSE]._replace(solve=solve))
-    cold_start.main([INVERSE])
+    compilation.main([INVERSE])
     lines = [line.split("\t") for line in capsys.readouterr().out.splitlines()]
     assert [line[0] + line[-1] if len(line) > 1 else line[0] for line in lines] == [
         f"{INVERSE}0", "inverse_poses written", f"{INVERSE}1", f"{FORWARD}0", "forward_poses written", f"{FORWARD}1",
@@ -74,7 +74,7 @@ def test_nothing_is_told_to_be_finished_before_its_machine_code_is_written(
 def test_an_entry_is_compiled_when_its_machine_code_is_there(
     tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("sagline.kernels.jit.folder_of", lambda _: tmp_path)
+    monkeypatch.setattr("sagline.kernels.jit.folder_of", lambda module: tmp_path / module.split(".")[2])
     (tmp_path / "inverse").mkdir()
     for name in ("poses.inverse_poses-35.py311.nbi", "poses.inverse_poses_too-35.py311.1.nbc", "other.nbc"):
         (tmp_path / "inverse" / name).touch()
@@ -82,7 +82,7 @@ def test_an_entry_is_compiled_when_its_machine_code_is_there(
     (tmp_path / "inverse" / "poses.inverse_poses-35.py311.1.nbc").touch()
     assert is_compiled(inverse_poses)
     assert not is_compiled(inverse_poses, 2)
-    assert cold_start.cold([INVERSE, SHARING, FORWARD]) == [SHARING, FORWARD]
+    assert compilation.not_compiled([INVERSE, SHARING, FORWARD]) == [SHARING, FORWARD]
 
 
 def test_every_entry_names_a_compiled_function() -> None:
@@ -93,19 +93,19 @@ def test_every_entry_names_a_compiled_function() -> None:
 
 
 def test_two_cores_share_the_work_and_second_versions_follow_their_first() -> None:
-    assert cold_start.shares([FORWARD, INVERSE]) in (([INVERSE], [FORWARD]), ([FORWARD], [INVERSE]))
-    here, beside = cold_start.shares([SHARING, VIBRATION, INVERSE, MARGINS])
+    assert compilation.split_entries([FORWARD, INVERSE]) in (([INVERSE], [FORWARD]), ([FORWARD], [INVERSE]))
+    here, beside = compilation.split_entries([SHARING, VIBRATION, INVERSE, MARGINS])
     assert here == [SHARING, INVERSE]
     assert sorted(beside) == sorted([VIBRATION, MARGINS])
-    assert cold_start.shares([MARGINS]) == ([MARGINS], [])
-    assert cold_start.shares([FORWARD_OVER_PULLEYS, INVERSE]) == (
+    assert compilation.split_entries([MARGINS]) == ([MARGINS], [])
+    assert compilation.split_entries([FORWARD_OVER_PULLEYS, INVERSE]) == (
         [FORWARD_OVER_PULLEYS],
         [INVERSE],
     )  # its first is here
-    assert cold_start.shares([ANSWERS, INVERSE]) == ([ANSWERS], [INVERSE])
-    assert cold_start.shares([MODES, ANSWERS, INVERSE]) == ([MODES, ANSWERS], [INVERSE])  # where vibration is
-    assert cold_start.shares([MARGINS, VIBRATION, MODES]) == ([VIBRATION, MODES], [MARGINS])
-    here, beside = cold_start.shares(tuple(ENTRIES))
+    assert compilation.split_entries([ANSWERS, INVERSE]) == ([ANSWERS], [INVERSE])
+    assert compilation.split_entries([MODES, ANSWERS, INVERSE]) == ([MODES, ANSWERS], [INVERSE])  # where vibration is
+    assert compilation.split_entries([MARGINS, VIBRATION, MODES]) == ([VIBRATION, MODES], [MARGINS])
+    here, beside = compilation.split_entries(tuple(ENTRIES))
     assert sorted(here + beside) == sorted(ENTRIES)
     for entry in ENTRIES.values():
         (share,) = [each for each in (here, beside) if entry.words in each]
@@ -151,7 +151,7 @@ def test_no_entry_is_compiled_for_one_that_does_not_come_after_it(names: list[st
 
 def test_what_is_compiled_is_named_and_counted() -> None:
     stages: list[Stage] = []
-    with heard(stages.append), compiling(inverse_poses, ("int64", "none")):
+    with compilation_events(stages.append), compiling(inverse_poses, ("int64", "none")):
         with compiling(measure_balance), compiling(new_nearness):
             pass
         with compiling(SimpleNamespace(py_func=os.getcwd)):  # numba's own are not counted
@@ -160,17 +160,17 @@ def test_what_is_compiled_is_named_and_counted() -> None:
         (INVERSE, 0, False), (INVERSE, 1, False), (INVERSE, 2, False), (INVERSE, 3, True),
     ]  # fmt: skip
     stages.clear()
-    with heard(stages.append), compiling(inverse_poses, ("int64", "bool")):
+    with compilation_events(stages.append), compiling(inverse_poses, ("int64", "bool")):
         pass
     assert stages[-1].words == SHARING
     stages.clear()
-    with heard(stages.append), compiling(forward_poses, ("Tuple(int64, float64, float64, none)", "bool")):
+    with compilation_events(stages.append), compiling(forward_poses, ("Tuple(int64, float64, float64, none)", "bool")):
         pass
     assert stages[-1].words == FORWARD
-    with heard(stages.append), compiling(forward_poses, ("Tuple(int64, float64, float64, bool)", "bool")):
+    with compilation_events(stages.append), compiling(forward_poses, ("Tuple(int64, float64, float64, bool)", "bool")):
         pass
     assert stages[-1].words == FORWARD_OVER_PULLEYS
-    with heard(stages.append), compiling(measure_balance):
+    with compilation_events(stages.append), compiling(measure_balance):
         pass
     assert stages[-1].words == "measure balance"
     with compiling(inverse_poses):
@@ -185,20 +185,20 @@ def test_the_line_says_how_far_it_is(snapshot: Any) -> None:
 
 def test_in_a_file_each_entry_is_told_once(snapshot: Any) -> None:
     text = StringIO()
-    with shown(Console(file=text), "working") as line:
+    with progress_line(Console(file=text), "working") as line:
         for done in range(3):
-            line.hear(Stage("one", done, 3, done == 2))
-            line.hear(Stage("other", done, 3, done == 2))
+            line.show_compilation(Stage("one", done, 3, done == 2))
+            line.show_compilation(Stage("other", done, 3, done == 2))
         line.progress(1, 2)
     assert text.getvalue() == snapshot
 
 
 def test_on_a_terminal_the_line_lives() -> None:
     text = StringIO()
-    with shown(Console(file=text, force_terminal=True, width=100), "working") as line:
-        line.hear(Stage("one", 31, 42))
+    with progress_line(Console(file=text, force_terminal=True, width=100), "working") as line:
+        line.show_compilation(Stage("one", 31, 42))
         line._bar.refresh()
-        line.hear(Stage("one", 42, 42, finished=True))
+        line.show_compilation(Stage("one", 42, 42, finished=True))
         line._bar.refresh()
         line.progress(1, 10)
         line._bar.refresh()
@@ -229,32 +229,32 @@ def test_without_the_other_process_all_is_compiled_here(monkeypatch: pytest.Monk
     monkeypatch.setattr("sagline.kernels.jit.FOLDER", tmp_path / "kernels")
     for program in ("/bin/false", str(tmp_path / "missing")):
         entries = {name: Counted(name, 1.0) for name in "abc"}
-        monkeypatch.setattr(cold_start, "ENTRIES", entries)
-        monkeypatch.setattr(cold_start, "cores", lambda: 2)
+        monkeypatch.setattr(compilation, "ENTRIES", entries)
+        monkeypatch.setattr(compilation, "available_cores", lambda: 2)
         monkeypatch.setattr(sys, "executable", program)
-        cold_start.compile_all("abc", lambda stage: None)
+        compilation.compile_all("abc", lambda stage: None)
         assert all(entry.is_compiled for entry in entries.values())
         assert os.listdir(tmp_path) == []
 
 
 def test_on_one_core_no_other_process_is_started(monkeypatch: pytest.MonkeyPatch) -> None:
     entries = {name: Counted(name, 1.0) for name in "abc"}
-    monkeypatch.setattr(cold_start, "ENTRIES", entries)
-    monkeypatch.setattr(cold_start, "cores", lambda: 1)
-    monkeypatch.setattr(cold_start, "Side", None)
-    cold_start.compile_all("abc", lambda stage: None)
+    monkeypatch.setattr(compilation, "ENTRIES", entries)
+    monkeypatch.setattr(compilation, "available_cores", lambda: 1)
+    monkeypatch.setattr(compilation, "CompilerProcess", None)
+    compilation.compile_all("abc", lambda stage: None)
     assert all(entry.is_compiled for entry in entries.values())
 
 
 COMPILE = """
 import sys
-from sagline.cli import cold_start
-from sagline.cli.compiling import heard
-cold_start.cores = lambda: 2
+from sagline.cli import compilation
+from sagline.cli.compilation import compilation_events
+compilation.available_cores = lambda: 2
 def say(stage):
     print(stage.words, stage.done, stage.expected, int(stage.finished), sep="\\t", flush=True)
-with heard(say):
-    cold_start.compile_all(sys.argv[1:] or {names!r}, say)
+with compilation_events(say):
+    compilation.compile_all(sys.argv[1:] or {names!r}, say)
 """
 
 

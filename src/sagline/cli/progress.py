@@ -1,4 +1,4 @@
-"""The one line that says what is going on: what is done, how long it will take, what is compiled before it."""
+"""The progress line: the work, the time left, and the kernels that are compiled before it."""
 
 from __future__ import annotations
 
@@ -9,69 +9,62 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
-from sagline.cli.cold_start import compile_all
-from sagline.cli.compiling import Stage, first_run_text, heard
+from sagline.cli.compilation import Stage, compilation_events, compile_all, first_run_text
 from sagline.core.errors import printable
-from sagline.core.progress import Progress as Told
+from sagline.core.progress import Progress as ProgressCallback
 
 PATIENCE = 2.0  # s: work that takes longer shows a bar and the time left
 
 
-class Line:
-    """On a terminal one live line; elsewhere only what is compiled is told, each entry once."""
+class ProgressLine:
+    """One live line on a terminal; elsewhere a line for each entry that is compiled."""
 
     def __init__(self, console: Console, bar: Progress, what: str) -> None:
-        """Begin.
-
-        Args:
-            console: Where it is.
-            bar: Running, or disabled where nobody watches.
-            what: What is being done.
-        """
+        """Add the work to a bar, which is disabled outside a terminal."""
         self._console = console
         self._bar = bar
         self._what = what = printable(what)
         self._task = bar.add_task(what, total=None, visible=bool(what))
         self._compiling: dict[str, Stage] = {}
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
-    def stage(self, what: str) -> Told:
-        """A new part of the work, whose count begins at zero; returns what to call with the count and its end."""
+    def stage(self, what: str) -> ProgressCallback:
+        """Begin a new part of the work; returns the function that takes its progress."""
         self._what = what = printable(what)
         self._bar.reset(self._task, total=None, description=what)
         return self.progress
 
     def progress(self, done: int, total: int) -> None:
-        """So much of so much is done."""
+        """Show the part that is done."""
         self._bar.update(self._task, completed=done, total=total)
 
     def name(self, what: str) -> None:
-        """The same work, called by another name."""
+        """Rename the work."""
         self._what = what = printable(what)
         self._bar.update(self._task, description=what)
 
     def compile(self, entries: Sequence[str]) -> None:
-        """Have entries of the kernels compiled before they are needed."""
+        """Compile entries of the kernels."""
         if entries:
-            compile_all(entries, self.hear)
+            compile_all(entries, self.show_compilation)
             self.stage(self._what)  # the time left does not count what was compiled
 
-    def hear(self, stage: Stage) -> None:
-        """Something is compiled; from any thread."""
+    def show_compilation(self, stage: Stage) -> None:
+        """Show a stage of a compilation; from any thread."""
         self._compiling[stage.words] = stage
         stages = [each for each in self._compiling.values() if not each.finished]
         if self._bar.disable:
-            if stage.words not in self._told:
+            if stage.words not in self._reported:
                 self._console.print(Text.assemble(first_run_text([stage])), soft_wrap=True)
         else:
             text = first_run_text(stages) if stages else self._what
             self._bar.update(self._task, description=text, visible=bool(text))
-        self._told.add(stage.words)
+        self._reported.add(stage.words)
 
 
 @contextmanager
-def shown(console: Console, what: str) -> Iterator[Line]:
-    """A line while inside."""
+def progress_line(console: Console, what: str) -> Iterator[ProgressLine]:
+    """Show a progress line while inside."""
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description}", markup=False),
@@ -79,13 +72,13 @@ def shown(console: Console, what: str) -> Iterator[Line]:
         _Late(TimeRemainingColumn()),
     )
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        line = Line(console, bar, what)
-        with heard(line.hear):
+        line = ProgressLine(console, bar, what)
+        with compilation_events(line.show_compilation):
             yield line
 
 
 class _Late(ProgressColumn):
-    """A column that appears when the work takes its time, if it is known how much there is."""
+    """A column that appears when known work takes longer than `PATIENCE`."""
 
     def __init__(self, column: ProgressColumn) -> None:
         super().__init__()
