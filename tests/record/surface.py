@@ -46,6 +46,7 @@ def _member(owner: type, name: str) -> str:
 
 def _signature(value: Any) -> str:
     try:
-        return re.sub(r" at 0x[0-9a-f]+", "", str(inspect.signature(value)))
+        text = re.sub(r" at 0x[0-9a-f]+", "", str(inspect.signature(value)))
+        return text.replace("-> 'None'", "-> None")  # generated constructors and written ones
     except (TypeError, ValueError):
         return "()"

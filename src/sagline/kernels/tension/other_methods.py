@@ -1,4 +1,4 @@
-"""The tension distribution methods the load that are no projection of a reference: the one switch between them."""
+"""Tension distribution methods that are not projections: the one switch between them."""
 
 from __future__ import annotations
 
