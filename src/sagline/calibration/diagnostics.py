@@ -110,7 +110,7 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
 
 
 def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) -> bool:
-    """Whether some robot like this one reads what lengths and load cells say, whatever was measured.
+    """True if some robot like this one reads what lengths and load cells say, whatever was measured.
 
     Args:
         robot: The robot as it is believed to be.

@@ -93,7 +93,7 @@ def evaluate(
 
 
 def _status(found: SearchResult, chi_squared: float, freedoms: int) -> CalibrationStatus:
-    """Whether to believe a search, by the poses of full weight."""
+    """True if to believe a search, by the poses of full weight."""
     kept, weights = found.kept, found.fit.normal.weights
     if not found.fit.converged:
         return CalibrationStatus.NOT_CONVERGED
@@ -146,7 +146,7 @@ def covariance_of(problem: Problem, triangle: Array, slopes: Array) -> tuple[Arr
 
 
 def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bool) -> bool:
-    """Whether residuals are larger or smaller than the deviations of the sensors say.
+    """True if residuals are larger or smaller than the deviations of the sensors say.
 
     Where poses were taken out that fit badly, what is left fits better than chance has it: the mean of a chi squared
     that is cut at a quantile c is r F(c; r + 2)/F(c; r).

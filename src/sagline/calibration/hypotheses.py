@@ -192,7 +192,7 @@ class Trial:
         return self.found[key]
 
     def _has(self, name: str, counted: bool) -> bool:
-        """Whether the robot has such a number that may be looked for."""
+        """True if the robot has such a number that may be looked for."""
         if name == "drum_radius":
             return counted
         return name != "linear_density" or bool((self.robot.cables.linear_density > 0.0).all())

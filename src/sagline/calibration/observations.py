@@ -41,7 +41,7 @@ def counts_of(drums: Drums, lengths: Array) -> Array:
 
 
 def has_drum_data(robot: Robot) -> bool:
-    """Whether lengths follow from counts with what is known of the winches."""
+    """True if lengths follow from counts with what is known of the winches."""
     names = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")
     return robot.winches is not None and all(getattr(robot.winches, name) is not None for name in names)
 

@@ -275,7 +275,7 @@ def _refuse_unseen(robot: Robot, sensors: Sensors, unknown: Unknown, kind: Kind,
 
 
 def _shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
-    """Whether the cables share one number: it must be the same for all, and as well known."""
+    """True if the cables share one number: it must be the same for all, and as well known."""
     alike = bool((own == own[0]).all() and (width == width[0]).all())
     if unknown.shared is None:
         return kind.shared and alike

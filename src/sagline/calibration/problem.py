@@ -261,7 +261,7 @@ def _aligned(problem: Problem, numbers: Array, poses: Array) -> Array:
 
 
 def _spans(points: Array) -> bool:
-    """Whether points (N, 3) lie on no line, so that they determine a rotation."""
+    """True if points (N, 3) lie on no line, so that they determine a rotation."""
     if len(points) < _PAIRS:
         return False
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -186,7 +186,7 @@ def _pair(likeness: Array, one: Group, other: Group) -> tuple[int, int] | None:
 
 
 def _is_substituted(scatter: Array, many: Indices) -> Flags:
-    """Whether what the numbers of many cables do is all but what each does, (P,): their multiple correlation."""
+    """True if what the numbers of many cables do is all but what each does, (P,): their multiple correlation."""
     within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
     share = np.sum(between * np.linalg.solve(within + ridge, between), axis=0)

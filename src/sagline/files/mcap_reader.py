@@ -254,7 +254,7 @@ def read_log(file: os.PathLike[str] | str) -> Log:
 
 
 def has_begun(file: os.PathLike[str] | str) -> bool:
-    """Whether a log that another process writes can be read yet: False while it is missing or its first bytes are."""
+    """True if a log that another process writes can be read yet: False while it is missing or its first bytes are."""
     try:
         path = file_path(file)
         check_regular(path, path.stat().st_mode)

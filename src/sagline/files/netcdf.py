@@ -55,7 +55,7 @@ def seal(file: Path) -> None:
 
 
 def _digest_is_right(file: Path) -> bool | None:
-    """Whether the digest at the end of a file is that of its content; None if there is none."""
+    """True if the digest at the end of a file is that of its content; None if there is none."""
     with file.open("rb") as handle:
         before = max(0, file.stat().st_size - _LENGTH)
         handle.seek(before)
@@ -186,7 +186,7 @@ def file_errors(path: Path) -> Iterator[None]:
 
 
 def is_of(path: Path, content: Content) -> bool:
-    """Whether the attributes of a file name this content; nothing else is checked."""
+    """True if the attributes of a file name this content; nothing else is checked."""
     from h5py import File
 
     try:

@@ -52,7 +52,7 @@ def plain_number(text: str) -> float | None:
 
 
 def within_reach(number: float) -> bool:
-    """Whether a number is finite, and of a size that products of a few do not take out of float64."""
+    """True if a number is finite, and of a size that products of a few do not take out of float64."""
     return abs(number) <= LARGEST
 
 

@@ -35,7 +35,7 @@ def unreadable(path: Path, error: Exception) -> FileError:
 
 
 def exists(path: Path) -> bool:
-    """Whether a path exists; False for a name that no file can have."""
+    """True if a path exists; False for a name that no file can have."""
     try:
         path.stat()
     except (OSError, ValueError):

@@ -268,7 +268,7 @@ class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
 
 
 def _in_percent(value: object) -> bool:
-    """Whether a text, or the first of a list, is in percent."""
+    """True if a text, or the first of a list, is in percent."""
     if isinstance(value, list):
         return bool(value) and _in_percent(value[0])
     return isinstance(value, str) and value.rstrip().endswith("%")

@@ -95,7 +95,7 @@ def _cause(error: Exception, data: bytes) -> tuple[str, str]:
 
 
 def _decodes(data: bytes, encoding: str) -> bool:
-    """Whether bytes that begin with one-byte letters are text in this encoding."""
+    """True if bytes that begin with one-byte letters are text in this encoding."""
     try:
         return not encoding.lower().startswith(("utf-16", "utf16")) and bool(data.decode(encoding))
     except (LookupError, UnicodeError):

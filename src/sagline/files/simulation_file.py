@@ -108,7 +108,7 @@ def check_simulation(data: Dataset, cables: int) -> None:
 
 
 def has_events(data: Dataset) -> bool:
-    """Whether a data set has a variable of events."""
+    """True if a data set has a variable of events."""
     return any(quantity.name in data.variables for quantity in EVENTS)
 
 

@@ -111,7 +111,7 @@ def _open_lock(place: Path) -> int:
 
 
 def try_lock(lock: int, *, if_unknown: bool) -> bool:
-    """Whether the lock of an open file could be taken; `if_unknown` where the system has no locks."""
+    """True if the lock of an open file could be taken; `if_unknown` where the system has no locks."""
     if sys.platform == "win32":
         return if_unknown
     import fcntl

@@ -43,7 +43,7 @@ class Confirmation(Result):
 
     @property
     def held(self) -> Flags:
-        """Whether the cables hold the platform in a stable equilibrium, shape () or (N,)."""
+        """True if the cables hold the platform in a stable equilibrium, shape () or (N,)."""
         return np.asarray(self.status == ForwardStatus.SOLVED)
 
     @property

@@ -68,12 +68,12 @@ class ForwardSolution(Result):
 
     @property
     def solved(self) -> Flags:
-        """Whether each sample is a stable equilibrium in which the cables hold the platform, shape () or (N,)."""
+        """True if each sample is a stable equilibrium in which the cables hold the platform, shape () or (N,)."""
         return np.asarray(self.status == ForwardStatus.SOLVED)
 
     @property
     def stable(self) -> Flags:
-        """Whether each sample is a stable equilibrium, however it is held, shape () or (N,)."""
+        """True if each sample is a stable equilibrium, however it is held, shape () or (N,)."""
         return np.isin(self.status, STABLE)
 
     @property
@@ -141,7 +141,7 @@ class ForwardRows(NamedTuple):
 
     @property
     def stable(self) -> Flags:
-        """Whether each sample is a stable equilibrium, (N,)."""
+        """True if each sample is a stable equilibrium, (N,)."""
         return np.isin(self.pose_status, STABLE)
 
     def solution(

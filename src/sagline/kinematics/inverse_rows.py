@@ -141,7 +141,7 @@ class Verdicts(NamedTuple):
 
 
 def covers_all(method: int, redundant: int) -> bool:
-    """Whether a distribution method finds tensions wherever there are any; formulas without limits do not.
+    """True if a distribution method finds tensions wherever there are any; formulas without limits do not.
 
     Args:
         method: Its code.

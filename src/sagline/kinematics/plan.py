@@ -91,7 +91,7 @@ class Plan(Result, Saved):
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Whether each pose has an answer, shape () or (N,)."""
+        """True if each pose has an answer, shape () or (N,)."""
         return np.asarray(self.status == PoseStatus.SOLVED)
 
     @property

@@ -83,7 +83,7 @@ class _ExitState(NamedTuple):
 
 
 def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
-    """Whether the routing differs from a straight guided run without friction.
+    """True if the routing differs from a straight guided run without friction.
 
     Args:
         robot: The robot, or one a pose.

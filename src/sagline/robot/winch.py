@@ -148,7 +148,7 @@ class Winch:
 
     @property
     def anything_behind(self) -> bool:
-        """Whether a cable runs over a pulley, or has dead cable behind it; guides count once a robot has them."""
+        """True if a cable runs over a pulley, or has dead cable behind it; guides count once a robot has them."""
         return bool(self.pulley_radius.any() or self.dead_cable.any())
 
     def per_cable(self, count: int) -> Winch:

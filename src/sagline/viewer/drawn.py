@@ -39,7 +39,7 @@ class Drawable(ABC):
     @property
     @abstractmethod
     def feasible(self) -> bool:
-        """Whether platform and cables are drawn as feasible."""
+        """True if platform and cables are drawn as feasible."""
 
     @property
     @abstractmethod

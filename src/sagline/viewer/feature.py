@@ -64,12 +64,12 @@ class Feature:
 
     @property
     def moving(self) -> bool:
-        """Whether the drawing moves."""
+        """True if the drawing moves."""
         return False
 
     @property
     def waiting(self) -> bool:
-        """Whether a result is still to come."""
+        """True if a result is still to come."""
         return False
 
     def depends(self, view: View) -> Hashable:
@@ -104,7 +104,7 @@ class BackgroundTask:
 
     @property
     def busy(self) -> bool:
-        """Whether a calculation is running."""
+        """True if a calculation is running."""
         return self._began is not None
 
     @property

@@ -55,7 +55,7 @@ class Panel:
 
     @property
     def ghost(self) -> bool:
-        """Whether straight cables are drawn beside the real ones."""
+        """True if straight cables are drawn beside the real ones."""
         return bool(self._ghost.value)
 
     def settings(self) -> Settings:

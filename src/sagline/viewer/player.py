@@ -135,7 +135,7 @@ class Player:
 
     @property
     def given(self) -> bool:
-        """Whether the page was opened with what is played."""
+        """True if the page was opened with what is played."""
         return self.played is self._given
 
     @property

@@ -55,7 +55,7 @@ class ClientFile:
         return ClientFile(self.path / name, self.title)
 
     def is_file(self) -> bool:
-        """Whether it is a file."""
+        """True if it is a file."""
         return self.path.is_file()
 
     def read_bytes(self) -> bytes:

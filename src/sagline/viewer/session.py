@@ -199,7 +199,7 @@ class SessionMoment(InMotion):
 
     @property
     def feasible(self) -> bool:
-        """Whether there is no fault."""
+        """True if there is no fault."""
         return self.state not in WRONG
 
     @property

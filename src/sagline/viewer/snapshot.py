@@ -48,7 +48,7 @@ def method_name(method: TensionMethod) -> str:
 
 
 def depends_on_history(method: TensionMethod) -> bool:
-    """Whether the tensions of a pose depend on those before it."""
+    """True if the tensions of a pose depend on those before it."""
     return method.alone is not method
 
 
@@ -130,7 +130,7 @@ class Snapshot(Drawable):
 
     @property
     def feasible(self) -> bool:
-        """Whether tensions within the limits balance the platform."""
+        """True if tensions within the limits balance the platform."""
         return self.plan is not None and bool(self.plan.feasible)
 
     @property

@@ -59,7 +59,7 @@ def frame(robot: Robot) -> Solid:
 
 
 def is_frame_assumed(robot: Robot) -> bool:
-    """Whether the frame is assumed."""
+    """True if the frame is assumed."""
     return robot.frame_size is None or "frame_size" in robot.assumed
 
 

@@ -86,7 +86,7 @@ class Chart:
 
     @property
     def of_cables(self) -> bool:
-        """Whether its lines are cables."""
+        """True if its lines are cables."""
         return self.names[0] == "0"
 
 

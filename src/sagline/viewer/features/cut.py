@@ -117,7 +117,7 @@ class CutFeature(Feature):
 
     @property
     def waiting(self) -> bool:
-        """Whether a simulation is running."""
+        """True if a simulation is running."""
         return self._task.busy
 
     def depends(self, view: View) -> Hashable:

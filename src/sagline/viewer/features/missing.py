@@ -127,7 +127,7 @@ class MissingFeature(Feature):
 
     @property
     def waiting(self) -> bool:
-        """Whether the nearest pose is still to come."""
+        """True if the nearest pose is still to come."""
         return self._task.busy
 
     def follow(self, view: View) -> None:

@@ -160,12 +160,12 @@ class ModesFeature(Feature):
 
     @property
     def moving(self) -> bool:
-        """Whether a mode moves."""
+        """True if a mode moves."""
         return self.swing is not None
 
     @property
     def waiting(self) -> bool:
-        """Whether modes or a response are still to come."""
+        """True if modes or a response are still to come."""
         return self._due is not None or self._task.busy
 
     def follow(self, view: View) -> None:

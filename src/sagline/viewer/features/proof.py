@@ -79,7 +79,7 @@ def residual(state: Equilibrium, forces: tuple[PlatformForce, ...]) -> tuple[flo
 
 
 def can_rotate(state: Equilibrium) -> bool:
-    """Whether the platform can rotate, so that moments balance too."""
+    """True if the platform can rotate, so that moments balance too."""
     return bool(np.abs(state.one_robot.freedom[:, 3:]).max() > 0.0)
 
 

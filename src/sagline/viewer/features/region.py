@@ -118,22 +118,22 @@ class RegionFeature(Feature):
 
     @property
     def waiting(self) -> bool:
-        """Whether a hull is being computed."""
+        """True if a hull is being computed."""
         return self._task.busy
 
     @property
     def _anything(self) -> bool:
-        """Whether anything is to be drawn."""
+        """True if anything is to be drawn."""
         return bool(self._region_box.value or self._slice_box.value or self._travel_box.value)
 
     @property
     def _by_cable(self) -> bool:
-        """Whether the colors of the hull are those of the limiting cables."""
+        """True if the colors of the hull are those of the limiting cables."""
         return bool(self._color.value != BY_MARGIN)
 
     @property
     def _scaled(self) -> bool:
-        """Whether anything is drawn in the colors of margins."""
+        """True if anything is drawn in the colors of margins."""
         return bool(self._slice_box.value or (self._region_box.value and not self._by_cable))
 
     def depends(self, view: View) -> Hashable:

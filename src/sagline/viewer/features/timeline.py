@@ -56,7 +56,7 @@ class TimelineFeature(Feature):
 
     @property
     def waiting(self) -> bool:
-        """Whether the time of the clock is still to be sent."""
+        """True if the time of the clock is still to be sent."""
         return bool(self._clock != self._now())
 
     def depends(self, view: View) -> Hashable:
