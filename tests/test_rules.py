@@ -1,4 +1,4 @@
-"""Rules for the tests themselves: parts of errors instead of sentences, public names instead of inner modules."""
+"""Rules for the tests (parts of errors, public names) and for docstrings (their first word)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from pathlib import Path
 from tests.tiers import extended
 
 TESTS = Path(__file__).parent
+SOURCE = TESTS.parent / "src"
+CLAUSE = re.compile(r"(What|How|Whether|Where|Which|Who|Whatever)\b")
 LETTERS = re.compile(r"[A-Za-z]{2}")
 SENTENCES = 25  # literal sentences that may be left, outside the snapshots
 FOREIGN = 65  # imports of inner modules of another folder that may be left
@@ -87,3 +89,15 @@ with pytest.raises(ValueError, match="the pose is singular"): pass
 assert value == "25 N"
 """
     assert sorted(sentences(ast.parse(code))) == [2, 4, 5]
+
+
+@extended
+def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
+    found = []
+    for file in sorted(SOURCE.rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                text = ast.get_docstring(node) or ""
+                if CLAUSE.match(text):
+                    found.append(f"{file.relative_to(SOURCE)}: {text.splitlines()[0]}")
+    assert found == []

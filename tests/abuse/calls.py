@@ -1070,6 +1070,7 @@ def _controls(given: _Given) -> dict[str, Call]:
             "execute": _all(path=("one", path)),
             "path_to": speeds,
             "go_to": speeds,
+            "events_from": _all(first=("whole", 1)),
             "jog": _all(winch=("cable", 3), by=("number", 1e-3)),
             "start_jog": _all(winch=("cable", 3), by=("number", 1e-3)),
             "jog_platform": _all(by=("array", np.array([1e-3, 0.0, 2e-3]))),
@@ -1095,8 +1096,8 @@ def _controls(given: _Given) -> dict[str, Call]:
             _all(
                 robot=("one", robot),
                 period=("number", 0.01),
-                cell_deviation=("number", 1.0),
-                cell_bias=("number", 2.0),
+                cell_deviation=("number", 1.0, True),
+                cell_bias=("number", 2.0, True),
                 largest_correction=("number", 5e-3),
             ),
         ),

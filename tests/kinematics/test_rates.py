@@ -5,8 +5,8 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array, Indices
-from sagline.tension.methods import METHODS
 from tests.kinematics.feasible import Variable
+from tests.tension.reference import public_methods
 from tests.tiers import extended, wide
 
 SUSPENDED, MIXED = sl.load_robot("article-suspended"), sl.load_robot("article-mixed")
@@ -40,7 +40,7 @@ def missed(rates: Array, expected: Array) -> Array:
 
 
 @pytest.mark.parametrize("robot", [MIXED, IPANEMA], ids=lambda r: r.name)
-@pytest.mark.parametrize("method", [method for name, method in METHODS.items() if name != "Closest"])
+@pytest.mark.parametrize("method", [kind for kind in public_methods().values() if kind is not sl.Closest])
 def test_methods_without_memory(robot: sl.Robot, method: type[sl.TensionMethod]) -> None:
     if method().needs_upper_limits and np.isinf(robot.tension_max).any():
         robot = robot.replace(tension_max=5e3)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
+import sagline as sl
 from sagline import Cable, MinimumNorm, Plan, Pose, Robot, inverse, load_robot, robot_names
 from sagline.core.arrays import Array
 
@@ -23,6 +24,16 @@ def random_poses(robot: Robot, count: int, rng: np.random.Generator, stretch: fl
     angles = rng.uniform(-box.tilt, box.tilt, (count, 1)) * stretch
     turns = axes / np.linalg.norm(axes, axis=1, keepdims=True) * angles
     return Pose(middle + half * rng.uniform(-1, 1, (count, 3)), Rotation.from_rotvec(turns))
+
+
+def public_methods() -> dict[str, type[sl.TensionMethod]]:
+    """All tension distribution methods of the public surface, by name."""
+    kinds = {name: getattr(sl, name) for name in sl.__all__}
+    return {
+        name: kind
+        for name, kind in kinds.items()
+        if isinstance(kind, type) and issubclass(kind, sl.TensionMethod) and kind is not sl.TensionMethod
+    }
 
 
 @cache

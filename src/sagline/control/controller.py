@@ -24,7 +24,7 @@ from sagline.control.recording import Event, EventKind, Recorder
 from sagline.control.set_points import Along, Course, SetPoint, Standing
 from sagline.control.states import MOTION, RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
-from sagline.core.arguments import instance
+from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
@@ -145,8 +145,12 @@ class Controller:
 
         Args:
             first: Number of events that are known already.
+
+        Raises:
+            InvalidValueError: If it is no whole number, or not between 0 and the number of events.
         """
-        return self._context.journal.events[first:]
+        events = self._context.journal.events
+        return events[whole_number(first, "first", 0, len(events)) :]
 
     @property
     def pace(self) -> Pace | None:

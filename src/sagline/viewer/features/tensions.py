@@ -184,10 +184,10 @@ def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[Mark, ...], *, mo
         area = f'<polyline points="{outline}" class="interval"/>'
         names = "".join(_end(field, k, places[k], places[1 - k]) for k in range(2))
     where = f' data-scale="{field.scale!r}" data-middle="{" ".join(map(repr, field.middle.tolist()))}"'
-    kind = f'class="field" data-dot=""{where}' if movable else 'role="img" aria-label="feasible tensions"'
+    kind = f'class="field" role="group" data-dot=""{where}' if movable else 'role="img"'
     return (
-        f'<svg viewBox="0 0 {WIDTH} {field.height}" {kind}>{area}{names}{_marks(field, marks)}'
-        f"{_dot(snapshot, field, movable=movable)}</svg>"
+        f'<svg viewBox="0 0 {WIDTH} {field.height}" {kind} aria-label="feasible tensions">{area}{names}'
+        f"{_marks(field, marks)}{_dot(snapshot, field, movable=movable)}</svg>"
     )
 
 
