@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from tests.tiers import extended
+from tools import size
 
 TESTS = Path(__file__).parent
 SOURCE = TESTS.parent / "src"
@@ -101,3 +102,9 @@ def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
                 if CLAUSE.match(text):
                     found.append(f"{file.relative_to(SOURCE)}: {text.splitlines()[0]}")
     assert found == []
+
+
+@extended
+def test_public_functions_have_their_sections() -> None:
+    assert size.without_args() == []
+    assert size.without_examples() == []

@@ -2,12 +2,13 @@
 
 Code lines are lines with a token that is neither a comment nor part of a docstring. A record type is a NamedTuple, a
 dataclass or an attrs class. A public-looking name is that of a function or class at the top of a module that does not
-begin with an underscore.
+begin with an underscore. An inner function is one that `sagline.__all__` does not reach.
 """
 
 from __future__ import annotations
 
 import ast
+import inspect
 import io
 import re
 import sys
@@ -15,6 +16,7 @@ import tokenize
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
+from types import FunctionType, ModuleType
 from typing import Final
 
 ROOT: Final = Path(__file__).parents[1]
@@ -24,7 +26,7 @@ CLAUSE: Final = re.compile(r"(What|How|Whether|Where|Which|Who|Whatever)\b")
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
-def docstring_lines(tree: ast.Module) -> set[int]:
+def docstring_lines(tree: ast.AST) -> set[int]:
     """Numbers of the lines of all docstrings of a module."""
     found: set[int] = set()
     for node in ast.walk(tree):
@@ -62,12 +64,65 @@ def import_lines(tree: ast.Module) -> int:
     return sum((node.end_lineno or node.lineno) - node.lineno + 1 for node in found)
 
 
+def public_values() -> Iterator[object]:
+    """Values of `sagline.__all__` and of `__all__` of its public modules."""
+    import sagline
+
+    for name in sagline.__all__:
+        value = getattr(sagline, name)
+        yield from (getattr(value, inner) for inner in value.__all__) if isinstance(value, ModuleType) else (value,)
+
+
+def public_functions() -> dict[tuple[str, str], FunctionType]:
+    """Public functions, public methods and constructors by module and qualified name."""
+    found: dict[tuple[str, str], FunctionType] = {}
+    for value in public_values():
+        members: list[object] = [value]
+        if isinstance(value, type):
+            own = [kind for kind in value.__mro__ if kind.__module__.startswith("sagline")]
+            names = ((name, member) for kind in own for name, member in vars(kind).items())
+            members = [member for name, member in names if name == "__init__" or name[0] != "_"]
+        for member in members:
+            inner = (
+                getattr(member, "fget", None) or getattr(member, "__func__", None) or getattr(member, "func", member)
+            )
+            if isinstance(inner, FunctionType):
+                found[inner.__module__, inner.__qualname__] = inner
+    return found
+
+
+def without_args() -> list[str]:
+    """Public methods with parameters but no Args section."""
+    found = []
+    for (module, name), function in public_functions().items():
+        parameters = set(inspect.signature(function).parameters) - {"self", "cls"}
+        if "." in name and not name.endswith("__init__") and parameters and "Args:" not in (function.__doc__ or ""):
+            found.append(f"{module}.{name}")
+    return sorted(found)
+
+
+def without_examples() -> list[str]:
+    """Public functions without an Examples section."""
+    functions = [value for value in public_values() if isinstance(value, FunctionType)]
+    return sorted(f"{each.__module__}.{each.__name__}" for each in functions if "Examples:" not in (each.__doc__ or ""))
+
+
+def functions_of(node: ast.AST, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ast.AST]]:
+    """Functions and methods of a module with their qualified names; functions inside functions belong to those."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, Function):
+            yield ".".join((*path, child.name)), child
+        else:
+            yield from functions_of(child, (*path, child.name) if isinstance(child, ast.ClassDef) else path)
+
+
 def counts() -> tuple[Counter[str], Counter[str]]:
     """Counts of the whole source, and code lines of each folder."""
     total: Counter[str] = Counter()
     folders: Counter[str] = Counter()
     modules: defaultdict[str, set[str]] = defaultdict(set)
     package = ROOT / "src" / "sagline"
+    public = public_functions().keys()
     for file in sorted(package.rglob("*.py")):
         source = file.read_text(encoding="utf-8")
         tree = ast.parse(source)
@@ -78,6 +133,9 @@ def counts() -> tuple[Counter[str], Counter[str]]:
         total["files"] += 1
         total["code lines"] += len(code)
         total["docstring lines"] += len(docstrings)
+        module = ".".join(file.relative_to(package.parent).with_suffix("").parts).removesuffix(".__init__")
+        inner = (node for name, node in functions_of(tree) if (module, name) not in public)
+        total["docstring lines of inner functions"] += sum(len(docstring_lines(node)) for node in inner)
         total["import lines"] += import_lines(tree)
         total[f"files of more than {LONG_FILE} lines"] += source.count("\n") > LONG_FILE
         for name in top_names(tree):
@@ -102,6 +160,8 @@ def main() -> int:
     import sagline
 
     total, folders = counts()
+    total["public methods without Args"] = len(without_args())
+    total["public functions without Examples"] = len(without_examples())
     total["public names"] = len(sagline.__all__)
     for name, count in total.items():
         print(f"{name:45s} {count:7,d}")

@@ -127,6 +127,15 @@ def identify_empirical(
         InvalidValueError: If the cable is none or weighs nothing, or a value is out of range.
         CableGeometryError: If a span and a rise are both zero.
 
+    Examples:
+        >>> import sagline as sl
+        >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
+        >>> fit = sl.identify_empirical(
+        ...     cable, [5.0, 10.0], [-4.0, -2.0], [50.0, 100.0]
+        ... )
+        >>> round(fit.model.k_h, 3)
+        4.875
+
     Source:
         Gia Luan & Truong Thinh 2020, sections 3 to 5, in one step each; docs/article.md.
     """

@@ -118,6 +118,17 @@ def identify_cable(
 
     Raises:
         InvalidValueError: If there are fewer measurements than unknowns, or a value is out of range.
+
+    Examples:
+        >>> import sagline as sl
+        >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)
+        >>> span, rise, tension = [8.0, 9.0, 10.0], [1.0, 2.0, 3.0], [60.0, 90.0, 200.0]
+        >>> state = sl.Catenary().from_tension(cable, span, rise, tension)
+        >>> fit = sl.identify_cable(
+        ...     span, rise, state.unstrained_length, state.frame_end_tension
+        ... )
+        >>> round(float(fit.cable.linear_density), 4)
+        0.067
     """
     names = _checked_unknowns(unknowns)
     choice(tension_at, "tension_at", get_args(TensionAt))

@@ -320,4 +320,11 @@ class Fault(ABC):
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """The operator's line in every cycle in which the rule holds; of a lasting fault, where an item is new."""
+        """The operator's line in every cycle in which the rule holds; of a lasting fault, where an item is new.
+
+        Args:
+            cycle: Readings and set points of the cycle.
+
+        Returns:
+            Text of the message; None without a fault.
+        """

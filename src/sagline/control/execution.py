@@ -238,6 +238,11 @@ def planned_position(execution: Execution) -> Array:
 
     Returns:
         Positions [m], shape (N, 3); NaN beside the plan.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> position = sl.control.planned_position(done)  # doctest: +SKIP
     """
     done = instance(execution, Execution, "execution")
     plan = done.plan
@@ -258,6 +263,11 @@ def position_error(execution: Execution) -> Array:
 
     Returns:
         Along the world's axes [m], shape (N, 3); NaN beside the plan and where there is no estimate.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> error = sl.control.position_error(done)  # doctest: +SKIP
     """
     planned = planned_position(execution)
     return locked(execution.position - planned)
@@ -273,6 +283,11 @@ def null_space_error(execution: Execution, filter_time: float | None = None) -> 
     Returns:
         e_N = K_A N_L G f with f the filtered T_A less the planned T_A [N], shape (N, m); NaN beside the plan, and of a
         robot without redundancy.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> error = sl.control.null_space_error(done)  # doctest: +SKIP
 
     Source:
         docs/model.md, section 12.

@@ -63,6 +63,14 @@ def parity(state: Equilibrium) -> Array:
     Raises:
         InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
 
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> state = sl.inverse(robot, pose).state
+        >>> sl.control.parity(state).shape
+        (8, 8)
+
     Source:
         docs/model.md, section 12.
     """
@@ -109,6 +117,13 @@ def null_space(state: Equilibrium) -> NullSpace:
 
     Raises:
         InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> state = sl.inverse(robot, pose).state
+        >>> null = sl.control.null_space(state)
 
     Source:
         docs/model.md, section 12.

@@ -98,16 +98,33 @@ class Recorder(Protocol):
         """Reason why it takes nothing more, "" while it does: `Cycle.recording` of the fault rules."""
 
     def begins(self, plan: Plan) -> None:
-        """Take a plan, before the first cycle that follows it."""
+        """Receive a plan before its first cycle.
+
+        Args:
+            plan: The plan that is executed next.
+        """
 
     def ends(self, status: Status, reason: str) -> None:
-        """Take how that plan ended, an `ExecutionStatus`, after its last cycle."""
+        """Receive the result of the plan after its last cycle.
+
+        Args:
+            status: `ExecutionStatus` of the plan.
+            reason: Reason in words; empty if the plan was completed.
+        """
 
     def cycle(self, cycle: Recorded) -> None:
-        """Take a cycle."""
+        """Receive a cycle.
+
+        Args:
+            cycle: Readings, set points and states of one cycle.
+        """
 
     def event(self, event: Event) -> None:
-        """Take an event."""
+        """Receive an event.
+
+        Args:
+            event: Change of a state, fault or command.
+        """
 
 
 class Tape:

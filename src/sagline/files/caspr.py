@@ -60,6 +60,10 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
     Raises:
         FileError: If a file cannot be read, the two are not to be found, or they describe no robot with one platform
             and straight, unrouted cables.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_caspr("CoGiRo").robot  # doctest: +SKIP
     """
     optional(cables, Cable, "cables")
     if cable_set is not None:

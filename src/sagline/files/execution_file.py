@@ -54,6 +54,10 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
 
     Warns:
         SaglineWarning: If the log was cut off: what was recorded in its last second is not there.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
     """
     log = read_log(file)
     if not log.complete:

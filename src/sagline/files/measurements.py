@@ -122,6 +122,10 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
 
     Raises:
         FileError: If it cannot be read, or a column or number is wrong; the message names the line.
+
+    Examples:
+        >>> import sagline as sl
+        >>> sl.load_measurements("cable.csv")  # doctest: +SKIP
     """
     path = file_path(file)
     table = Table.read(path, read_text(path, TABLE_LIMIT), UNITS)

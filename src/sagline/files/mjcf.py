@@ -153,6 +153,14 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
         InvalidValueError: If the pose is a batch, a length is below 1e-6 m or no longer than the dead cable, or no
             tensions within the robot's limits hold the platform there.
         CableGeometryError: If a platform end is inside its pulley.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> text = sl.dump_mjcf(robot, pose)
+        >>> "<mujoco" in text
+        True
     """
     instance(robot, Robot, "robot")
     if instance(pose, Pose, "pose").shape:

@@ -105,6 +105,10 @@ def load_path(file: str | os.PathLike[str]) -> Path:
 
     Raises:
         FileError: If the file cannot be read, or what it says is no path; the message names the line or the key.
+
+    Examples:
+        >>> import sagline as sl
+        >>> path = sl.load_path("own_path.yaml")  # doctest: +SKIP
     """
     path = file_path(file)
     yaml, table = (_path_from_yaml, YAML_LIMIT), (path_from_table, TABLE_LIMIT)

@@ -197,6 +197,14 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
         InvalidValueError: If the plan is of several robots, one a pose; of a cable model or a way of sharing that is
             none of sagline's; or if its values are none that `inverse` gives.
         FileError: If the file cannot be written; what was there before is untouched.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> sl.save_plan(sl.inverse(robot, pose), "run.nc")
+        >>> bool(sl.load_plan("run.nc").feasible)
+        True
     """
     FORMAT.save(plan, file)
 

@@ -188,6 +188,15 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
     Raises:
         FileError: If the file is missing, cut off, no NetCDF file, no simulation, of a newer format, or not as it was
             written: its digest, shapes, units and signs are checked.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> motion = sl.simulate(sl.inverse(robot, pose).state, duration=0.5)
+        >>> motion.save("motion.nc")
+        >>> sl.load_simulation("motion.nc").robot.cable_count
+        8
     """
     return FORMAT.load(file)
 

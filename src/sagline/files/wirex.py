@@ -51,6 +51,10 @@ def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> I
 
     Raises:
         FileError: If the file cannot be read, has another version, or describes no robot with one platform.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_wirex("robot.wcrfx").robot  # doctest: +SKIP
     """
     optional(cables, Cable, "cables")
     path = file_path(source, "source")

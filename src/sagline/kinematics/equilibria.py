@@ -80,6 +80,13 @@ def equilibria(
         InvalidValueError: If a length is wrong (the message names the cable), starts is below 1 or more than
             memory holds, or an argument is of the wrong kind.
 
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> lengths = sl.inverse(robot, pose).unstrained_length
+        >>> found = sl.equilibria(robot, lengths, starts=20)
+
     Source:
         docs/model.md, section 6.
     """

@@ -108,6 +108,12 @@ def lengths_from_counts(
         InvalidValueError: If the robot's winches or cables lack what is needed (the message names it), counts run off a
             drum, are no whole number of rows, or tensions are missing.
 
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("winches_robot.yaml")  # doctest: +SKIP
+        >>> counts = sl.encoder_counts(sl.inverse(robot, path))  # doctest: +SKIP
+        >>> lengths = sl.lengths_from_counts(robot, counts)  # doctest: +SKIP
+
     Source:
         docs/model.md, section 10.
     """

@@ -229,6 +229,12 @@ def article_path(rate: float = 100.0) -> Path:
     Raises:
         InvalidValueError: If the rate is not positive.
 
+    Examples:
+        >>> import sagline as sl
+        >>> path = sl.article_path()
+        >>> len(path), float(path.time[-1])
+        (6001, 60.0)
+
     Source:
         Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7.
     """

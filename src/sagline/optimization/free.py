@@ -171,7 +171,15 @@ class FreeCable(Free):
         object.__setattr__(self, "catalogue", entries)
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot."""
+        """Design variables of a given robot.
+
+        Args:
+            robot: Initial robot of the search.
+            item: Name of the object in messages.
+
+        Returns:
+            Design variables and the function that writes them.
+        """
         own = robot.cables
         for k, one in enumerate(self.catalogue):
             pairs = ((own.linear_density, one.cable.linear_density), (own.axial_stiffness, one.cable.axial_stiffness))
@@ -237,7 +245,15 @@ class FreeLimit(Free):
         set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=named)
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot."""
+        """Design variables of a given robot.
+
+        Args:
+            robot: Initial robot of the search.
+            item: Name of the object in messages.
+
+        Returns:
+            Design variables and the function that writes them.
+        """
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         own = getattr(robot, self.which)[cables]
         name = f"{self.which}{whose_text(cables, robot.cable_count)}"

@@ -208,10 +208,15 @@ class BlockLink:
         return np.array([np.nan if g.newest is None else g.newest.round_trip for g in self._exchanges])
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Pass a command to the groups' threads and return their newest data; waits for nothing.
+        """Pass a command to the groups' threads and return their newest data, without waiting.
 
-        A group whose grant another id has, or nobody, is sent the claim of `command.owner` where it says so, and no
-        command.
+        A group that `command.owner` does not control receives its claim, if the command has one, and no command.
+
+        Args:
+            command: Set points of all winches; None reads only.
+
+        Returns:
+            The newest sample of all groups, or the groups whose data are missing.
         """
         now = self._clock()
         newest = [group.newest for group in self._exchanges]

@@ -78,6 +78,11 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
 
     Raises:
         InvalidValueError: If it is no calibration, or there is no such part.
+
+    Examples:
+        >>> import sagline as sl
+        >>> found = sl.load_calibration("calibration.nc")  # doctest: +SKIP
+        >>> figure = sl.plot.calibration(found)  # doctest: +SKIP
     """
     instance(found, Calibration, "found")
     choice(part, "part", PARTS)

@@ -54,6 +54,13 @@ def energy(simulation: Simulation) -> Figure:
 
     Returns:
         A figure of two panels.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> motion = sl.simulate(sl.inverse(robot, pose).state, duration=0.5)
+        >>> figure = sl.plot.energy(motion)
     """
     balance, time = instance(simulation, Simulation, "simulation").energy, simulation.time
     figure = sheet(height=4.2)
@@ -118,6 +125,14 @@ def frequencies(
 
     Raises:
         InvalidValueError: If there are less than two, or the times do not fit them.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
+        >>> states = sl.inverse(robot, path).state[::100]
+        >>> found = [sl.vibration(state, up_to=8.0) for state in states]
+        >>> axes = sl.plot.frequencies(found, path.time[::100])
     """
     states = tuple(instance(each, Vibration, f"vibrations[{k}]") for k, each in enumerate(vibrations))
     if len(states) < 2:
@@ -215,6 +230,15 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
 
     Raises:
         InvalidValueError: If there is no such quantity, or the poses are no grid.
+
+    Examples:
+        >>> import sagline as sl
+        >>> import numpy as np
+        >>> robot = sl.load_robot("cogiro")
+        >>> grid = np.meshgrid([-1, 1], [-1, 1], [1, 2], indexing="ij")
+        >>> poses = sl.Pose(np.stack(grid, axis=-1).reshape(-1, 3), np.eye(3))
+        >>> found = sl.frequency_map(robot, poses, up_to=8.0)
+        >>> figure = sl.plot.frequency_map(found)
     """
     name, label, logarithmic = MAP_QUANTITIES[choice(quantity, "quantity", MAP_QUANTITIES)]
     x, y, z, values = _gridded(instance(found, FrequencyMap, "found"), getattr(found, name))
@@ -284,6 +308,13 @@ def response(
 
     Raises:
         InvalidValueError: If the vibration has no modes or the response no frequencies, or there is no such motion.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> found = sl.vibration(sl.inverse(robot, pose).state, up_to=20.0)
+        >>> axes = sl.plot.response(found)
     """
     if isinstance(vibration, FrequencyResponse):
         curves, modes = curves_of_response(vibration, force, motion), []

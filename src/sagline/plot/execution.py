@@ -65,6 +65,11 @@ def execution(done: Execution) -> Figure:
 
     Raises:
         InvalidValueError: If the execution is none.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> figure = sl.plot.execution(done)  # doctest: +SKIP
     """
     instance(done, Execution, "execution")
     figure = sheet(height=7.6, width=WIDTH)
@@ -88,6 +93,11 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.states(done)  # doctest: +SKIP
     """
     ax = axes_or_new(ax, height=0.9)
     clock = _clock(done)
@@ -118,6 +128,11 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.measured_tensions(done)  # doctest: +SKIP
     """
     ax = axes_or_new(ax)
     clock = _clock(done)
@@ -137,6 +152,11 @@ def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
 
     Returns:
         The axes; empty for a robot without redundancy.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.mendable_tensions(done)  # doctest: +SKIP
     """
     ax = axes_or_new(ax, height=2.6)
     clock = _clock(done)
@@ -154,6 +174,11 @@ def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> done = sl.load_execution("run.mcap")  # doctest: +SKIP
+        >>> axes = sl.plot.place_errors(done)  # doctest: +SKIP
     """
     ax = axes_or_new(ax, height=2.6)
     clock = _clock(done)

@@ -36,6 +36,10 @@ def front(front: Front) -> Figure:
 
     Raises:
         InvalidValueError: If it is no front.
+
+    Examples:
+        >>> import sagline as sl
+        >>> figure = sl.plot.front(sl.load_front("front"))  # doctest: +SKIP
     """
     goals = instance(front, Front, "front").goals
     count = max(1, len(goals) - 1)

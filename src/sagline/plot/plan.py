@@ -65,6 +65,13 @@ def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None
 
     Raises:
         InvalidValueError: If there is no such quantity.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
+        >>> plan = sl.inverse(robot, path)
+        >>> axes = sl.plot.tensions(plan)
     """
     ax = axes_or_new(ax)
     _draw_cables(ax, plan, quantity, TENSIONS)
@@ -85,6 +92,13 @@ def lengths(plan: Plan, quantity: str = "unstrained_length", ax: Axes | None = N
 
     Raises:
         InvalidValueError: If there is no such quantity.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
+        >>> plan = sl.inverse(robot, path)
+        >>> axes = sl.plot.lengths(plan)
     """
     ax = axes_or_new(ax)
     _draw_cables(ax, plan, quantity, LENGTHS)
@@ -100,6 +114,13 @@ def overview(plan: Plan) -> Figure:
 
     Returns:
         A figure of four panels.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
+        >>> plan = sl.inverse(robot, path)
+        >>> figure = sl.plot.overview(plan)
     """
     rows, columns, height = (4, 1, 9.0) if current().narrow else (2, 2, 5.0)
     figure = sheet(height)
@@ -156,6 +177,13 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
+        >>> plan = sl.inverse(robot, path)
+        >>> axes = sl.plot.error(sl.confirm(plan))
     """
     ax = axes_or_new(ax, height=2.6)
     _draw_errors(ax, confirmation)
@@ -175,6 +203,16 @@ def errors(*confirmations: Confirmation) -> Figure:
 
     Raises:
         InvalidValueError: If there is none, or one is no confirmation.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
+        >>> plans = [
+        ...     sl.inverse(robot, path, model=model)
+        ...     for model in (sl.Straight(), sl.Elastic())
+        ... ]
+        >>> figure = sl.plot.errors(*map(sl.confirm, plans))
     """
     if not confirmations:
         raise InvalidValueError("confirmations", "none", "one at least", HOW_TO_GET["Confirmation"])
@@ -232,6 +270,13 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
 
     Raises:
         InvalidValueError: If there is no such quantity.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> path = sl.quintic_path([(0, 0, 1.5), (2, 1, 2.5)], speed=1.0)
+        >>> plan = sl.inverse(robot, path)
+        >>> figure = sl.plot.small_multiples(plan)
     """
     table = TENSIONS | LENGTHS
     label, scale = table[choice(quantity, "quantity", table)]
@@ -272,6 +317,10 @@ def path(path: Path, ax: Axes | None = None) -> Axes:
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> axes = sl.plot.path(sl.article_path())
     """
     ax = axes_or_new(ax, height=3.6, width=4.6)
     x, y, z = instance(path, Path, "path").pose.position.T
@@ -301,6 +350,10 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import sagline as sl
+        >>> axes = sl.plot.velocity(sl.article_path())
     """
     ax = axes_or_new(ax, height=2.6)
     for name, course, color, style in zip(

@@ -42,6 +42,12 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
     Raises:
         InvalidValueError: If there is no polygon to draw, or points are no tensions of its cables.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> axes = sl.plot.polygon(sl.tension_polygon(robot, pose))
     """
     if instance(shape, TensionPolygon, "shape").vertices.shape[1] != 2 or len(shape.vertices) == 0:
         raise InvalidValueError(

@@ -152,6 +152,10 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
 
     Raises:
         InvalidValueError: If no pose is given and the robot has no test box, or the pose is a batch.
+
+    Examples:
+        >>> import sagline as sl
+        >>> axes = sl.plot.robot(sl.load_robot("cogiro"))
     """
     where = pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
     optional(ax, Axes3D, "ax")

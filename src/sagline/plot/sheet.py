@@ -180,6 +180,10 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     Raises:
         InvalidValueError: If the drawing is none.
         FileError: If the file cannot be written, or its suffix is none that matplotlib knows.
+
+    Examples:
+        >>> import sagline as sl
+        >>> sl.plot.save(sl.plot.path(sl.article_path()), "path.svg")
     """
     if not isinstance(drawing, Figure | Axes):
         raise InvalidValueError("drawing", brief(drawing), "a figure of matplotlib, or its Axes", "Draw one first.")

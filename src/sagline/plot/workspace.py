@@ -67,6 +67,13 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
 
     Raises:
         InvalidValueError: If the place is not in the workspace's box, or the box is flat and the axis is not its own.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> loads = sl.WrenchBox(force=50.0, moment=5.0)
+        >>> space = sl.workspace(robot, wrenches=loads, cells=8)
+        >>> axes = sl.plot.slice(space, "z", at=2.0)
     """
     plane = _plane(instance(space, Workspace, "space"), normal, at)
     low, high = space.box.low, space.box.high
@@ -221,6 +228,13 @@ def workspace(space: Workspace) -> Figure:
 
     Raises:
         InvalidValueError: If it is no workspace.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> loads = sl.WrenchBox(force=50.0, moment=5.0)
+        >>> space = sl.workspace(robot, wrenches=loads, cells=8)
+        >>> figure = sl.plot.workspace(space)
     """
     flat = flat_axis(instance(space, Workspace, "space").box)
     if flat is not None:

@@ -180,6 +180,10 @@ def winch_drive(name: str) -> WinchDrive:
 
     Raises:
         InvalidValueError: If there is no such drive; the message suggests one that is near.
+
+    Examples:
+        >>> import sagline as sl
+        >>> drive = sl.winch_drive("yaskawa-sgmah-01aj1")
     """
     given: Any = name  # a caller without types gives anything
     word = str(given) if isinstance(given, str) else ""

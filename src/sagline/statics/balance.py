@@ -35,6 +35,12 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike
         InvalidValueError: If several robots are not one a pose or do not fit together, or the poses, the twists and
             their rates are not N of each.
 
+    Examples:
+        >>> import sagline as sl
+        >>> robot, path = sl.load_robot("cogiro"), sl.article_path()
+        >>> sl.inertial_wrench(robot, path.pose, path.twist, path.twist_rate).shape
+        (6001, 6)
+
     Source:
         Newton and Euler; docs/model.md, section 4. With the angular velocity itself, not Euler-angle rates.
     """
@@ -106,6 +112,13 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
         CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
             cable.
 
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> sl.structure_matrix(robot, pose).shape
+        (6, 8)
+
     Source:
         docs/model.md, section 1.
     """
@@ -136,6 +149,13 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
         InvalidValueError: If robot or pose are none, or k_h is no number.
         CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
             cable.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("article-suspended")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 1.5), 0.0, 0.0, 0.0)
+        >>> [each.shape for each in sl.article_balance(robot, pose)]
+        [(6, 8), (6,)]
 
     Source:
         Gia Luan & Truong Thinh 2020, equations (26), (27), (50), (51).

@@ -113,6 +113,10 @@ def load_sweep(file: os.PathLike[str] | str) -> Request:
 
     Raises:
         FileError: If the file cannot be read, or what it says is no request; the message names the key.
+
+    Examples:
+        >>> import sagline as sl
+        >>> request = sl.load_sweep("own_sweep.yaml")  # doctest: +SKIP
     """
     path = file_path(file)
     if path.suffix.lower() not in (".yaml", ".yml"):

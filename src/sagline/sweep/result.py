@@ -233,6 +233,10 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
     Raises:
         FileError: If it is no folder of a sweep, or damaged.
         InvalidValueError: If Zarr is not installed.
+
+    Examples:
+        >>> import sagline as sl
+        >>> result = sl.sweep.load("output/sweep")  # doctest: +SKIP
     """
     path = file_path(folder, "folder", folder=True)
     check_package("zarr", "sweeps")

@@ -21,6 +21,12 @@ def without_cables(robot: Robot, *cables: int) -> Robot:
 
     Raises:
         InvalidValueError: If an index names no cable, or no cable is left.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> sl.without_cables(robot, 3).cable_count
+        7
     """
     kept = np.ones(instance(robot, Robot, "robot").cable_count, dtype=bool)
     for cable in cables:

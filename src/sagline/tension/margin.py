@@ -29,6 +29,13 @@ def limit_margin(state: Equilibrium) -> Array:
 
     Raises:
         InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> round(float(sl.limit_margin(sl.inverse(robot, pose).state)), 1)
+        225.3
     """
     margin: Array = cable_margins(state).min(axis=-1)
     return margin
@@ -59,6 +66,13 @@ def capacity_margin(state: Equilibrium) -> Array:
 
     Raises:
         InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> round(float(sl.capacity_margin(sl.inverse(robot, pose).state)))
+        511
 
     Source:
         Bouchard, Gosselin & Moore 2010; Guay, Cardou, Cruz-Ruiz & Caro 2014.

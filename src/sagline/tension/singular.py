@@ -43,6 +43,12 @@ def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
     Raises:
         InvalidValueError: If there is not one pose.
         CableGeometryError: If both ends of a cable coincide.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> pose = sl.Pose.from_euler((1.0, 0.5, 2.0), 0.0, 0.0, 0.0)
+        >>> motion = sl.unresisted_motion(robot, pose)
     """
     instance(robot, Robot, "robot")
     if instance(pose, Pose, "pose").shape:
