@@ -1,17 +1,20 @@
 """Fields of input types: name, default, unit and allowed range stand once, where the type declares the field.
 
 A type is `attrs.frozen`; a field has a converter, from which a type checker knows what the constructor takes, and the
-arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks what is given.
+arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks what is given. A dataclass of
+single numbers derives from `NumberFields` and declares its ranges in the same way.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 from attrs import fields
 from numpy.typing import ArrayLike
 
-from sagline.core.arrays import Array
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array, number
 
 
 def given(value: ArrayLike) -> Array:
@@ -27,6 +30,25 @@ def if_known(value: ArrayLike | None) -> Array | None:
 def rule(unit: str = "", **limits: Any) -> dict[str, Any]:
     """Metadata of a field: arguments of `checked`."""
     return {"unit": unit, **limits}
+
+
+class NumberFields:
+    """Base of dataclasses whose fields are single numbers: those with a `rule` as metadata are checked when made.
+
+    A field whose rule has `most` is a whole number from 0 to that. None is allowed where it is the default.
+    """
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for about in dataclasses.fields(self):  # type: ignore[arg-type]
+            value, limits = getattr(self, about.name), dict(about.metadata)
+            if not limits or (value is None and about.default is None):
+                continue
+            most = limits.pop("most", None)
+            good = number(value, about.name, **limits) if most is None else whole_number(value, about.name, 0, most)
+            object.__setattr__(self, about.name, good)
 
 
 def reduced(value: Any) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:

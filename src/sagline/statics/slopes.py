@@ -103,6 +103,26 @@ def on_platform(forces: Array, levers: Array) -> Array:
     return np.swapaxes(np.concatenate((forces, np.cross(levers, forces)), axis=-1), -1, -2)
 
 
+def motions_of_ends(levers: Array) -> Array:
+    """Matrices from a motion of the platform (..., 6) [m, rad] to those of the platform ends, (..., m, 3, 6)."""
+    motion = np.eye(6)
+    ends: Array = np.swapaxes(motion[:, :3] + np.cross(motion[:, 3:], levers[..., None, :]), -1, -2)
+    return ends
+
+
+def platform_end_forces(state: Equilibrium) -> Array:
+    """Forces on the cables of a single state at their platform ends, world axes [N], (m, 3)."""
+    reach = (state.pose.transform(state.one_robot.platform_anchors) - state.exit_point)[:, :2]
+    level = reach / np.maximum(np.hypot(reach[:, 0], reach[:, 1]), _TINY)[:, None]
+    return np.column_stack((level * state.cables.horizontal_tension[:, None], state.cables.vertical_force))
+
+
+def frame_end_forces(state: Equilibrium) -> Array:
+    """Forces in the cables of a single state at their frame ends, towards the platform, world axes [N], (m, 3)."""
+    weight = state.cables.cable_weight[:, None] * np.array([0.0, 0.0, 1.0])
+    return platform_end_forces(state) - weight
+
+
 _LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a meter of the cable's own
 
 

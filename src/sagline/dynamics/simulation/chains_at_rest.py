@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
+from sagline.dynamics.simulation.results import displaced_pose
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
+from sagline.statics.slopes import platform_end_forces
 
 STEPS = 60
 NEAR = 1e-8  # of a length, of a force: Newton squares what is left, and one more step leaves rounding
@@ -93,7 +94,7 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
     chains = LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
     center, freedom = robot.center_of_mass, robot.freedom
     given = state.wrench - np.array([0.0, 0.0, robot.mass * robot.gravity, 0.0, 0.0, 0.0])
-    force = _force_of(state)
+    force = platform_end_forces(state)
     _refuse_slack(force, chains)
     pose, near = state.pose, False
     for _ in range(STEPS):
@@ -102,7 +103,7 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
         unbalance = np.concatenate((force.sum(axis=0), np.cross(levers, force).sum(axis=0))) - given
         blocks = np.asarray(np.linalg.inv(chains.compliance(force)), dtype=np.float64)
         motion = _balancing_motion(unbalance, _platform_stiffness(blocks, levers, force), freedom, _size(levers))
-        pose = _displaced(pose, center, motion)
+        pose = displaced_pose(pose, robot, motion)
         if near:
             break
         near = bool(np.abs(motion).max() <= NEAR * length.max())
@@ -115,15 +116,6 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
     place[:, 1:] = ends[:, None] - np.cumsum(chains.steps(force), axis=1)
     place[:, -1] = exits
     return ChainsAtRest(pose, np.ascontiguousarray(np.swapaxes(place, 1, 2)), force)
-
-
-def _force_of(state: Equilibrium) -> Array:
-    """Forces on the platform ends of the exact cables, world axes, shape (m, 3)."""
-    chord = state.pose.transform(state.one_robot.platform_anchors) - state.exit_point
-    reach = np.hypot(chord[:, 0], chord[:, 1])
-    level = chord[:, :2] / np.where(reach > 0.0, reach, 1.0)[:, None]
-    sideways = level * state.cables.horizontal_tension[:, None]
-    return np.column_stack((sideways, state.cables.vertical_force))
 
 
 def _refuse_slack(force: Array, chains: LumpedCables) -> None:
@@ -189,9 +181,3 @@ def _cross_matrix(vectors: Array) -> Array:
     matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -z, y, -x
     matrix[:, 1, 0], matrix[:, 2, 0], matrix[:, 2, 1] = z, -y, x
     return matrix
-
-
-def _displaced(pose: Pose, center: Array, motion: Array) -> Pose:
-    """The pose after a motion: the center of mass displaced, the platform turned about it."""
-    rotation = Rotation.from_rotvec(motion[3:]) * pose.rotation
-    return Pose(pose.position + pose.matrix @ center + motion[:3] - rotation.as_matrix() @ center, rotation)

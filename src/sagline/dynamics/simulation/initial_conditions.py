@@ -80,18 +80,23 @@ class TimeTable:
         pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
         return TimeTable(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
 
-    def at(self, time: float) -> tuple[Array, Array]:
-        """Values and rates (n,) at a time; where the rate jumps, the later one."""
-        if len(self.time) == 1 or time < self.time[0] or time >= self.time[-1]:
-            return self.value[0 if time < self.time[0] else -1], np.zeros(self.value.shape[1])
-        k = int(np.searchsorted(self.time, time, side="right")) - 1
-        whole = self.time[k + 1] - self.time[k]
-        x = (time - self.time[k]) / whole
-        slope = (self.value[k + 1] - self.value[k]) / whole
+    def at(self, time: float | Array) -> tuple[Array, Array]:
+        """Values and rates (..., n) at times (...); where the rate jumps, the later one."""
+        at = np.asarray(time)
+        if len(self.time) == 1:
+            value = np.zeros((*at.shape, 1)) + self.value[0]
+            return value, np.zeros_like(value)
+        k = np.clip(np.searchsorted(self.time, at, side="right") - 1, 0, len(self.time) - 2)
+        whole = (self.time[k + 1] - self.time[k])[..., None]
+        x = np.clip((at - self.time[k])[..., None] / whole, 0.0, 1.0)
+        low, high = self.value[k], self.value[k + 1]
+        slope = (high - low) / whole
         begin, end = self.begin[k] - slope, self.end[k] - slope
         bend = (1.0 - x) * begin - x * end
-        value = (1.0 - x) * self.value[k] + x * self.value[k + 1] + whole * x * (1.0 - x) * bend
-        return value, slope + (1.0 - 2.0 * x) * bend - x * (1.0 - x) * (begin + end)
+        value = (1.0 - x) * low + x * high + whole * x * (1.0 - x) * bend
+        rate = slope + (1.0 - 2.0 * x) * bend - x * (1.0 - x) * (begin + end)
+        within = (at >= self.time[0]) & (at < self.time[-1])
+        return value, np.where(within[..., None], rate, 0.0)
 
     def with_instant(self, time: float) -> TimeTable:
         """Time table with one more instant."""

@@ -8,18 +8,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
-from sagline.dynamics.simulation.initial_conditions import InitialConditions, TimeTable
-from sagline.dynamics.simulation.results import Simulation, energy_balance, twist_of_origin
+from sagline.dynamics.simulation.initial_conditions import InitialConditions
+from sagline.dynamics.simulation.results import Simulation, displaced_pose, energy_balance, twist_of_origin
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
 from sagline.kernels import codes
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
+from sagline.statics.slopes import frame_end_forces, motions_of_ends
 from sagline.statics.stiffness import Stiffness, modes, stiffness
 
 UP_TO: Final = 1.5  # of the highest massless frequency: modes above answer as at rest
@@ -69,37 +68,19 @@ def modal_model(state: Equilibrium, damping: Damping) -> ModalModel:
         raise InvalidValueError("start", found.status.text, 'a state with linear vibrations for "modal"', step)
     rest, square = stiffness(state), (2.0 * np.pi * found.frequency) ** 2
     force = _forces_at_frame(state, found, rest)
-    along = _at_frame(state)
+    along = frame_end_forces(state)
     size = np.linalg.norm(along, axis=1)
     unit = along / size[:, None]
     let_out = unit * (1.0 + size / state.cables.cable.axial_stiffness)[:, None]
     drive = np.concatenate((np.einsum("kmi,mi->km", force, let_out), found.shape.T), axis=1)
     pulled = np.einsum("kmi,mi->mk", force, unit)
-    ends = _ends_by_motion(state) @ rest.compliance
+    levers = (state.one_robot.platform_anchors - state.one_robot.center_of_mass) @ state.pose.matrix.T
+    ends = motions_of_ends(levers) @ rest.compliance
     by_wrench = np.einsum("mi,mij,mjk->mk", unit, rest.cable_stiffness, ends)
     whole = np.concatenate((rest.length_sensitivity, rest.compliance), axis=1)
     tension = np.concatenate((rest.tension_sensitivity, by_wrench), axis=1)
     slow = drive / square[:, None]
     return ModalModel(found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow)
-
-
-def _at_frame(state: Equilibrium) -> Array:
-    """Forces in the cables at their frame ends, towards the platform, world axes [N], (m, 3)."""
-    chord = state.pose.transform(state.one_robot.platform_anchors) - state.exit_point
-    reach = np.maximum(np.hypot(chord[:, 0], chord[:, 1]), 1e-300)
-    level = chord[:, :2] * (state.cables.horizontal_tension / reach)[:, None]
-    return np.column_stack((level, state.cables.vertical_force - state.cables.cable_weight))
-
-
-def _ends_by_motion(state: Equilibrium) -> Array:
-    """Displacements of the platform ends by a motion of the platform, (m, 3, 6)."""
-    robot = state.one_robot
-    x, y, z = ((robot.platform_anchors - robot.center_of_mass) @ state.pose.matrix.T).T
-    ends = np.zeros((robot.cable_count, 3, 6))
-    ends[:, :, :3] = np.eye(3)
-    ends[:, 0, 4], ends[:, 0, 5], ends[:, 1, 5] = z, -y, x
-    ends[:, 1, 3], ends[:, 2, 3], ends[:, 2, 4] = -z, y, -x
-    return ends
 
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
@@ -108,7 +89,7 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
     Along a cable f = f_0 - g with g' = rho omega^2 u; its end moves by the integral of C f.
     """
     material, length = state.cables.cable, state.free_length
-    at_frame, points = _at_frame(state), found.cable_shape.shape[2]
+    at_frame, points = frame_end_forces(state), found.cable_shape.shape[2]
     square = (2.0 * np.pi * found.frequency) ** 2
     weight = state.cables.cable_weight
     force = np.empty((len(square), len(length), 3))
@@ -125,21 +106,6 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
         missing = CubicSpline(s, bent).antiderivative()(length[i])
         force[:, i] = (shape[-1] + missing) @ rest.cable_stiffness[i].T
     return force
-
-
-def table_values(table: TimeTable, time: Array) -> Array:
-    """Values (N, n) of a course at times (N,)."""
-    if len(table.time) == 1:
-        return np.repeat(table.value, len(time), axis=0)
-    at = np.clip(time, table.time[0], table.time[-1])
-    k = np.clip(np.searchsorted(table.time, at, side="right") - 1, 0, len(table.time) - 2)
-    whole = (table.time[k + 1] - table.time[k])[:, None]
-    x = (at - table.time[k])[:, None] / whole
-    low, high = table.value[k], table.value[k + 1]
-    slope = (high - low) / whole
-    bend = (1.0 - x) * (table.begin[k] - slope) - x * (table.end[k] - slope)
-    values: Array = (1.0 - x) * low + x * high + whole * x * (1.0 - x) * bend
-    return values
 
 
 def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> ModalMotion:
@@ -195,7 +161,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
     )
     time: Array = given.begin + size * np.arange(count + 1, dtype=np.float64)
     kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # the end too
-    lengths, wrenches = table_values(given.lengths, time), table_values(given.wrench, time)
+    lengths, wrenches = given.lengths.at(time)[0], given.wrench.at(time)[0]
     change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
     _check_small_changes(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
     response = modal_response(frequency, found.loss, change @ model.drive.T, size)
@@ -205,7 +171,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
     supplied, lost = response.supplied[kept], response.lost[kept]
     at_steps = state.cables.frame_end_tension + response.amplitude @ model.pulled.T + change @ model.tension.T
     slopes = np.gradient(driven, time[kept], axis=0)
-    moving, pose = rate @ found.shape.T + slopes @ model.motion.T, _displaced(state, motion)
+    moving, pose = rate @ found.shape.T + slopes @ model.motion.T, displaced_pose(state.pose, given.robot, motion)
     return Simulation(
         robot=given.robot,
         time=locked(time[kept].copy()),
@@ -251,14 +217,6 @@ def _check_small_changes(most: Array, state: Equilibrium) -> None:
         value, allowed = f"{most[i]:.3g} m from its own", f'<= {SMALL * state.free_length[i]:.3g} m for "modal"'
         step = 'Give cable_mass="lumped", which knows large motions.'
         raise InvalidValueError(f"unstrained_length: cable {i}", value, allowed, step)
-
-
-def _displaced(state: Equilibrium, motion: Array) -> Pose:
-    """Poses after motions (N, 6) of the platform: its center of mass displaced, itself turned about it."""
-    center = state.pose.matrix @ state.one_robot.center_of_mass
-    turned = Rotation.from_rotvec(motion[:, 3:])
-    place = state.pose.position + center + motion[:, :3] - turned.as_matrix() @ center
-    return Pose.from_quaternion(place, (turned * state.pose.rotation).as_quat())
 
 
 def _shapes(state: Equilibrium, found: Vibration, amplitude: Array) -> Array:

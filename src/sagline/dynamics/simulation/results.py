@@ -7,21 +7,24 @@ from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from sagline.core.arguments import brief, whole_number
-from sagline.core.arrays import Array, locked, number
+from sagline.core.arguments import brief
+from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import NumberFields, rule
 from sagline.core.results import Result, Saved
 from sagline.dynamics.simulation.winches import Winches
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-LAST: Final = 9_999  # cable or winch; no robot has more
+WHICH: Final = rule(most=9_999)  # cable or winch; no robot has more
+TIME, MASS = rule("s"), rule("kg", above=0.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Break:
+class Break(NumberFields):
     """A cable breaks: from then on it is not there. Its energy goes with it, as `energy.removed`.
 
     Attributes:
@@ -29,17 +32,12 @@ class Break:
         time: When [s].
     """
 
-    cable: int
-    time: float
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        object.__setattr__(self, "cable", whole_number(self.cable, "cable", 0, LAST))
-        object.__setattr__(self, "time", number(self.time, "time", "s"))
+    cable: int = field(metadata=WHICH)
+    time: float = field(metadata=TIME)
 
 
 @dataclass(frozen=True, slots=True)
-class Stall:
+class Stall(NumberFields):
     """A winch stops at once, and stands from then on while the others go on.
 
     Attributes:
@@ -47,17 +45,12 @@ class Stall:
         time: When [s].
     """
 
-    winch: int
-    time: float
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, LAST))
-        object.__setattr__(self, "time", number(self.time, "time", "s"))
+    winch: int = field(metadata=WHICH)
+    time: float = field(metadata=TIME)
 
 
 @dataclass(frozen=True, slots=True)
-class Brake:
+class Brake(NumberFields):
     """The rates that a winch is asked for, or those of all winches together, fall evenly to zero and stay there.
 
     With one duration for all the platform keeps to the direction of its path.
@@ -68,20 +61,13 @@ class Brake:
         duration: How long it takes [s], > 0.
     """
 
-    time: float
-    winch: int | None = None
-    duration: float = 0.2
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        object.__setattr__(self, "time", number(self.time, "time", "s"))
-        if self.winch is not None:
-            object.__setattr__(self, "winch", whole_number(self.winch, "winch", 0, LAST))
-        object.__setattr__(self, "duration", number(self.duration, "duration", "s", above=0.0))
+    time: float = field(metadata=TIME)
+    winch: int | None = field(default=None, metadata=WHICH)
+    duration: float = field(default=0.2, metadata=rule("s", above=0.0))
 
 
 @dataclass(frozen=True, slots=True)
-class Drop:
+class Drop(NumberFields):
     """A part of the platform's mass falls off; the inertia shrinks with it, the center of mass stays where it is.
 
     Attributes:
@@ -89,17 +75,12 @@ class Drop:
         time: When [s].
     """
 
-    mass: float
-    time: float
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        object.__setattr__(self, "mass", number(self.mass, "mass", "kg", above=0.0))
-        object.__setattr__(self, "time", number(self.time, "time", "s"))
+    mass: float = field(metadata=MASS)
+    time: float = field(metadata=TIME)
 
 
 @dataclass(frozen=True, slots=True)
-class PickUp:
+class PickUp(NumberFields):
     """A mass at rest is fixed to the platform: its momentum is then the momentum of both.
 
     The inertia grows with the mass, the center of mass stays where it is.
@@ -109,13 +90,8 @@ class PickUp:
         time: When [s].
     """
 
-    mass: float
-    time: float
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        object.__setattr__(self, "mass", number(self.mass, "mass", "kg", above=0.0))
-        object.__setattr__(self, "time", number(self.time, "time", "s"))
+    mass: float = field(metadata=MASS)
+    time: float = field(metadata=TIME)
 
 
 Event: TypeAlias = Break | Stall | Brake | Drop | PickUp
@@ -270,6 +246,14 @@ def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Arra
     """The balance of five energies [J], each of shape (N,)."""
     total = kinetic + potential - supplied + lost + removed
     return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
+
+
+def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
+    """Pose after a motion (..., 6) [m, rad]: the center of mass displaced, the platform turned about it."""
+    center = pose.matrix @ robot.center_of_mass
+    turned = Rotation.from_rotvec(motion[..., 3:])
+    place = pose.position + center + motion[..., :3] - turned.as_matrix() @ center
+    return Pose.from_quaternion(place, (turned * pose.rotation).as_quat())
 
 
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 
 from sagline.core.arguments import brief, choice
-from sagline.core.arrays import Array, locked, number
+from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import NumberFields, rule
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.period import read_cells, read_encoders
 from sagline.kernels.jit import machine_code
@@ -22,7 +23,7 @@ NEEDED: Final = ("drum_radius", "inertia", "position_gain", "speed_gain", "integ
 
 
 @dataclass(frozen=True, slots=True)
-class SecondOrder:
+class SecondOrder(NumberFields):
     """Winches whose lengths follow their set points as a damped mass on a spring does.
 
     On a set point that moves at a steady rate they lag by 2 damping_ratio / (2 pi bandwidth) times that rate.
@@ -35,13 +36,8 @@ class SecondOrder:
         InvalidValueError: If a value is not positive.
     """
 
-    bandwidth: float
-    damping_ratio: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        object.__setattr__(self, "bandwidth", number(self.bandwidth, "bandwidth", "Hz", above=0.0))
-        object.__setattr__(self, "damping_ratio", number(self.damping_ratio, "damping_ratio", "", above=0.0))
+    bandwidth: float = field(metadata=rule("Hz", above=0.0))
+    damping_ratio: float = field(default=1.0, metadata=rule(above=0.0))
 
 
 Winches: TypeAlias = Literal["ideal", "robot"] | SecondOrder

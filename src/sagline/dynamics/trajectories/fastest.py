@@ -9,18 +9,16 @@ from typing import Final
 import numpy as np
 
 from sagline.core.arguments import callback, instance
-from sagline.core.arrays import Array, locked, number
+from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
 from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes, Profile, fastest_speed_profile
 from sagline.dynamics.trajectories.jerk_bounded import Bounds, JerkProfile, fastest_jerk_profile
-from sagline.dynamics.trajectories.segments import Curve, RestToRestSegment, segments_of
-from sagline.dynamics.trajectories.shapers import sample_time
+from sagline.dynamics.trajectories.segments import Curve, RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.kinematics.inverse import inverse
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
-from sagline.motion.rest_to_rest import time_grid
 from sagline.robot.drum import drum_lever
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -105,7 +103,7 @@ def fastest(
         0.96 s True
     """
     inner = _with_margin(instance(robot, Robot, "robot"), number(margin, "margin", "N", low=0.0))
-    step = sample_time(instance(path, Path, "path"))
+    sample_time(instance(path, Path, "path"))  # refuses a path of one sample
     limits = (
         np.inf if jerk is None else number(jerk, "jerk", "m/s^3", above=0.0),
         np.inf if angular_jerk is None else number(angular_jerk, "angular_jerk", "rad/s^3", above=0.0),
@@ -119,7 +117,7 @@ def fastest(
             progress(k + 1, len(segments))
     bounded = bool(np.isfinite(limits).any())
     for again in range(_TRIES):
-        new = _joined_path(path, step, segments, timed, bounded)
+        new = _joined(path, segments, timed, bounded)
         plan = inverse(inner, new)
         slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
@@ -236,24 +234,15 @@ def _speed_excess(plan: Plan) -> float:
     return ratio * (1.0 + _SLOWER) if ratio > 1.0 else 1.0
 
 
-def _joined_path(
-    path: Path, step: float, segments: Sequence[RestToRestSegment], timed: Sequence[_TimedSegment | None], bounded: bool
+def _joined(
+    path: Path, segments: Sequence[RestToRestSegment], timed: Sequence[_TimedSegment | None], bounded: bool
 ) -> Path:
     """The moves one after the other, sampled."""
-    durations = [
-        segment.duration if one is None else one.duration for segment, one in zip(segments, timed, strict=True)
-    ]
-    ends = np.cumsum(durations)
-    rests = np.append(0.0, ends)
-    time = time_grid(float(ends[-1]), 1.0 / step)
-    position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
-    which = np.minimum(np.searchsorted(ends, time, side="right"), len(segments) - 1)
-    for k, (segment, one) in enumerate(zip(segments, timed, strict=True)):
-        part = which == k
-        pose = path.pose[segment.sample]
-        if one is not None:
-            pose, rates[:, part] = one.at(time[part] - rests[k])
-        position[part], quaternion[part] = pose.position, pose.quaternion
-    jerk = locked(rates[2]) if bounded else None
-    start = path.time[0]
-    return Path(time + start, Pose.from_quaternion(position, quaternion), rates[0], rates[1], jerk, rests + start)
+
+    def motion(k: int, time: Array) -> tuple[Pose, Array]:
+        one = timed[k]
+        assert one is not None
+        return one.at(time)
+
+    durations = [(segment if one is None else one).duration for segment, one in zip(segments, timed, strict=True)]
+    return joined_path(path, segments, durations, motion, with_jerk=bounded)

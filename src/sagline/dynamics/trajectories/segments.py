@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import comb, factorial
@@ -9,9 +10,10 @@ from typing import Any, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from sagline.core.arrays import Array
+from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
+from sagline.motion.rest_to_rest import time_grid
 from sagline.motion.segments import QUINTIC, Segments
 from sagline.robot.pose import Pose
 
@@ -326,3 +328,38 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
     way = lengths(time, *rates[:2])
     way /= way[0, -1]
     return SplineCurve.through(pose, way[0]), way
+
+
+def sample_time(path: Path) -> float:
+    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that."""
+    if len(path) < 2:
+        raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
+    rate = 1.0 / float(np.median(np.diff(path.time)))
+    return 1.0 / (round(rate) if abs(rate - round(rate)) <= 1e-6 * rate else rate)
+
+
+def joined_path(
+    path: Path,
+    segments: Sequence[RestToRestSegment],
+    durations: Sequence[float],
+    motion: Callable[[int, Array], tuple[Pose, Array]],
+    *,
+    with_jerk: bool,
+) -> Path:
+    """Segments of a path with new durations [s], at its sample rate.
+
+    `motion` takes the number of a segment that moves and times since its begin; it returns poses and twists with their
+    first two derivatives, (3, N, 6).
+    """
+    ends = np.cumsum(durations)
+    rests = np.append(0.0, ends)
+    time = time_grid(float(ends[-1]), 1.0 / sample_time(path))
+    position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
+    which = np.minimum(np.searchsorted(ends, time, side="right"), len(segments) - 1)
+    for k, segment in enumerate(segments):
+        part, pose = which == k, path.pose[segment.sample]
+        if segment.curve is not None:
+            pose, rates[:, part] = motion(k, time[part] - rests[k])
+        position[part], quaternion[part] = pose.position, pose.quaternion
+    jerk, start = locked(rates[2]) if with_jerk else None, path.time[0]
+    return Path(time + start, Pose.from_quaternion(position, quaternion), rates[0], rates[1], jerk, rests + start)

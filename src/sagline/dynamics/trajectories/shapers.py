@@ -16,9 +16,8 @@ from sagline.core.arrays import Array, broadcast_shape, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
-from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
+from sagline.dynamics.trajectories.segments import RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.motion.path import Path, checked_time
-from sagline.motion.rest_to_rest import time_grid
 from sagline.robot.pose import Pose
 
 MOST_IMPULSES: Final = 10_000  # three for each of eight frequencies are 6,561
@@ -290,24 +289,17 @@ def shaped(path: Path, shaper: Shaper) -> Path:
         limit = f"<= {0.5 / step:g} Hz, half the path's sample rate"
         raise InvalidValueError("the shaper's frequency", f"{fastest:g} Hz", limit, "Give the path a higher rate.")
     segments = segments_of(path)
-    longer = np.array([segment.duration + (0.0 if segment.curve is None else shaper.duration) for segment in segments])
-    ends = np.cumsum(longer)
-    rests = np.append(0.0, ends)
-    time = time_grid(float(ends[-1]), 1.0 / step)
-    check_memory("the shaped path", _BYTES * time.size * shaper.time.size, "Shape a shorter path.")
-    position, quaternion, rates = np.empty((time.size, 3)), np.empty((time.size, 4)), np.zeros((3, time.size, 6))
-    which = np.minimum(np.searchsorted(ends, time, side="right"), len(segments) - 1)
-    for k, segment in enumerate(segments):
-        part = which == k
-        pose = _held(path, segment)
-        if segment.curve is not None:
-            motion = shaped_parameter(segment, shaper, time[part] - rests[k])
-            jet = segment.curve.at(motion[0])
-            pose, rates[:, part] = jet.pose, jet.twists(motion)
-        position[part], quaternion[part] = pose.position, pose.quaternion
-    start = path.time[0]
-    kept = None if path.jerk is None else locked(rates[2])
-    return Path(time + start, Pose.from_quaternion(position, quaternion), rates[0], rates[1], kept, rests + start)
+    longer = [segment.duration + (0.0 if segment.curve is None else shaper.duration) for segment in segments]
+    check_memory("the shaped path", _BYTES * (sum(longer) / step) * shaper.time.size, "Shape a shorter path.")
+
+    def motion(k: int, time: Array) -> tuple[Pose, Array]:
+        curve = segments[k].curve
+        assert curve is not None
+        parameter = shaped_parameter(segments[k], shaper, time)
+        jet = curve.at(parameter[0])
+        return jet.pose, jet.twists(parameter)
+
+    return joined_path(path, segments, longer, motion, with_jerk=path.jerk is not None)
 
 
 def shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) -> Array:
@@ -316,16 +308,3 @@ def shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) ->
     for delay, share in zip(shaper.time, shaper.amplitude, strict=True):
         motion += share * segment.rates(time - delay)
     return motion
-
-
-def _held(path: Path, segment: RestToRestSegment) -> Pose:
-    """Pose of the platform at the first sample of a segment."""
-    return path.pose[segment.sample]
-
-
-def sample_time(path: Path) -> float:
-    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that."""
-    if len(path) < 2:
-        raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
-    rate = 1.0 / float(np.median(np.diff(path.time)))
-    return 1.0 / (round(rate) if abs(rate - round(rate)) <= 1e-6 * rate else rate)

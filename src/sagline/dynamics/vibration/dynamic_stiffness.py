@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sagline.core.arguments import instance, optional
-from sagline.core.arrays import Array, checked, locked, number
+from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError, SaglineError
+from sagline.core.fields import NumberFields, rule
 from sagline.core.memory import check_memory
 from sagline.kernels import codes
 from sagline.kernels.dynamics import collocation
@@ -20,7 +21,7 @@ from sagline.statics.strings import Strings, strings_of
 
 
 @dataclass(frozen=True, slots=True)
-class Damping:
+class Damping(NumberFields):
     """Damping of a vibration; none by default.
 
     Attributes:
@@ -36,14 +37,13 @@ class Damping:
         docs/vibration.md.
     """
 
-    loss_time: float = 0.0
-    air_damping: float = 0.0
-    modal_damping: float = 0.0
+    loss_time: float = field(default=0.0, metadata=rule("s", low=0.0))
+    air_damping: float = field(default=0.0, metadata=rule("N s/m^2", low=0.0))
+    modal_damping: float = field(default=0.0, metadata=rule(low=0.0))
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name, unit in (("loss_time", "s"), ("air_damping", "N s/m^2"), ("modal_damping", "")):
-            object.__setattr__(self, name, number(getattr(self, name), name, unit, low=0.0))
+        NumberFields.__post_init__(self)
         if self.modal_damping >= 1.0:
             step = "Give the ratio, 0.01 for 1 %."
             raise InvalidValueError("modal_damping", f"{self.modal_damping:g}", "< 1", step)

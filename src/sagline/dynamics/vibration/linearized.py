@@ -14,7 +14,14 @@ from sagline.core.results import Result
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.dynamics.vibration.flexibility import flexibility
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
+from sagline.statics.slopes import (
+    CableSlopes,
+    cable_slopes,
+    frame_end_forces,
+    motions_of_ends,
+    on_platform,
+    tension_slopes,
+)
 from sagline.statics.stiffness import mass_matrix, modes
 
 if TYPE_CHECKING:
@@ -241,11 +248,9 @@ def _loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> _Loss:
     if not np.isfinite(per_motion).all():
         step = "Give modal_damping instead, or tighten the cable."
         raise InvalidValueError("state", "one with a folded cable", "cables that stretch, for loss_time", step)
-    unit = np.eye(6)
-    ends = unit[:, :3] + np.cross(unit[:, 3:], slopes.levers[:, None, :])
-    forces = ends @ np.swapaxes(per_motion, -1, -2)
+    forces = np.swapaxes(per_motion @ motions_of_ends(slopes.levers), -1, -2)
     by_motion = np.stack([on_platform(forces[:, k], slopes.levers).sum(axis=-1) for k in range(6)], axis=-1)
-    at_frame = slopes.force - np.array([0.0, 0.0, 1.0]) * state.cables.cable_weight[..., None]
+    at_frame = frame_end_forces(state)
     direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
     return _Loss(
         by_motion,

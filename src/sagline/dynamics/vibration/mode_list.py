@@ -11,7 +11,7 @@ from sagline.dynamics.vibration.flexibility import flexibility
 from sagline.dynamics.vibration.vibration import Vibration
 from sagline.kernels.dynamics import string as columns
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.slopes import cable_slopes
+from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import Modes, modes
 from sagline.statics.strings import Strings, strings_of
 
@@ -24,9 +24,7 @@ def end_displacements(state: Equilibrium, shape: Array) -> Array:
     Shapes: shape (6, n); returns (m, 3, n).
     """
     robot = state.one_robot
-    levers = state.pose.transform(robot.platform_anchors) - state.pose.transform(robot.center_of_mass)
-    turned = np.cross(shape[3:].T, levers[:, None])  # (m, n, 3)
-    return np.asarray(shape[:3] + np.swapaxes(turned, 1, 2))
+    return motions_of_ends((robot.platform_anchors - robot.center_of_mass) @ state.pose.matrix.T) @ shape
 
 
 def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:

@@ -10,7 +10,7 @@ from sagline.core.arrays import Array
 from sagline.kernels.dynamics.string import SMOOTH, TINY
 from sagline.kernels.dynamics.transfer import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.slopes import CableSlopes, cable_slopes
+from sagline.statics.slopes import CableSlopes, cable_slopes, motions_of_ends
 from sagline.statics.stiffness import mass_matrix, stiffness
 
 
@@ -223,8 +223,7 @@ def _correction(rest: StateSlopes, cables: tuple[Cable, ...], omega: float, grou
 def _equations(rest: StateSlopes, waves: list[Waves], omega: float, scale: Array | None = None) -> tuple[Array, Array]:
     """Balance of the free motions and ends that meet, (n + 3 m, n + 3 m), and what its columns were multiplied by."""
     freedom, levers = rest.state.one_robot.freedom, rest.slopes.levers
-    n, unit = len(freedom), np.eye(6)
-    ends = np.swapaxes(unit[:, :3] + np.cross(unit[:, 3:], levers[:, None]), -1, -2)  # (m, 3, 6)
+    n, ends = len(freedom), motions_of_ends(levers)
     matrix = np.zeros((n + 3 * len(waves), n + 3 * len(waves)))
     held = -(omega**2) * rest.mass
     held[3:, 3:] += lever_form(np.eye(3), levers, rest.slopes.force).sum(axis=0)

@@ -16,7 +16,7 @@ from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.statics.slopes import cable_slopes
+from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
 from sagline.statics.strings import COUNTING, Strings, strings_of, undamped
 
@@ -87,14 +87,9 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
     slopes = cable_slopes(state)
     matrix = slopes.matrix.reshape(-1, 6, 6)
     levers = slopes.levers.reshape(len(matrix), -1, 3)
-    ends = np.zeros((*levers.shape, 6))
-    ends[..., :3] = np.eye(3)
-    for a, b, c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):  # u = q_1 + q_2 x r
-        ends[..., a, 3 + b] = levers[..., c]
-        ends[..., a, 3 + c] = -levers[..., b]
     return VibrationModel(
         strings_of(state),
-        ends,
+        motions_of_ends(levers),
         0.5 * (matrix + np.swapaxes(matrix, -1, -2)),
         mass_matrix(state).reshape(-1, 6, 6),
         first_of(state.robot).freedom,
