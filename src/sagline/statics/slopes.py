@@ -120,7 +120,7 @@ def platform_end_forces(state: Equilibrium) -> Array:
 def frame_end_forces(state: Equilibrium) -> Array:
     """Forces in the cables of a single state at their frame ends, towards the platform, world axes [N], (m, 3)."""
     weight = state.cables.cable_weight[:, None] * np.array([0.0, 0.0, 1.0])
-    return platform_end_forces(state) - weight
+    return np.asarray(platform_end_forces(state) - weight)
 
 
 _LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a meter of the cable's own
