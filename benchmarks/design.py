@@ -24,7 +24,7 @@ def searches() -> Iterator[Row]:
         was, now = front.start_values[0], front.values[0, 0]
         yield Row(
             f"{optimizer}, {EVALUATIONS} robots x 315 poses: share of the grid",
-            ">= 7 % more, <= 10 s" if optimizer == OPTIMIZERS[0] else "state it",
+            ">= 7 % more, <= 10 s" if optimizer == OPTIMIZERS[0] else "none",
             f"{was:.4f} -> {now:.4f}, {100.0 * (now / was - 1.0):.0f} % more; {seconds:.1f} s of cpu, "
             f"{len(front.evaluated)} robots",
         )

@@ -169,7 +169,7 @@ def main(share: float = 1.0) -> list[Row]:
     for part in (far_starts, without_start, speed, derivatives):
         console.print(f"[dim]{(part.__doc__ or '').splitlines()[0]}[/dim]")
         for row in part(share):
-            console.print(f"[dim]  {row.what}: {row.measured}[/dim]")
+            console.print(f"[dim]  {row.quantity}: {row.measured}[/dim]")
             rows.append(row)
     show("forward kinematics, one core", rows, Console())
     return rows

@@ -16,8 +16,8 @@ from rich.table import Table
 class Row(NamedTuple):
     """One line of the table."""
 
-    what: str
-    reach: str
+    quantity: str
+    target: str
     measured: str
 
 

@@ -84,7 +84,7 @@ def regions() -> Iterator[Row]:
                 client.set(mass, float(robot.mass * (1.1 + 0.05 * k)))
                 times.append(heard_until(client, "m³"))
         size = " x ".join(map(str, cells))
-        reach = "<= 0.5 s" if name == "cogiro" else "state it"
+        reach = "<= 0.5 s" if name == "cogiro" else "none"
         yield Row(f"region of {name} after a slider moves, {size} cells", reach, f"{min(times):.2f} s")
 
 

@@ -64,7 +64,7 @@ def speed() -> Iterator[Row]:
         matrix = reduced_model(setting, 0, UP_TO).matrix
         alone = 1e3 * best_seconds(lambda matrix=matrix: np.linalg.eigh(matrix), 40)  # type: ignore[misc]
         shown = f"{taken:.1f} ms, of which {alone:.1f} ms for the eigenvalues of {len(matrix)} unknowns"
-        yield Row(f"{name}: vibration up to 20 Hz", "<= 3 ms" if name == "cogiro" else "state it", shown)
+        yield Row(f"{name}: vibration up to 20 Hz", "<= 3 ms" if name == "cogiro" else "none", shown)
     places = np.random.default_rng(0).uniform([-3, -2, 1], [3, 2, 3], (64, 3))
     poses, robot = sl.Pose.from_euler(places, 0, 0, 0), sl.load_robot("cogiro")
     taken = 1e3 * best_seconds(lambda: sl.frequency_map(robot, poses, up_to=UP_TO)) / len(poses)
@@ -76,7 +76,7 @@ def speed() -> Iterator[Row]:
             lambda damping=damping, state=state: sl.frequency_response(state, frequency, damping)  # type: ignore[misc]
         )
         shown = f"{taken:.2f} s, off by {found.deviation.max():.0e} at {found.deviation.size} of them"
-        yield Row(f"cogiro: response at 1,000 frequencies to 20 Hz, {words} damping", "state it", shown)
+        yield Row(f"cogiro: response at 1,000 frequencies to 20 Hz, {words} damping", "none", shown)
 
 
 PARTS = (cables, robots, speed)

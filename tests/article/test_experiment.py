@@ -66,8 +66,8 @@ def a_machine_as_it_was_planned_is_where_it_should_be(whole: Experiment) -> None
     assert np.linalg.norm(whole.estimated - whole.true, axis=1).max() <= 0.05e-3
     assert whole.farthest <= 0.4e-3
     text = PAGE.read_text()
-    assert "within 0.002 mm of" in text
-    assert "within 0.4 mm" in text
+    assert "below 0.002 mm" in text
+    assert "below 0.4 mm" in text
 
 
 def it_takes_as_long_as_the_article_s(whole: Experiment) -> None:

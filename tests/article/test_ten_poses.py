@@ -246,5 +246,5 @@ def test_the_documentation_tells_the_same_numbers(study: TenPoses) -> None:
         assert tuple(cell.strip() for cell in cells) == numbers
     least, most = 1e3 * study.limits.single_zero.min(), 1e3 * study.limits.single_zero.max()
     assert f"{least:.0f} to {most:.0f} mm" in text
-    assert f"do {100.0 * study.limits.imitated:.1f} % of" in text
+    assert f"reproduce {100.0 * study.limits.imitated:.1f} % of" in text
     assert f"{sum(len(group) for group in study.explanations)} models" in text
