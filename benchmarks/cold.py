@@ -23,12 +23,14 @@ from sagline.cli.hosting import Readings
 import numpy as np
 from sagline.viewer.hull import WorkspaceQuery, region_hull
 from sagline.viewer.server import started, stop
-from sagline.viewer.viewer import Reading, Viewer
+from sagline.viewer.feature import Reading
+from sagline.viewer.features import FEATURES
+from sagline.viewer.page import Page
 
 begun = float(sys.argv[1])
 server = started(port=0)
 readings = Readings()
-viewer = Viewer(server, sl.load_robot("cogiro"), None, readings.ready)
+viewer = Page(server, FEATURES, sl.load_robot("cogiro"), None, readings.ready)
 
 def watch():
     viewer.shown.wait()

@@ -15,9 +15,10 @@ import numpy as np
 
 import sagline as sl
 from benchmarks.measure import Row, print_table
+from sagline.viewer.features import FEATURES
 from sagline.viewer.hull import WorkspaceQuery, region_hull, region_in
+from sagline.viewer.page import Page
 from sagline.viewer.server import started, stop
-from sagline.viewer.viewer import Viewer
 from tests.viewer.client import Client, await_that
 
 ROBOTS = ("cogiro", "falcon-7", "fast", "article-suspended", "ipanema-2-pulleys")
@@ -35,7 +36,7 @@ class Shown(NamedTuple):
         mass: The slider of the platform's mass.
     """
 
-    viewer: Viewer
+    viewer: Page
     client: Client
     mass: str
 
@@ -44,7 +45,7 @@ class Shown(NamedTuple):
 def shown(robot: sl.Robot) -> Iterator[Shown]:
     """A page of a robot, its region drawn."""
     server = started(port=0)
-    viewer = Viewer(server, robot)
+    viewer = Page(server, FEATURES, robot)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     fields = {each.label: each for each in server.gui._gui_input_handle_from_uuid.values()}

@@ -9,6 +9,7 @@ import sagline as sl
 from sagline import article_balance
 from sagline.core.errors import MOST
 from sagline.viewer import readout
+from sagline.viewer.drawn import cable_segments, chord_segments
 from sagline.viewer.snapshot import Settings, taken_at
 from tests.refusal import refused
 from tests.tiers import extended, wide
@@ -83,8 +84,8 @@ def test_ends_that_no_cable_reaches_are_named(count: int) -> None:
                 with pytest.raises(sl.CableGeometryError) as error:
                     refuse(robot, both)
                 assert error.value.item.startswith(f"pose 1, cable {wrong[0]}: ")
-        assert np.isfinite(snapshot.cable_segments(1.0)).all()
-        assert np.isfinite(snapshot.ghost_segments(1.0, 0.0)).all()
+        assert np.isfinite(cable_segments(snapshot, 1.0)).all()
+        assert np.isfinite(chord_segments(snapshot, 1.0, 0.0)).all()
         assert "No chord" in readout.verdict(snapshot)
     assert 0.2 * count < outside < 0.95 * count
 

@@ -10,9 +10,10 @@ import pytest
 import viser
 
 import sagline as sl
+from sagline.viewer.features import FEATURES
+from sagline.viewer.page import Page
 from sagline.viewer.playback import Run
 from sagline.viewer.server import started, stop
-from sagline.viewer.viewer import Viewer
 from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client
 
@@ -66,7 +67,7 @@ def press(count: int, seed: int) -> None:
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
     run = Run.of(sl.inverse(ROBOT, sl.quintic_path(ends, durations=[1.0], rate=20)))
     server = started(port=0)
-    viewer = Viewer(server, ROBOT, run)
+    viewer = Page(server, FEATURES, ROBOT, run)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     try:
@@ -96,7 +97,7 @@ def press(count: int, seed: int) -> None:
         stop(server)
 
 
-def shows(viewer: Viewer, place: np.ndarray, tension: np.ndarray) -> bool:
+def shows(viewer: Page, place: np.ndarray, tension: np.ndarray) -> bool:
     if viewer.view is None or not np.array_equal(viewer.view.snapshot.pose.position, place):
         return False
     return np.allclose(viewer.view.snapshot.tension, tension, rtol=1e-9)

@@ -78,15 +78,15 @@ def test_tension_takes_them_too() -> None:
 def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[Any] = []
 
-    class Viewer:
-        def __init__(self, server: Any, robot: sl.Robot, *, wrench: Any, **page: Any) -> None:
+    class Page:
+        def __init__(self, server: Any, features: Any, robot: sl.Robot, *, wrench: Any, **page: Any) -> None:
             taken.append((robot, wrench))
 
         def serve(self) -> None:
             raise KeyboardInterrupt
 
     monkeypatch.setattr("sagline.viewer.server.started", lambda *_: SimpleNamespace(stop=int, get_port=lambda: 1))
-    monkeypatch.setattr("sagline.viewer.viewer.Viewer", Viewer)
+    monkeypatch.setattr("sagline.viewer.page.Page", Page)
     monkeypatch.setattr("sagline.cli.hosting.not_compiled", lambda names: [])
     assert sagline("view", "article-suspended", "--no-browser", *LOADS).exit_code == 0
     (robot, wrench) = taken[0]

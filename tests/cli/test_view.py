@@ -94,7 +94,7 @@ def test_a_simulation_is_played_as_a_run_is(tmp_path: FilePath) -> None:
     played = played_in(sl.load_robot("cogiro"), tmp_path / "sim.nc")
     assert (played.name, played.duration) == ("simulation", 0.5)
     np.testing.assert_array_equal(played.home.position, swing.pose.position[0])
-    assert np.isnan(played.sight(0.5).tension[3])
+    assert np.isnan(played.at(0.5).tension[3])
 
 
 @extended

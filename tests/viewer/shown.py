@@ -14,9 +14,9 @@ import viser
 import sagline as sl
 from sagline.viewer.camera import Framing
 from sagline.viewer.channel import NAME
+from sagline.viewer.page import Page
 from sagline.viewer.playback import Run
 from sagline.viewer.server import Server, started, stop
-from sagline.viewer.viewer import Viewer
 from tests.viewer.client import PATIENCE, Client, await_that
 
 ROBOT = sl.load_robot("article-suspended")
@@ -46,7 +46,7 @@ class Shown(NamedTuple):
     """
 
     server: Server
-    viewer: Viewer
+    viewer: Page
     thread: threading.Thread
     pieces: list[viser.GuiHtmlHandle]
 
@@ -90,7 +90,7 @@ def pieces_of(server: Server) -> list[viser.GuiHtmlHandle]:
     return pieces
 
 
-def shown(made: Callable[[Server], Viewer]) -> Iterator[Shown]:
+def shown(made: Callable[[Server], Page]) -> Iterator[Shown]:
     """A page of a viewer made for a server, while it is served."""
     server = started(port=0)
     pieces = pieces_of(server)
@@ -130,7 +130,7 @@ def put(client: Client, server: Server, framing: Framing) -> viser.CameraHandle:
 
 def framed(client: Client, page: Shown) -> viser.CameraHandle:
     """The camera of a client of a page, once it has been put to where it sees all."""
-    return put(client, page.server, page.viewer.page.framing)
+    return put(client, page.server, page.viewer.framing)
 
 
 def tell(page: Shown | Server, client: Client, topic: str, value: Any) -> None:

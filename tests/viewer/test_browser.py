@@ -16,11 +16,12 @@ from playwright.sync_api import Browser, ConsoleMessage, Error, FloatRect, Page
 from viser._messages import ViewerCameraMessage
 
 import sagline as sl
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.modes import ModesFeature
+from sagline.viewer.page import Page as ViewerPage
 from sagline.viewer.playback import Run
 from sagline.viewer.robot_scene import PLATFORM
 from sagline.viewer.server import started, stop
-from sagline.viewer.viewer import Viewer
 from tests.calibration.made_up import made_up
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
@@ -69,7 +70,7 @@ def opened(
     complains: bool = False,
     found: sl.Calibration | None = None,
     cameras: list[ViewerCameraMessage] | None = None,
-) -> Iterator[tuple[Page, Viewer]]:
+) -> Iterator[tuple[Page, ViewerPage]]:
     """A page on a viewer; whatever the console complains of fails the test, unless it has reason to.
 
     All that it tells of its camera is kept, if it is to be.
@@ -77,7 +78,7 @@ def opened(
     server = started(port=0, title=robot.name)
     if cameras is not None:
         server._websock_server.register_handler(ViewerCameraMessage, lambda _, message: cameras.append(message))
-    viewer = Viewer(server, robot, run, found=found)
+    viewer = ViewerPage(server, FEATURES, robot, run, found=found)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     complaints: list[str] = []
@@ -213,11 +214,11 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         page.get_by_text("parabolic").wait_for()
         least_contrast(page)
         page.keyboard.press("Escape")
-        viewer.page.scene.gizmo.position = np.array([7.4, 5.4, 1.5])
+        viewer.scene.gizmo.position = np.array([7.4, 5.4, 1.5])
         viewer.refresh()
         page.get_by_text("Not feasible", exact=True).wait_for()
         least_contrast(page)
-        viewer.page.scene.gizmo.position = np.array([np.nan, 0.0, 0.0])
+        viewer.scene.gizmo.position = np.array([np.nan, 0.0, 0.0])
         viewer.refresh()
         page.get_by_text("Not possible", exact=True).first.wait_for()  # the modes say so too
         least_contrast(page)
@@ -225,7 +226,7 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         page.get_by_text("Reset View").wait_for()
         least_contrast(page)
         page.locator(".tabler-icon-arrow-back").first.click()
-        stop(viewer.page.server)
+        stop(viewer.server)
         page.get_by_text("Disconnected: is sagline view still running?").wait_for()
         least_contrast(page)
 
@@ -273,9 +274,9 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
     with opened(browser, sl.load_robot("article-suspended")) as (page, viewer):
         page.get_by_role("tab", name="Modes").click()
         page.locator("tr[data-send='mode'][data-value='2']").click()
-        await_that(page, lambda: viewer.page.feature(ModesFeature).moving)
+        await_that(page, lambda: viewer.feature(ModesFeature).moving)
         page.get_by_text("Hz, with cable mass").wait_for()
-        swing = viewer.page.feature(ModesFeature).swing
+        swing = viewer.feature(ModesFeature).swing
         assert swing is not None
         found = sl.vibration(swing.state, up_to=20.0)
         page.get_by_text(f"{found.frequency[1]:.3f} Hz, with cable mass", exact=True).wait_for()
@@ -287,7 +288,7 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         mark.click()
         await_that(
             page,
-            lambda: (now := viewer.page.feature(ModesFeature).swing) is not None and now.mode.name == "1",
+            lambda: (now := viewer.feature(ModesFeature).swing) is not None and now.mode.name == "1",
         )
         page.locator("tr[data-send='mode'][data-value='massless 1']").hover()
         page.mouse.down()
@@ -296,7 +297,7 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         page.get_by_text(f"{found.massless_frequency[0]:.3f} Hz, massless").wait_for()
         assert page.evaluate(OVERFLOWING) == []
         page.locator("tr[data-send='mode'][data-value='massless 1']").click()  # once more: at rest
-        await_that(page, lambda: not viewer.page.feature(ModesFeature).moving)
+        await_that(page, lambda: not viewer.feature(ModesFeature).moving)
 
 
 def test_the_modes_can_be_read_in_the_light_and_in_the_dark_on_a_small_screen(browser: Browser) -> None:
@@ -322,8 +323,8 @@ def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
         page.get_by_role("button", name="Cut", exact=True).click()
         page.get_by_text("Simulated", exact=True).wait_for()
         page.get_by_text("break of cable 0 at 0.000 s").wait_for()
-        assert viewer.page.player.played is not None
-        await_that(page, lambda: viewer.page.player.clock.time == viewer.page.player.played.duration)  # type: ignore[union-attr]
+        assert viewer.player.played is not None
+        await_that(page, lambda: viewer.player.clock.time == viewer.player.played.duration)  # type: ignore[union-attr]
         page.get_by_role("button", name="Play").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []

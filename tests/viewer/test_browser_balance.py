@@ -9,8 +9,8 @@ from playwright.sync_api import Browser, Page
 import sagline as sl
 from sagline.viewer.by_hand import ByHand
 from sagline.viewer.features.missing import MissingFeature
+from sagline.viewer.page import Page as ViewerPage
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, least_contrast, opened
@@ -33,13 +33,13 @@ def on_all_screens(*fast: tuple[str, tuple[int, int]]) -> list[object]:
     return [pytest.param(*each, marks=() if each in fast else pytest.mark.soak) for each in every]
 
 
-def tension(viewer: Viewer) -> np.ndarray:
+def tension(viewer: ViewerPage) -> np.ndarray:
     assert viewer.view is not None
     assert isinstance(viewer.view.snapshot, Snapshot)
     return viewer.view.snapshot.tension
 
 
-def by_hand(viewer: Viewer) -> bool:
+def by_hand(viewer: ViewerPage) -> bool:
     return viewer.view is not None and isinstance(viewer.view.settings.tension, ByHand)
 
 
@@ -128,13 +128,13 @@ def test_a_pose_that_cannot_be_held_leads_to_one_that_can(browser: Browser, name
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     with opened(browser, robot, width=screen[0]) as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
-        viewer.page.scene.gizmo.position = 0.5 * (low + high) + np.array([0.42, 0.2, 0.3]) * (high - low)
+        viewer.scene.gizmo.position = 0.5 * (low + high) + np.array([0.42, 0.2, 0.3]) * (high - low)
         viewer.refresh()
         page.get_by_text("Held nearest").wait_for()
         page.get_by_role("button", name="Go there").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []
-        await_that(page, lambda: not viewer.page.feature(MissingFeature).waiting)
+        await_that(page, lambda: not viewer.feature(MissingFeature).waiting)
         page.get_by_role("button", name="Go there").click()
         page.get_by_text("Feasible", exact=True).wait_for()
         page.get_by_text("Held nearest").wait_for(state="hidden")
@@ -152,4 +152,4 @@ def test_the_proof_is_read_and_drawn(browser: Browser, name: str, screen: tuple[
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []
         page.get_by_label("Forces in the scene").click()
-        await_that(page, lambda: "/forces" in viewer.page.server.scene._handle_from_node_name)
+        await_that(page, lambda: "/forces" in viewer.server.scene._handle_from_node_name)

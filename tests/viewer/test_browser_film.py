@@ -12,11 +12,11 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
+from sagline.robot.reach import home_pose
 from sagline.viewer.features import export
 from sagline.viewer.playback import Run
 from sagline.viewer.solids import size_of
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.viewer import home_pose
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, await_that, opened
@@ -107,7 +107,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
         film_button.click()
         page.get_by_role("button", name="Cancel").click()
         page.locator("#sagline-film").wait_for(state="detached")
-        (client,) = viewer.page.server.get_clients().values()
+        (client,) = viewer.server.get_clients().values()
         await_that(page, lambda: not client.scene._handle_from_node_name)
         with page.expect_download(timeout=1e3 * PATIENCE) as download:
             film_button.click()
@@ -115,7 +115,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
         download.value.save_as(tmp_path / "film.mp4")
         page.locator("#sagline-film").wait_for(state="detached")
         assert any(note.startswith("Filming") for note in page.evaluate("[...window.notes]"))
-        assert viewer.page.player.following
+        assert viewer.player.following
         assert not client.scene._handle_from_node_name
         length, (first, last) = played(page, tmp_path / "film.mp4")
     assert length == pytest.approx(4.0, abs=1e-3)  # two pictures, each for two seconds, however long they took

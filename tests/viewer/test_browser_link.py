@@ -29,7 +29,7 @@ def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
             return viewer.view.snapshot.pose.position
 
         field = page.locator("#sagline-pose")
-        wanted = viewer.page.home.position + np.array([0.05, 0.0, 0.02])
+        wanted = viewer.home.position + np.array([0.05, 0.0, 0.02])
         field.fill(", ".join(map(str, wanted)))
         field.press("Enter")
         await_that(page, lambda: np.array_equal(place(), wanted))
@@ -56,7 +56,7 @@ def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
         assert "&tab=Modes" in link
         page.get_by_role("dialog").get_by_role("button", name="Close").press("Enter")
         page.get_by_role("button", name="Platform back home").press("Enter")
-        await_that(page, lambda: np.array_equal(place(), viewer.page.home.position))
+        await_that(page, lambda: np.array_equal(place(), viewer.home.position))
 
         elsewhere = browser.new_page(viewport={"width": 1000, "height": 640})
         elsewhere.set_default_timeout(1e3 * PATIENCE)

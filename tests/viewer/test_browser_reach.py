@@ -10,8 +10,8 @@ from playwright.sync_api import Browser, Page
 
 import sagline as sl
 from sagline.viewer.features.keyboard import KeyboardFeature
+from sagline.viewer.page import Page as ViewerPage
 from sagline.viewer.playback import Run
-from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
 from tests.viewer.reach import broken_rules, walked
@@ -71,14 +71,14 @@ def said(page: Page) -> str:
     return page.locator("#sagline-said").inner_text()
 
 
-def place(viewer: Viewer) -> np.ndarray:
+def place(viewer: ViewerPage) -> np.ndarray:
     assert viewer.view is not None
     return viewer.view.snapshot.pose.position
 
 
-def keys_move(page: Page, viewer: Viewer) -> None:
+def keys_move(page: Page, viewer: ViewerPage) -> None:
     """The platform goes where keys send it, and home; what is said follows; a field keeps its keys."""
-    start, step = place(viewer), viewer.page.feature(KeyboardFeature)._step
+    start, step = place(viewer), viewer.feature(KeyboardFeature)._step
     scene = page.get_by_role("application")
     scene.focus()
     for key, way in (

@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 
 import sagline as sl
 from sagline.viewer.features.region import RegionFeature
-from sagline.viewer.viewer import Viewer
+from sagline.viewer.page import Page as ViewerPage
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, await_that, least_contrast, opened
@@ -52,9 +52,9 @@ def scene(page: Page) -> np.ndarray:
     return picture[: height // 2, width // 3 : 3 * width // 5]
 
 
-def near_the_wall(viewer: Viewer) -> np.ndarray:
+def near_the_wall(viewer: ViewerPage) -> np.ndarray:
     """A position inside, half a cell from the wall, as high as the platform is."""
-    show = viewer.page.feature(RegionFeature)
+    show = viewer.feature(RegionFeature)
     assert viewer.view is not None
     assert show._levels is not None
     assert show._region is not None
@@ -76,7 +76,7 @@ def near_the_wall(viewer: Viewer) -> np.ndarray:
 def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, screen: tuple[int, int]) -> None:
     with opened(browser, sl.load_robot(name), width=screen[0], theme="dark") as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
-        show = viewer.page.feature(RegionFeature)
+        show = viewer.feature(RegionFeature)
         page.get_by_role("tab", name="Workspace").click()
         page.get_by_text("Nothing is computed until something is asked for.").wait_for()
         empty = scene(page)
@@ -87,15 +87,15 @@ def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, sc
         slide(page, "Platform + load", 8.0)
         await_that(page, lambda: viewer.view is not None and viewer.view.snapshot.robot.mass > mass)
         await_that(page, lambda: in_full(show) and show._hull_html.content != before)  # nothing was asked for again
-        viewer.page.scene.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
+        viewer.scene.place(sl.Pose(near_the_wall(viewer), np.eye(3)))
         viewer.refresh()
-        await_that(page, lambda: viewer.page.server.scene.get_handle_by_name("/wall/0") is not None)
+        await_that(page, lambda: viewer.server.scene.get_handle_by_name("/wall/0") is not None)
         page.get_by_text("left, cable").first.wait_for()
         page.get_by_label("Slice", exact=True).click()
         page.get_by_label("Where can I go", exact=True).click()
         page.get_by_text("Boundary", exact=True).wait_for()
         page.get_by_text("Margin [").wait_for()
-        await_that(page, lambda: viewer.page.server.scene.get_handle_by_name("/slice/levels/0") is not None)
+        await_that(page, lambda: viewer.server.scene.get_handle_by_name("/slice/levels/0") is not None)
         await_that(page, lambda: np.mean(np.abs(scene(page) - empty).max(axis=2) > 8) > 0.03)  # what is drawn is seen
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []

@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Browser, FloatRect, Page
 
 import sagline as sl
+from sagline.viewer.page import Page as ViewerPage
 from sagline.viewer.playback import Run
-from sagline.viewer.viewer import Viewer
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, SCENE, await_that, box, least_contrast, opened
@@ -44,7 +44,7 @@ def at(page: Page, share: float) -> tuple[float, float]:
     return slider["x"] + share * slider["width"], slider["y"] + 0.5 * slider["height"]
 
 
-def scrubbed(page: Page, viewer: Viewer, run: Run) -> None:
+def scrubbed(page: Page, viewer: ViewerPage, run: Run) -> None:
     """Point, drag, step and play with mouse and keys."""
     page.mouse.move(*at(page, 0.25))
     tip = page.locator("#sagline-timeline .tip")

@@ -14,7 +14,7 @@ from sagline.viewer.camera import Camera, fitted
 from sagline.viewer.features.cut import CutFeature
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.features.push import PushFeature
-from sagline.viewer.viewer import Viewer
+from sagline.viewer.page import Page as ViewerPage
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, SCENE, await_that, box, opened
@@ -32,11 +32,11 @@ def browser() -> Iterator[Browser]:
     yield from launched(FLAGS)
 
 
-def eye_of(viewer: Viewer) -> Camera | None:
-    return next((Camera.of(client.camera) for client in viewer.page.server.get_clients().values()), None)
+def eye_of(viewer: ViewerPage) -> Camera | None:
+    return next((Camera.of(client.camera) for client in viewer.server.get_clients().values()), None)
 
 
-def on_page(page: Page, viewer: Viewer, points: np.ndarray) -> np.ndarray:
+def on_page(page: Page, viewer: ViewerPage, points: np.ndarray) -> np.ndarray:
     """Where points (..., 3) are on the page [px], shape (..., 2)."""
     scene, eye = box(page, SCENE), eye_of(viewer)
     assert eye is not None
@@ -44,13 +44,13 @@ def on_page(page: Page, viewer: Viewer, points: np.ndarray) -> np.ndarray:
     return np.asarray([scene["x"], scene["y"]] + share * [scene["width"], scene["height"]])
 
 
-def settle(page: Page, viewer: Viewer, told: list[ViewerCameraMessage]) -> None:
+def settle(page: Page, viewer: ViewerPage, told: list[ViewerCameraMessage]) -> None:
     """Wait until the page tells that its camera stands where it is to, in a scene as large as it is."""
 
     def stands() -> bool:
         if not told:
             return False
-        last, scene, framing = told[-1], box(page, SCENE), viewer.page.framing
+        last, scene, framing = told[-1], box(page, SCENE), viewer.framing
         if (last.image_width, last.image_height) != (int(scene["width"]), int(scene["height"])):
             return False
         wanted = fitted(framing._low, framing._high, last.image_width / last.image_height, last.fov)[0]
@@ -80,27 +80,25 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
     told: list[ViewerCameraMessage] = []
     with opened(browser, sl.load_robot(name), width=size[0], height=size[1], cameras=told) as (page, viewer):
         settle(page, viewer, told)
-        start = viewer.page.scene.dragged_pose()
+        start = viewer.scene.dragged_pose()
         eye = eye_of(viewer)
         assert eye is not None
         # pull, at the middle of the platform, where its gizmo has its handles
-        middle = start.transform(viewer.page.feature(PushFeature).body.vertices).mean(axis=0)
+        middle = start.transform(viewer.feature(PushFeature).body.vertices).mean(axis=0)
         x, y = on_page(page, viewer, middle)
         uncovered(page, x, y)
         page.mouse.move(x, y)
         page.keyboard.down("Control")
         page.mouse.down()
         page.mouse.move(x + 15, y - 10, steps=3)
-        await_that(page, lambda: viewer.page.feature(PushFeature).response is not None)
+        await_that(page, lambda: viewer.feature(PushFeature).response is not None)
         page.mouse.move(x + 30, y - 20, steps=3)
         away = 0.9 * np.hypot(30.0, 20.0)
         await_that(page, lambda: pulled(page, viewer) > away)
         page.mouse.up()
         page.keyboard.up("Control")
-        await_that(page, lambda: viewer.page.feature(PushFeature).response is None)
-        np.testing.assert_array_equal(
-            viewer.page.scene.dragged_pose().position, start.position
-        )  # the gizmo did not move
+        await_that(page, lambda: viewer.feature(PushFeature).response is None)
+        np.testing.assert_array_equal(viewer.scene.dragged_pose().position, start.position)  # the gizmo did not move
         now = eye_of(viewer)
         assert now is not None
         np.testing.assert_allclose(now.place, eye.place, rtol=1e-12)  # nor did the camera, but for how pages round
@@ -112,29 +110,29 @@ def test_a_mouse_pulls_cuts_and_shakes(browser: Browser, name: str, size: tuple[
         x, y = free_place(places, inside["x"], inside["x"] + inside["width"], inside["y"] + inside["height"])
         uncovered(page, x, y)
         page.mouse.click(x, y)
-        await_that(page, lambda: viewer.page.feature(CutFeature)._is_marked)
+        await_that(page, lambda: viewer.feature(CutFeature)._is_marked)
         page.get_by_role("button", name="Cut cable").click()
-        await_that(page, lambda: viewer.page.player.played is not None and viewer.page.player.clock.time > 0.5)
+        await_that(page, lambda: viewer.player.played is not None and viewer.player.clock.time > 0.5)
         page.get_by_text("Simulated", exact=True).wait_for()
         page.get_by_role("button", name="Calm").click()
-        await_that(page, lambda: viewer.page.player.played is None)
+        await_that(page, lambda: viewer.player.played is None)
         # shake
         page.locator("button.shake").first.click()
-        await_that(page, lambda: viewer.page.feature(ModesFeature).moving)
-        swing = viewer.page.feature(ModesFeature).swing
+        await_that(page, lambda: viewer.feature(ModesFeature).moving)
+        swing = viewer.feature(ModesFeature).swing
         assert swing is not None
         assert swing.mode.name == "massless 1"
         page.locator("button.shake").first.click()
-        await_that(page, lambda: not viewer.page.feature(ModesFeature).moving)
+        await_that(page, lambda: not viewer.feature(ModesFeature).moving)
 
 
-def pulled(page: Page, viewer: Viewer) -> float:
+def pulled(page: Page, viewer: ViewerPage) -> float:
     """How long the arrow of the pull is on the page [px]."""
-    found = viewer.page.feature(PushFeature).response
+    found = viewer.feature(PushFeature).response
     if found is None:
         return 0.0
     grabbed = found.state.pose.transform(found.push.at)
-    ends = np.stack((grabbed, grabbed + found.push.force / viewer.page.feature(PushFeature)._stiffness))
+    ends = np.stack((grabbed, grabbed + found.push.force / viewer.feature(PushFeature)._stiffness))
     return float(np.linalg.norm(np.diff(on_page(page, viewer, ends), axis=0)))
 
 

@@ -13,11 +13,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features import calibration as feature
 from sagline.viewer.features.calibration import FIELD
+from sagline.viewer.page import Page
 from sagline.viewer.panel import written_mass
 from sagline.viewer.solids import Ellipsoids, ball, readable
-from sagline.viewer.viewer import Viewer
 from tests.calibration.made_up import made_up, parameters
 from tests.tiers import extended
 from tests.viewer.client import Client, await_that
@@ -31,7 +32,7 @@ def calibrated() -> sl.Calibration:
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, calibrated().robot, found=calibrated()))
+    yield from shown(lambda server: Page(server, FEATURES, calibrated().robot, found=calibrated()))
 
 
 @pytest.fixture
@@ -225,7 +226,7 @@ def test_of_a_long_log_some_poses_are_drawn_and_those_that_do_not_fit() -> None:
         chi_squared_of_pose=np.zeros(count),
         outliers=(replace(calibrated().outliers[0], row=1234),),
     )
-    with contextmanager(shown)(lambda server: Viewer(server, calibrated().robot, found=long)) as page:
+    with contextmanager(shown)(lambda server: Page(server, FEATURES, calibrated().robot, found=long)) as page:
         drawn = len(page.node("/log").batched_positions)
         assert 1000 <= drawn <= 4000
         names = [name.text for k in range(drawn) if (name := page.node(f"/log/{k}")) is not None]

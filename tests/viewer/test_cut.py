@@ -10,14 +10,16 @@ import pytest
 from viser import CameraHandle
 
 import sagline as sl
+from sagline.robot.reach import home_pose
 from sagline.viewer import swing
 from sagline.viewer.camera import Camera
-from sagline.viewer.features import cut
+from sagline.viewer.drawn import InMotion
+from sagline.viewer.features import FEATURES, cut
 from sagline.viewer.features.cut import Before, CutFeature
-from sagline.viewer.playback import Moment, Playback
+from sagline.viewer.page import Page
+from sagline.viewer.playback import Playback
 from sagline.viewer.player import Played, Player
 from sagline.viewer.server import started, stop
-from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import least_seconds
 from tests.plot import made
 from tests.tiers import extended, wide
@@ -28,7 +30,7 @@ from tests.viewer.test_push_show import POSE, look, tell
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, pose=POSE))
 
 
 def seen_at(page: Shown, camera: CameraHandle, cable: int) -> list[float]:
@@ -99,7 +101,7 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         assert f"{peak.tension:.1f} N in cable {peak.cable}" in page.text
         assert f"{peak.tension / ROBOT.tension_max[peak.cable]:.2f} times" in page.text
         await_that(lambda: page.told("clock")["time"] == whole.duration)
-        assert isinstance(page.viewer.view and page.viewer.view.snapshot, Moment)
+        assert isinstance(page.viewer.view and page.viewer.view.snapshot, InMotion)
         client.set(handle(page, "Calm"), True)
         await_that(lambda: played() is None)
         after = page.viewer.view
@@ -113,8 +115,8 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
     server = started(port=0)
     try:
         given, first, second = Playback(made.simulation()), made.simulation(50), made.simulation(60)
-        viewer = Viewer(server, given.robot, given)
-        cuts, player = viewer.page.feature(CutFeature), viewer.page.player
+        viewer = Page(server, FEATURES, given.robot, given)
+        cuts, player = viewer.feature(CutFeature), viewer.player
         cuts._asked, before = 1, Before(given.home, player.save())
         cuts._play(1, first, 3, before)
         cuts._play(1, second, 3, before)
@@ -131,8 +133,8 @@ def test_cut_by_cut_all_is_put_back() -> None:
     server = started(port=0)
     try:
         given = Playback(made.simulation())
-        viewer = Viewer(server, given.robot, given)
-        cuts, player = viewer.page.feature(CutFeature), viewer.page.player
+        viewer = Page(server, FEATURES, given.robot, given)
+        cuts, player = viewer.feature(CutFeature), viewer.player
         for number in (1, 2):
             cuts._asked = number
             cuts._play(number, made.simulation(50), 3, Before(given.home, player.save()))

@@ -13,11 +13,13 @@ import pytest
 from scipy.optimize import minimize
 
 import sagline as sl
+from sagline.robot.reach import home_pose
 from sagline.viewer.by_hand import BY_HAND, ByHand, DotField
+from sagline.viewer.features import FEATURES
+from sagline.viewer.features.state import code_of
 from sagline.viewer.features.tensions import Marks, field_of, grouped, polygon_figure
+from sagline.viewer.page import Page, Source
 from sagline.viewer.snapshot import METHODS, Settings, Snapshot, taken_at
-from sagline.viewer.state_code import Source, code_of
-from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
@@ -31,7 +33,7 @@ HEAVY = sl.load_robot("cogiro").replace(
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, HEAVY))
+    yield from shown(lambda server: Page(server, FEATURES, HEAVY))
 
 
 def say(page: Shown, client: Client, value: Any, topic: str = "dot") -> None:
@@ -149,7 +151,7 @@ def test_code_of_what_is_chosen_by_hand_gives_its_tensions(page: Shown) -> None:
 
 
 def test_steps_add_up_and_stop_at_the_sides() -> None:
-    with contextmanager(shown)(lambda server: Viewer(server, HEAVY)) as page, Client(page.port) as client:
+    with contextmanager(shown)(lambda server: Page(server, FEATURES, HEAVY)) as page, Client(page.port) as client:
         field = field_of(seen(page))  # as large as the first at a pose are the steps there
         assert field is not None
         start = moved(page, client, {"at": [0.0, 0.0]})

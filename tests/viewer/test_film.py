@@ -10,9 +10,10 @@ import pytest
 from PIL import Image
 
 import sagline as sl
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.export import ExportFeature, moments
 from sagline.viewer.offscreen import Shot
-from sagline.viewer.viewer import Viewer
+from sagline.viewer.page import Page
 from tests.refusal import refused
 from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client, await_that
@@ -21,7 +22,7 @@ from tests.viewer.shown import PATH, ROBOT, Shown, a_run, framed, handle, shown,
 
 @pytest.fixture(scope="module")
 def film() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, ROBOT, a_run()))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, a_run()))
 
 
 def rendered(client: Client, message: dict[str, Any], picture: bytes) -> None:
@@ -36,9 +37,7 @@ def pixel() -> bytes:
 
 
 def taking(page: Shown) -> bool:
-    return any(
-        visitor.taking.locked() for visitor in tuple(page.viewer.page.feature(ExportFeature)._exporters.values())
-    )
+    return any(visitor.taking.locked() for visitor in tuple(page.viewer.feature(ExportFeature)._exporters.values()))
 
 
 def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:
@@ -93,7 +92,7 @@ def test_a_film_is_told_picture_by_picture_and_can_be_cancelled(film: Shown) -> 
                     tell(film, client, "film", "cancel")
                     await_that(
                         lambda: any(
-                            v.cancelled.is_set() for v in film.viewer.page.feature(ExportFeature)._exporters.values()
+                            v.cancelled.is_set() for v in film.viewer.feature(ExportFeature)._exporters.values()
                         )
                     )
                 rendered(client, message, pixel())

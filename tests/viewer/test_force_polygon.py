@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.robot.reach import home_pose
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.proof import cable_forces, force_polygon_figure, forces_on_platform, residual
 from sagline.viewer.missing import missing_of
+from sagline.viewer.page import Page
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import force_unit
-from sagline.viewer.viewer import Viewer, home_pose
 from tests.tiers import wide
 from tests.viewer.client import Client, await_that
 from tests.viewer.planar import PLANAR
@@ -180,7 +182,7 @@ def held_planar() -> sl.Equilibrium:
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, sl.load_robot("falcon-7")))
+    yield from shown(lambda server: Page(server, FEATURES, sl.load_robot("falcon-7")))
 
 
 def test_arrows_in_the_scene_come_and_go(page: Shown) -> None:

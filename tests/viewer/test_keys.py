@@ -10,11 +10,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
+from sagline.robot.reach import home_pose
 from sagline.viewer.feature import View
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.keyboard import MOST, TURN, nudged, place_of, screen_reader_text
+from sagline.viewer.page import Page
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.viewer import Viewer, home_pose
 from tests.tiers import extended
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import Shown, handle, shown
@@ -24,7 +26,7 @@ ROBOT = sl.load_robot("cogiro")
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, ROBOT))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT))
 
 
 def tell(page: Shown, topic: str, value: Any, count: int = 0) -> None:
@@ -84,7 +86,7 @@ def test_steps_that_are_none_and_ways_out_of_sight_move_nothing(page: Shown) -> 
         for count in range(30):
             text = json.dumps({"topic": "nudge", "value": [MOST, 0, 0, 0, 0, 0], "count": count})
             client.set(handle(page, "sagline"), text)
-        await_that(lambda: "out of sight" in str(page.told("nudge-told")))
+        await_that(lambda: "out of sight" in str(page.told("nudge-reply")))
     await_that(lambda: 50.0 < page.position[0] < 100.0)
     assert page.thread.is_alive()
 

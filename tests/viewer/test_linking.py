@@ -14,11 +14,11 @@ import pytest
 
 import sagline as sl
 from sagline.viewer.feature import View
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import StateFeature
 from sagline.viewer.link import name_of, pose_part, short
+from sagline.viewer.page import Page, Source
 from sagline.viewer.playback import Run
-from sagline.viewer.state_code import Source
-from sagline.viewer.viewer import Viewer
 from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client, await_that
 from tests.viewer.shown import Shown, controls, framed, handle, shown, tell, with_mass
@@ -28,7 +28,7 @@ ROBOT = sl.load_robot("cogiro")
 
 @contextmanager
 def a_page(robot: sl.Robot = ROBOT, **given: Any) -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, robot, **given))
+    yield from shown(lambda server: Page(server, FEATURES, robot, **given))
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ class Asking:
 
     def answered(self, topic: str, name: str) -> dict[str, Any]:
         """What a question is answered."""
-        start = f"sagline:{topic}-told:"
+        start = f"sagline:{topic}-reply:"
         for message in self.client.heard(PATIENCE):
             self.seen.append(message)
             content = str((message.get("props") or message.get("updates") or {}).get("content", ""))
@@ -136,7 +136,7 @@ def test_another_page_comes_to_the_same(one: Shown, other: Shown, count: int) ->
 def test_all_controls_of_the_page_are_in_it(one: Shown, other: Shown) -> None:
     handles = [each for each in controls(one.server) if hasattr(each, "label")]
     wanted = {id(each) for each in handles if each.label != "sagline" and not each._impl.is_button}
-    named = one.viewer.page.feature(StateFeature).linking._controls._handles()
+    named = one.viewer.feature(StateFeature)._controls._handles()
     assert {id(each) for each in named.values()} == wanted
     assert all(name.startswith(short(each.label)) for name, each in named.items())
     assert {"slice", "cable-model", "mode", "modes-up-to"} <= set(named)
@@ -168,9 +168,9 @@ def test_a_link_is_of_all_that_was_set_before_it_was_asked_for(one: Shown) -> No
 
         def set_and_ask() -> None:
             mass.value = 120.0
-            one.viewer.page.channel._handlers["copy"](["both", "link"], number)
+            one.viewer.channel._handlers["copy"](["both", "link"], number)
 
-        one.viewer.page.later(set_and_ask)  # before what is set is shown
+        one.viewer.later(set_and_ask)  # before what is set is shown
         assert "&platform-load=120" in here.answered("copy", "both")["text"]
         here.client.set(mass, usual)
         await_that(lambda: view(one).snapshot.robot.mass == usual)

@@ -12,14 +12,16 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline.core.arrays import locked
+from sagline.robot.reach import home_pose
 from sagline.viewer.channel import chosen_by
 from sagline.viewer.feature import Reading
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.missing import explanation, missing_label
 from sagline.viewer.missing import NearestFeasible, missing_of, nearest_feasible
+from sagline.viewer.page import Page
 from sagline.viewer.server import Server
 from sagline.viewer.snapshot import Settings, Snapshot, taken_at
 from sagline.viewer.tension_scale import force_unit
-from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
@@ -199,9 +201,9 @@ def test_other_reasons_are_explained_too() -> None:
 
 
 def test_nobody_says_that_there_is_nowhere_to_go_before_it_was_looked_for() -> None:
-    def made(server: Server) -> Viewer:
+    def made(server: Server) -> Page:
         pose, later = sl.Pose(OUTSIDE["cogiro"][0], np.eye(3)), Reading.WORKSPACE
-        return Viewer(server, sl.load_robot("cogiro"), pose=pose, ready=lambda reading: reading is not later)
+        return Page(server, FEATURES, sl.load_robot("cogiro"), pose=pose, ready=lambda reading: reading is not later)
 
     with contextmanager(shown)(made) as page:
         assert "looked for" in page.text
@@ -210,7 +212,7 @@ def test_nobody_says_that_there_is_nowhere_to_go_before_it_was_looked_for() -> N
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, sl.load_robot("cogiro")))
+    yield from shown(lambda server: Page(server, FEATURES, sl.load_robot("cogiro")))
 
 
 @extended
@@ -227,7 +229,7 @@ def test_the_platform_goes_where_it_is_held(page: Shown) -> None:
         assert any("Missing force" in text for text in texts)
         say(page, client, "", "go-there")
         await_that(lambda: page.viewer.view is not None and page.viewer.view.snapshot.feasible)
-        robot = page.viewer.page.robot
+        robot = page.viewer.robot
         pose = nearest_feasible(robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), sl.Catenary(), None)
         assert pose is not None
         assert page.position == pytest.approx(pose.pose.position, abs=1e-9)

@@ -11,14 +11,16 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError, vibration
+from sagline.robot.reach import home_pose
 from sagline.viewer import lines, readout, swing
 from sagline.viewer.feature import BackgroundTask
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.modes import ModesFeature
+from sagline.viewer.page import Page
 from sagline.viewer.playback import Playback
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.swing import PERIOD, mode_of
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.viewer import Viewer, home_pose
 from tests.effort import best_rate
 from tests.plot import made
 from tests.tiers import extended, wide
@@ -30,7 +32,7 @@ POSE = sl.Pose([3.0, 2.0, 1.5], np.eye(3))
 
 @pytest.fixture
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE, mode="2"))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, pose=POSE, mode="2"))
 
 
 def moves(page: Shown) -> bool:
@@ -61,7 +63,7 @@ def heard_for(client: Client, seconds: float) -> list[Any]:
 
 @extended
 def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
-    show = page.viewer.page.feature(ModesFeature)
+    show = page.viewer.feature(ModesFeature)
     await_that(lambda: show.moving and not show.waiting)  # the response is there too
     assert show.swing is not None
     found = vibration(show.swing.state, up_to=20.0)
@@ -99,7 +101,7 @@ def test_the_list_says_what_every_frequency_is(page: Shown) -> None:
         await_that(lambda: any('"massless 1" class="chosen' in row for row in rows_of(page)))
         rows = rows_of(page)
         assert sum('class="chosen' in row for row in rows) == 1
-        found = vibration(page.viewer.page.feature(ModesFeature).swing.state, up_to=20.0)  # type: ignore[union-attr]
+        found = vibration(page.viewer.feature(ModesFeature).swing.state, up_to=20.0)  # type: ignore[union-attr]
         assert len(rows) == found.frequency.size + 6
         plain = [re.sub('data-value="[^"]*"', "", row) for row in rows]
         assert all(("cable mass" in row) != ("massless" in row) for row in plain)
@@ -126,7 +128,7 @@ def test_while_the_platform_is_dragged_nothing_swings_and_then_its_new_modes_do(
             time.sleep(0.03)
         await_that(lambda: page.position[0] == 0.0)
         await_that(lambda: moves(page))
-        swing = page.viewer.page.feature(ModesFeature).swing
+        swing = page.viewer.feature(ModesFeature).swing
         assert swing is not None
         assert swing.mode.frequency == pytest.approx(1.77012, abs=1e-5)  # as finite elements have it
         assert swing.state.pose.position[0] == 0.0
@@ -160,7 +162,7 @@ def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatc
 
 def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
     played = Playback(made.simulation())
-    start, end = played.sight(0.0), played.sight(9.0)
+    start, end = played.at(0.0), played.at(9.0)
     state = made.state_at()
     ends = lines.chords(ROBOT, state.pose)
     np.testing.assert_allclose(start.courses(1.0), lines.catenaries(ends, state.cables, 1.0), atol=1e-9)
@@ -190,7 +192,7 @@ def test_of_work_aside_the_latest_alone_counts() -> None:
     task.start(lambda: 2, done.append, print)
     task.start(lambda: 3, done.append, print)
     assert task.busy
-    assert task.waited == 0.0
+    assert task.elapsed == 0.0
     gate.set()
     for _ in range(2):
         await_that(lambda: bool(tasks))

@@ -10,9 +10,9 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline import structure_matrix
+from sagline.robot.reach import home_pose
 from sagline.viewer.features import push
 from sagline.viewer.push import Push, push_response, semi_axes
-from sagline.viewer.viewer import home_pose
 from tests.refusal import refused
 from tests.tiers import wide
 

@@ -12,9 +12,10 @@ import sagline as sl
 from sagline.viewer import solids
 from sagline.viewer.camera import Camera
 from sagline.viewer.channel import NAME
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.push import FAR, PushFeature
+from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, push_response
-from sagline.viewer.viewer import Viewer
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import ROBOT, Shown, framed, handle, shown
@@ -27,7 +28,7 @@ STIFFNESS = np.sqrt(25.0 * 2000.0) / (FAR * solids.size_of(ROBOT))  # N/m, of th
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, pose=POSE))
 
 
 def look(client: Client, page: Shown) -> CameraHandle:
@@ -48,7 +49,7 @@ def look(client: Client, page: Shown) -> CameraHandle:
 
 def push_of(page: Shown) -> PushResponse | None:
     """What is pushed."""
-    return page.viewer.page.feature(PushFeature).response
+    return page.viewer.feature(PushFeature).response
 
 
 def tell(client: Client, page: Shown, topic: str, value: Any) -> None:
@@ -91,7 +92,7 @@ def test_a_hand_pulls_as_far_as_it_is_away_and_lets_go(page: Shown) -> None:
 
 @extended
 def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
-    show = page.viewer.page.feature(PushFeature)
+    show = page.viewer.feature(PushFeature)
     with Client(page.port) as client:
         look(client, page)
         pull(client, page, "start", 0.5, 0.5)
@@ -114,12 +115,12 @@ def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
 
 
 def test_what_is_behind_the_eye_is_not_held(page: Shown) -> None:
-    show = page.viewer.page.feature(PushFeature)
+    show = page.viewer.feature(PushFeature)
     part = POSE.transform(BODY.vertices[BODY.faces[0]].mean(axis=0))
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # looks along y
     for away, held in ((5.0, False), (-5.0, True)):
         eye = Camera(part + away * axes[:, 2], axes, np.array([0.4, 0.3]), np.array([WIDE, HIGH], dtype=np.float64))
-        await_that(lambda: page.viewer.page.state is not None)
+        await_that(lambda: page.viewer.state is not None)
         show._grab(eye, (0.5, 0.5), -1)  # nobody, whose leaving would let it go
         assert (show._hold is not None) == held
     show._hold = None
@@ -181,7 +182,7 @@ def test_a_client_that_goes_lets_go(page: Shown) -> None:
     ),
 )
 def test_nonsense_holds_nothing(page: Shown, value: Any) -> None:
-    show = page.viewer.page.feature(PushFeature)
+    show = page.viewer.feature(PushFeature)
     with Client(page.port) as client:
         look(client, page)
         before = page.viewer.updates

@@ -18,7 +18,7 @@ RUN = Run.of(PLAN)
 def test_samples_are_those_of_the_plan() -> None:
     index = RUN.index_at(1.25)
     assert index == 12
-    snapshot = RUN.snapshot(index)
+    snapshot = RUN.at(1.25)
     assert np.array_equal(snapshot.pose.position, PATH.pose.position[12])
     assert np.array_equal(snapshot.tension, PLAN.chord_tension[12])
     assert snapshot.plan is not None

@@ -11,13 +11,15 @@ import viser
 import sagline as sl
 from sagline.control import Event, EventKind, State
 from sagline.files.mcap_writer import Recorder
+from sagline.viewer.drawn import InMotion, scaled_position
+from sagline.viewer.features import FEATURES
+from sagline.viewer.page import Page
 from sagline.viewer.player import Timeline
 from sagline.viewer.readout import css_color
 from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, TRUTH
 from sagline.viewer.server import started, stop
-from sagline.viewer.session import LogFollower, Session, SessionMoment
+from sagline.viewer.session import LogFollower, Session
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.viewer import Viewer
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.tiers import extended, wide
 
@@ -54,15 +56,14 @@ def text_of(html: str) -> str:
 def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth: Path) -> None:
     session, done, plan = session_of(log, truth), execution(), plan_of()
     assert session.duration == pytest.approx(2.0)
-    early, late, silent = session.sight(0.2), session.sight(1.204), session.sight(0.49)
+    early, late, silent = session.at(0.2), session.at(1.204), session.at(0.49)
     assert late.index == 120
     assert np.allclose(late.pose.position, plan.state.pose.position[120], rtol=0.0, atol=1e-12)
     assert late.rest is not None
     assert late.truth is not None
     assert np.array_equal(late.rest.position, done.position[120])
     assert np.allclose(late.truth.position - late.pose.position, [0.0, 0.0, -3e-3], rtol=0.0, atol=1e-9)
-    drawn = late.scaled_position(late.truth, 10.0)
-    assert drawn is not None
+    drawn = scaled_position(late.pose, late.truth, 10.0)
     assert np.allclose(drawn - late.pose.position, [0.0, 0.0, -3e-2], rtol=0.0, atol=1e-8)
     assert early.truth is None  # the twin's log begins later
     assert silent.rest is None  # there was no answer
@@ -72,12 +73,12 @@ def test_set_estimated_and_true_platforms_stand_where_they_were(log: Path, truth
 
 def test_the_panel_tells_state_errors_and_what_happened(log: Path, truth: Path) -> None:
     session, done = session_of(log, truth), execution()
-    moment, scale = session.sight(1.2), TensionScale.of(ROBOT)
-    said = text_of(moment.verdict())
+    moment, scale = session.at(1.2), TensionScale.of(ROBOT)
+    said = text_of(moment.verdict)
     assert said.startswith("MOVING Time 1.20 s")
     assert "planned 3 mm" in said
     assert events_of()[1].text in said
-    assert events_of()[1].text not in text_of(session.sight(0.4).verdict())
+    assert events_of()[1].text not in text_of(session.at(0.4).verdict)
     row = text_of(moment.numbers(scale))
     off = done.tension[120] - done.planned_tension[120]
     assert f"5 {done.tension[120, 5]:.1f} {off[5]:.1f}" in row
@@ -88,7 +89,7 @@ def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
     session = session_of(log)
     evil = Event(1000.0, 0, EventKind.NOTE, "x", State.MOVING, "<script>alert(1)</script>")
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    text = Session(**parts | {"events": (evil,)}).sight(1.0).verdict()
+    text = Session(**parts | {"events": (evil,)}).at(1.0).verdict
     assert "<script>" not in text
     assert "&lt;script&gt;" in text
 
@@ -100,7 +101,7 @@ def test_a_fault_is_red_with_its_name(log: Path, state: State) -> None:
     wrong = Session(**parts | {"state": np.full(201, state, dtype=np.int8)})
     server = started(port=0)
     try:
-        viewer = Viewer(server, ROBOT, wrong)
+        viewer = Page(server, FEATURES, ROBOT, wrong)
         viewer._update()
         body = handle(server, "/platform/body")
         assert tuple(body.color) == (PLATFORM if state is State.MOVING else INFEASIBLE)
@@ -126,11 +127,11 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         pass
     server = started(port=0)
     try:
-        viewer = Viewer(server, ROBOT, session)
-        viewer.page.player.scrub_to(session.duration)
+        viewer = Page(server, FEATURES, ROBOT, session)
+        viewer.player.scrub_to(session.duration)
         viewer._update()
         assert viewer.view is not None
-        assert isinstance(viewer.view.snapshot, SessionMoment)
+        assert isinstance(viewer.view.snapshot, InMotion)
         assert viewer.view.snapshot.index == 99
         assert handle(server, "/truth").visible
         assert tuple(handle(server, "/truth/body").color) == TRUTH
@@ -143,7 +144,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         viewer._work_off()
         viewer._update()
         assert viewer.view.snapshot.index == 200  # who looked at the end sees the new end
-        assert viewer.page.player.clock.time == pytest.approx(2.0)
+        assert viewer.player.clock.time == pytest.approx(2.0)
     finally:
         stop(server)
 
@@ -184,6 +185,6 @@ def test_before_the_place_is_known_the_platform_is_shown_in_the_middle(log: Path
     later = unknown.copy()
     later[100:120] = [0.1, 0.2, 1.4]
     known = Session(**parts | {"position": later, "planned": unknown})
-    assert np.array_equal(known.sight(1.5).pose.position, [0.1, 0.2, 1.4])  # the last that was known
+    assert np.array_equal(known.at(1.5).pose.position, [0.1, 0.2, 1.4])  # the last that was known
     assert known.track().spans == ()
     assert known.traces(50, 1.0)[1].shape == (50, 3)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.viewer.drawn import cable_colors, cable_segments, chord_segments, scaled_position
 from sagline.viewer.readout import legend
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
@@ -62,8 +63,8 @@ def test_approximate_model_rests_where_forward_finds_it() -> None:
     found = sl.forward(ROBOT, lengths, start=HERE)
     assert snapshot.error == pytest.approx(found.pose.position - HERE.position, abs=1e-9)
     assert 1e-4 < np.linalg.norm(found.pose.position - HERE.position) < 1e-2
-    drawn = snapshot.scaled_position(snapshot.rest, 100.0)
-    assert drawn is not None
+    assert snapshot.rest is not None
+    drawn = scaled_position(HERE, snapshot.rest, 100.0)
     assert drawn - HERE.position == pytest.approx(100.0 * (found.pose.position - HERE.position), abs=1e-7)
 
 
@@ -75,7 +76,7 @@ def test_infeasible_pose_says_by_how_much_and_which_cables() -> None:
     assert f"short of {float(plan.shortfall):.1f} N;" in snapshot.reason
     assert snapshot.reason.endswith("cables " + ", ".join(str(i) for i in np.flatnonzero(plan.blocking)))
     assert np.isnan(snapshot.tension).all()
-    sizes = np.linalg.norm(np.diff(snapshot.cable_segments(1.0), axis=1), axis=2)
+    sizes = np.linalg.norm(np.diff(cable_segments(snapshot, 1.0), axis=1), axis=2)
     assert np.count_nonzero(sizes) == sizes.size // 2  # dashed
 
 
@@ -93,7 +94,7 @@ def test_platform_on_an_anchor_is_no_accident() -> None:
     snapshot = taken_at(ROBOT, on_anchor, Settings(mass=50.0), None)
     assert not snapshot.feasible
     assert "coincide" in snapshot.reason
-    assert np.isfinite(snapshot.cable_segments(1.0)).all()
+    assert np.isfinite(cable_segments(snapshot, 1.0)).all()
 
 
 def test_ghosts_are_drawn_only_where_they_are_apart_from_their_cables() -> None:
@@ -103,10 +104,10 @@ def test_ghosts_are_drawn_only_where_they_are_apart_from_their_cables() -> None:
     apart = 0.042  # m: two cables hang less below their chords, the others visibly more
     assert np.abs(sag - apart).min() > 0.1 * apart
     for sag_scale in (0.0, 1.0, 3.0):
-        ghosts = snapshot.ghost_segments(sag_scale, apart).reshape(ROBOT.cable_count, -1, 2, 3)
+        ghosts = chord_segments(snapshot, sag_scale, apart).reshape(ROBOT.cable_count, -1, 2, 3)
         drawn = np.linalg.norm(ghosts[:, :, 1] - ghosts[:, :, 0], axis=2) > 0.0
         assert np.array_equal(drawn.any(axis=1), sag_scale * sag > apart)  # taut cables have none
-        cables = snapshot.cable_segments(sag_scale).reshape(ghosts.shape)
+        cables = cable_segments(snapshot, sag_scale).reshape(ghosts.shape)
         away = np.linalg.norm(ghosts - cables, axis=3)
         assert away[drawn].size == 0 or away[drawn].min() > apart
         assert not drawn[:, [0, -1]].any()  # where both end at the same anchor
@@ -128,7 +129,7 @@ def test_cables_over_pulleys_are_drawn_on_them_whether_they_hold_or_not() -> Non
         assert from_center.min() > 0.2 - 1e-9  # none cuts through its pulley
         on_it = np.isclose(from_center, 0.2, rtol=1e-9).sum(axis=1)
         assert (on_it >= 16).all()
-        assert snapshot.cable_colors(TensionScale.of(robot)).shape == snapshot.cable_segments(1.0).shape
+        assert cable_colors(snapshot, TensionScale.of(robot)).shape == cable_segments(snapshot, 1.0).shape
         if pose is HERE:
             exits = sl.inverse(robot, pose, model=model).exit_point
             assert np.abs(courses[:, :, None] - exits[:, None, None]).sum(axis=3).min(axis=(1, 2)).max() < 1e-9

@@ -12,11 +12,12 @@ import pytest
 import sagline as sl
 from sagline import SaglineError
 from sagline.viewer.feature import Reading
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.region import RegionFeature, planes_of
 from sagline.viewer.hull import Hull, WorkspaceQuery, region_hull
+from sagline.viewer.page import Page
 from sagline.viewer.server import Server
 from sagline.viewer.tension_scale import cable_color
-from sagline.viewer.viewer import Viewer
 from tests.effort import best_rate
 from tests.kinematics.test_many_robots import planar
 from tests.tiers import extended
@@ -50,11 +51,11 @@ MAKER = Maker()
 def page() -> Iterator[Shown]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("sagline.viewer.features.region.region_hull", lambda *arguments: MAKER.hull(*arguments))
-        yield from shown(lambda server: Viewer(server, ROBOT, pose=POSE))
+        yield from shown(lambda server: Page(server, FEATURES, ROBOT, pose=POSE))
 
 
 def show_of(page: Shown) -> RegionFeature:
-    return page.viewer.page.feature(RegionFeature)
+    return page.viewer.feature(RegionFeature)
 
 
 def meshes(page: Shown, name: str) -> list[Any]:
@@ -218,7 +219,7 @@ def test_thirty_updates_a_second_while_a_slider_is_dragged_that_a_region_follows
 ) -> None:
     monkeypatch.setattr(MAKER, "hull", region_hull)
     robot = sl.load_robot("cogiro")
-    with contextmanager(shown)(lambda server: Viewer(server, robot)) as page:
+    with contextmanager(shown)(lambda server: Page(server, FEATURES, robot)) as page:
         mass = handle(page, "Platform + load [kg]")
 
         with Client(page.port) as client:
@@ -272,8 +273,8 @@ def test_a_planar_robot_is_sliced_in_its_plane() -> None:
 
 
 def test_what_is_still_compiled_is_said() -> None:
-    def made(server: Server) -> Viewer:
-        return Viewer(server, ROBOT, ready=lambda reading: reading is not Reading.WORKSPACE)
+    def made(server: Server) -> Page:
+        return Page(server, FEATURES, ROBOT, ready=lambda reading: reading is not Reading.WORKSPACE)
 
     with contextmanager(shown)(made) as page:
         assert "Compiling" not in page.text

@@ -13,12 +13,13 @@ import pytest
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.viewer.feature import View
+from sagline.viewer.features import FEATURES
+from sagline.viewer.features.state import code_of
+from sagline.viewer.page import Page, Source
 from sagline.viewer.panel import mass_range
 from sagline.viewer.playback import Playback, Run
 from sagline.viewer.snapshot import METHODS, MODELS, Settings, Snapshot, depends_on_history, taken_at
-from sagline.viewer.state_code import Source, code_of
 from sagline.viewer.tension_scale import TensionScale
-from sagline.viewer.viewer import Viewer
 from tests.tiers import extended, wide
 from tests.viewer.client import PATIENCE, Client, await_that
 from tests.viewer.shown import Shown, handle, shown, with_mass
@@ -130,11 +131,11 @@ def test_a_sample_of_a_run_in_a_file(tmp_path: Path) -> None:
     sl.inverse(robot, path_of(robot), model=sl.Empirical()).save(file)
     run = Run.of(sl.load_plan(file))
     for time in (0.0, 0.52, 9.0):
-        view = View(run.sight(time), Settings(robot.mass), TensionScale.of(robot), False, None, run)
-        names = executed(code_of(view, robot, Source.of_plan(file), time))
-        np.testing.assert_array_equal(names["tension"], run.sight(time).tension)
-        np.testing.assert_array_equal(names["pose"].position, run.sight(time).pose.position)
-        rest = run.sight(time).rest
+        view = View(run.at(time), Settings(robot.mass), TensionScale.of(robot), False, None, run)
+        names = executed(code_of(view, robot, Source.of_file("plan", file), time))
+        np.testing.assert_array_equal(names["tension"], run.at(time).tension)
+        np.testing.assert_array_equal(names["pose"].position, run.at(time).pose.position)
+        rest = run.at(time).rest
         assert rest is not None
         np.testing.assert_array_equal(names["rest"].position, rest.position)
 
@@ -146,7 +147,7 @@ def test_beside_a_run_its_robot_is_that_of_the_file(tmp_path: Path) -> None:
     set_to = Settings(77.0)
     snapshot = taken_at(robot.replace(mass=77.0), sl.Pose([0.1, 0.2, 1.6], np.eye(3)), set_to, None)
     view = View(snapshot, set_to, TensionScale.of(robot), False)
-    same(code_of(view, robot.replace(mass=77.0), Source.of_plan(file)), snapshot)
+    same(code_of(view, robot.replace(mass=77.0), Source.of_file("plan", file)), snapshot)
 
 
 def test_a_moment_of_a_simulation_in_a_file(tmp_path: Path) -> None:
@@ -154,9 +155,9 @@ def test_a_moment_of_a_simulation_in_a_file(tmp_path: Path) -> None:
     state = sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).state
     sl.simulate(state, duration=0.2, events=(sl.Break(cable=0, time=0.05),)).save(file)
     playback = Playback(sl.load_simulation(file))
-    moment = playback.sight(0.13)
+    moment = playback.at(0.13)
     view = View(moment, Settings(robot.mass), TensionScale.of(robot), False, None, playback)
-    names = executed(code_of(view, robot, Source.of_simulation(file), 0.13))
+    names = executed(code_of(view, robot, Source.of_file("simulation", file), 0.13))
     assert moment.index > 0
     np.testing.assert_array_equal(names["tension"][1:], moment.tension[1:])
     np.testing.assert_array_equal(names["pose"].position, moment.pose.position)
@@ -164,7 +165,7 @@ def test_a_moment_of_a_simulation_in_a_file(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, sl.load_robot("cogiro"), source=Source.of_robot("cogiro")))
+    yield from shown(lambda server: Page(server, FEATURES, sl.load_robot("cogiro"), source=Source.of_robot("cogiro")))
 
 
 def asked(page: Shown, topic: str, text: Any, name: str = "me-1") -> dict[str, Any]:
@@ -174,7 +175,7 @@ def asked(page: Shown, topic: str, text: Any, name: str = "me-1") -> dict[str, A
         client.set(field, json.dumps({"topic": topic, "value": [name, text], "count": 0}))
         for message in client.heard(PATIENCE):
             content = str((message.get("props") or message.get("updates") or {}).get("content", ""))
-            start = f"sagline:{topic}-told:"
+            start = f"sagline:{topic}-reply:"
             if content.startswith(start) and json.loads(content[len(start) :])["to"] == name:
                 return dict(json.loads(content[len(start) :]))
     raise AssertionError("no answer")
@@ -228,5 +229,5 @@ def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> No
 def test_what_is_in_no_file_is_refused_in_a_line() -> None:
     robot = sl.load_robot("article-suspended")
     run = Run.of(sl.inverse(robot, path_of(robot)))
-    with contextmanager(shown)(lambda server: Viewer(server, robot, run)) as page:
+    with contextmanager(shown)(lambda server: Page(server, FEATURES, robot, run)) as page:
         assert asked(page, "copy", "code", "c")["refused"].startswith("the run ")

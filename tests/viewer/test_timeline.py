@@ -10,13 +10,13 @@ import pytest
 
 import sagline as sl
 from sagline.control import State
+from sagline.viewer.features import FEATURES
 from sagline.viewer.features.timeline import TimelineFeature
 from sagline.viewer.page import Page
 from sagline.viewer.playback import Playback, Run
 from sagline.viewer.player import Beside, Player
 from sagline.viewer.server import started, stop
 from sagline.viewer.session import LogFollower, Session
-from sagline.viewer.state_code import Source
 from sagline.viewer.tension_scale import ForceUnit
 from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
 from sagline.viewer.timeline import (
@@ -30,7 +30,6 @@ from sagline.viewer.timeline import (
     spans_of,
     timeline_message,
 )
-from sagline.viewer.viewer import Viewer
 from tests.effort import least_seconds
 from tests.files.executions import events_of, execution
 from tests.tiers import extended, wide
@@ -46,7 +45,7 @@ UNIT = ForceUnit("N", 1.0, ".1f")
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
     beside = Beside(Run.of(OTHER), ("a.nc", "b.nc"))
-    yield from shown(lambda server: Viewer(server, ROBOT, Run.of(PLAN), beside=beside))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, Run.of(PLAN), beside=beside))
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +67,7 @@ def growing(log: Session) -> Iterator[Shown]:
     """The first hundred cycles of the log."""
     cycles = {name: value[:100] for name in log.__slots__ if isinstance(value := getattr(log, name), np.ndarray)}
     del cycles["shown"]
-    yield from shown(lambda server: Viewer(server, log.robot, changed(log, **cycles)))
+    yield from shown(lambda server: Page(server, FEATURES, log.robot, changed(log, **cycles)))
 
 
 @pytest.mark.parametrize("seed", wide(range(20), 5))
@@ -304,7 +303,7 @@ def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
 def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> None:
     server = started(port=0)
     try:
-        page = Page(server, ROBOT, Run.of(PLAN), lambda _: True, None, None, "", None, Source(), None)
+        page = Page(server, (), ROBOT, Run.of(PLAN))
         channel, player = page.channel, page.player
         show = TimelineFeature(page)
 

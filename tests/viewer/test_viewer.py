@@ -15,10 +15,11 @@ from websockets.exceptions import ConnectionClosed
 
 import sagline as sl
 from sagline.viewer.feature import Reading
+from sagline.viewer.features import FEATURES
+from sagline.viewer.page import Page
 from sagline.viewer.robot_scene import RobotScene
 from sagline.viewer.server import started, stop
 from sagline.viewer.snapshot import Snapshot, method_name
-from sagline.viewer.viewer import Viewer
 from tests.effort import best_rate
 from tests.refusal import refused
 from tests.tiers import extended, wide
@@ -28,12 +29,12 @@ from tests.viewer.shown import PATH, ROBOT, Shown, a_run, handle, pieces_of, sho
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, ROBOT))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT))
 
 
 @pytest.fixture
 def film() -> Iterator[Shown]:
-    yield from shown(lambda server: Viewer(server, ROBOT, a_run()))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, a_run()))
 
 
 def test_it_listens_on_the_loopback_address_alone(page: Shown) -> None:
@@ -185,7 +186,7 @@ def heard_or_cut_off(page: Shown, client: int, heard: list[int]) -> bool:
 @extended
 def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
     asked: list[int] = []
-    page.viewer.page.channel.on("asked", lambda _, number: asked.append(number))
+    page.viewer.channel.on("asked", lambda _, number: asked.append(number))
     for position, wxyz in (
         ([np.nan, 0.0, 2.0], [1, 0, 0, 0]),
         ([1e9, 0.0, 2.0], [1, 0, 0, 0]),
@@ -209,10 +210,10 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
 def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> None:
     server = started(port=0)
     try:
-        viewer = Viewer(server, ROBOT)
-        viewer.page.panel._mass.value = 1e9  # after the settings were read
-        viewer.page.panel.show_what_if("")
-        assert not viewer.page.panel._forgetting.visible
+        viewer = Page(server, FEATURES, ROBOT)
+        viewer.panel._mass.value = 1e9  # after the settings were read
+        viewer.panel.show_what_if("")
+        assert not viewer.panel._forgetting.visible
     finally:
         stop(server)
 
@@ -271,7 +272,7 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
     )
     server = started(port=0)
     pieces = pieces_of(server)
-    viewer = Viewer(server, ROBOT, ready=ready.__contains__)
+    viewer = Page(server, FEATURES, ROBOT, ready=ready.__contains__)
     thread = threading.Thread(target=viewer.serve)
     page = Shown(server, viewer, thread, pieces)
 

@@ -42,7 +42,7 @@ from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from sagline.viewer.feature import Reading
-    from sagline.viewer.viewer import Viewer
+    from sagline.viewer.page import Page
 
 LATER = "trimesh"  # what the viewer loads when somebody asks for it
 ENTRY_OF = {  # by the names of the viewer's readings
@@ -92,7 +92,7 @@ def check_viewer() -> None:
         FileError: If one is not.
     """
     try:
-        import sagline.viewer.viewer  # noqa: F401
+        import sagline.viewer.features  # noqa: F401
     except ModuleNotFoundError as error:
         raise FileError.not_installed(error.name, "The viewer needs it", "viewer") from None
     if find_spec(LATER) is None:
@@ -103,7 +103,7 @@ def serve(
     robot: Robot,
     address: Address,
     *,
-    meanwhile: Callable[[Viewer], AbstractContextManager[None]] = lambda _: nullcontext(),
+    meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
     **page: Any,
 ) -> int:
     """Serve a page until Ctrl-C; returns the exit code.
@@ -112,10 +112,11 @@ def serve(
         robot: The robot.
         address: Where to listen.
         meanwhile: What goes on beside the viewer, as long as it serves.
-        page: What is on the page, as `Viewer` takes it: played, wrench, pose, mode, found, source, beside.
+        page: What is on the page, as `Page` takes it: played, wrench, pose, mode, found, source, beside.
     """
     from sagline.viewer import server as web
-    from sagline.viewer.viewer import Viewer
+    from sagline.viewer.features import FEATURES
+    from sagline.viewer.page import Page
 
     server = web.started(address.host, address.port, robot.name)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
@@ -126,7 +127,7 @@ def serve(
         if address.host not in ("127.0.0.1", "::1", "localhost"):
             note("Note: ", "everyone who can reach this machine can look at it and drag it.", style="bold")
         readings = Readings()
-        viewer = Viewer(server, robot, ready=readings.ready, **page)
+        viewer = Page(server, FEATURES, robot, ready=readings.ready, **page)
         if address.browser and has_display():
             webbrowser.open(url)
         with working("") if readings.missing else nullcontext(), readings.compiled_for(viewer), meanwhile(viewer):
@@ -159,7 +160,7 @@ class Readings:
         return ENTRY_OF[reading.name] not in self.missing
 
     @contextmanager
-    def compiled_for(self, viewer: Viewer) -> Iterator[None]:
+    def compiled_for(self, viewer: Page) -> Iterator[None]:
         """Compile what is missing in another process while inside, and refresh the viewer after each entry.
 
         The page shows only what the calling thread, which serves it, has to wait for.
@@ -180,7 +181,7 @@ class Readings:
             ended.set()
             thread.join(PATIENCE)
 
-    def _compile(self, viewer: Viewer, ended: threading.Event) -> None:
+    def _compile(self, viewer: Page, ended: threading.Event) -> None:
         if available_cores() < 2:
             while not (viewer.shown.wait(0.1) or ended.is_set()):
                 pass
@@ -202,6 +203,6 @@ class Readings:
                 ENTRIES[name].compile()
                 self._arrived(name, viewer)
 
-    def _arrived(self, name: str, viewer: Viewer) -> None:
+    def _arrived(self, name: str, viewer: Page) -> None:
         self.missing = [each for each in self.missing if each != name]
         viewer.refresh()

@@ -18,9 +18,9 @@ from sagline.core.errors import FileError, InvalidValueError, SaglineError
 if TYPE_CHECKING:
     from sagline.cli.hosting import Address
     from sagline.robot.robot import Robot
+    from sagline.viewer.page import Page
     from sagline.viewer.player import Beside, Played
     from sagline.viewer.session import LogFollower, Session
-    from sagline.viewer.viewer import Viewer
 
 LOG: Final = ".mcap"
 LOOK: Final = 0.5  # s, between two looks at a file that grows
@@ -123,7 +123,7 @@ def view_robot(robot: Robot, name: str | Path, address: Address, mass: float | N
     from sagline.cli.hosting import check_viewer, serve
 
     check_viewer()
-    from sagline.viewer.state_code import Source
+    from sagline.viewer.page import Source
 
     return serve(robot, address, source=Source.of_robot(name, mass), **start)
 
@@ -135,11 +135,11 @@ def view_run(robot: Robot, file: Path, address: Address, beside: Path | None = N
     from sagline.files.simulation_file import FORMAT
 
     check_viewer()
-    from sagline.viewer.state_code import Source
+    from sagline.viewer.page import Source
 
     played = played_in(robot, file)
     other = None if beside is None else played_beside(played.robot, file, beside)
-    source = Source.of_simulation(file) if is_of(file, FORMAT) else Source.of_plan(file)
+    source = Source.of_file("simulation" if is_of(file, FORMAT) else "plan", file)
     return serve(played.robot, address, played=played, source=source, beside=other)
 
 
@@ -153,9 +153,9 @@ def view_calibration(file: Path, robot: str | None, address: Address) -> int:
     found = load_calibration(file)
     if robot is not None:
         _check_robot(file, "calibration", found.robot, load_robot(robot))
-    from sagline.viewer.state_code import Source
+    from sagline.viewer.page import Source
 
-    return serve(found.robot, address, found=found, source=Source.of_calibration(file))
+    return serve(found.robot, address, found=found, source=Source.of_file("calibration", file))
 
 
 def view_log(
@@ -181,8 +181,8 @@ def view_log(
     from sagline.files.robot_file import load_robot
 
     check_viewer()
+    from sagline.viewer.page import Source
     from sagline.viewer.session import LogFollower
-    from sagline.viewer.state_code import Source
 
     follower = LogFollower(file, truth)
     with working(f"waiting for {file.name}" if live else f"reading {file.name}"):
@@ -197,7 +197,7 @@ def view_log(
         address,
         meanwhile=lambda viewer: _following(follower, viewer) if live else nullcontext(),
         played=session,
-        source=Source.of_log(file),
+        source=Source.of_file("execution", file),
         beside=other,
     )
 
@@ -260,7 +260,7 @@ def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Se
 
 
 @contextmanager
-def _following(follower: LogFollower, viewer: Viewer) -> Iterator[None]:
+def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
     """While inside, what comes into the log comes onto the page."""
     over = threading.Event()
 

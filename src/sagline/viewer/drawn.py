@@ -1,8 +1,10 @@
-"""A robot as it is drawn, at rest or in motion."""
+"""Configuration of a robot as it is drawn: solved at rest, or a sample of a motion."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,117 +15,45 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.chords import touching_angle
 from sagline.viewer import lines
+from sagline.viewer.readout import block, cable_table, pose_line
+from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Colors, TensionScale
 
 
-class Drawable(ABC):
-    """A robot at a pose, as it is drawn."""
+@dataclass(frozen=True, slots=True, eq=False)
+class InMotion:
+    """One sample of a simulation or of a log, drawn from the lengths of its cables or from their nodes."""
 
-    __slots__ = ()
+    robot: Robot
+    pose: Pose
+    index: int  # of the sample
+    tension: Array  # [N], shape (m,); NaN where there is none
+    length: Array  # unstrained, off the drums [m], shape (m,); NaN where there is none
+    verdict: str  # HTML of the state and of the events
+    heads: tuple[str, ...]  # of the table of the cables
+    columns: Sequence[Sequence[str]]  # of that table, a text for each cable
+    why_no_choice: str  # reason why tensions are not chosen
+    feasible: bool = True
+    rest: Pose | None = None  # second pose that is shown
+    truth: Pose | None = None  # true pose, where it is known
+    nodes: Array | None = None  # positions of the cables at their nodes [m], shape (m, P, 3)
+    broken: list[int] = field(default_factory=list)  # cables that have broken
+    notice: str = ""  # label of a platform that is not feasible
 
-    @property
-    @abstractmethod
-    def robot(self) -> Robot:
-        """The robot."""
-
-    @property
-    @abstractmethod
-    def pose(self) -> Pose:
-        """Pose of the platform."""
-
-    @property
-    @abstractmethod
-    def tension(self) -> Array:
-        """Tensions [N], shape (m,); NaN where there is none."""
-
-    @property
-    @abstractmethod
-    def feasible(self) -> bool:
-        """True if platform and cables are drawn as feasible."""
-
-    @property
-    @abstractmethod
-    def rest(self) -> Pose | None:
-        """A second pose that is shown; None for none."""
-
-    @abstractmethod
-    def courses(self, sag_scale: float) -> Array:
-        """Points of the cables from frame anchor to platform end [m], shape (m, P, 3), the sag scaled by a factor."""
-
-    def scaled_position(self, pose: Pose | None, factor: float) -> Array | None:
-        """Position of another pose with its distance scaled by a factor [m], shape (3,)."""
-        here = self.pose.position
-        return None if pose is None else np.asarray(here + factor * (pose.position - here))
-
-    def cable_segments(self, sag_scale: float) -> Array:
-        """Segments of the cables (m (P - 1), 2, 3), dashed where the pose is not feasible."""
-        return lines.segments(self.courses(sag_scale), dashed=not self.feasible)
-
-    def ghost_segments(self, sag_scale: float, apart: float) -> Array:
-        """Segments of the chords where a cable is farther from its own than a distance [m]; else of no length."""
-        free = self.courses(sag_scale)[:, -lines.POINTS :]
-        chords = lines.straight(free[:, [0, -1]])
-        return lines.segments(chords, dashed=False, shown=np.linalg.norm(free - chords, axis=2) > apart)
-
-    def cable_colors(self, scale: TensionScale) -> Colors:
-        """Colors of both ends of every segment as viser takes them, shape (m (P - 1), 2, 3)."""
-        ends = 2 * (lines.points_per_cable(self.robot) - 1)
-        return np.repeat(scale.linear_colors(self.tension), ends, axis=0).reshape(-1, 2, 3)
-
-
-class InMotion(Drawable):
-    """A robot in motion, drawn from the lengths of its cables or from their nodes."""
-
-    __slots__ = ()
-
-    @property
-    @abstractmethod
-    def length(self) -> Array:
-        """Unstrained lengths off the drums [m], shape (m,); NaN where there is none."""
-
-    @abstractmethod
-    def verdict(self) -> str:
-        """HTML of the state and of the events."""
-
-    @abstractmethod
     def numbers(self, scale: TensionScale) -> str:
-        """HTML of the pose, and of tension and length of every cable."""
-
-    @property
-    @abstractmethod
-    def why_no_choice(self) -> str:
-        """Reason why tensions are not chosen."""
-
-    @property
-    def nodes(self) -> Array | None:
-        """Positions of the cables at their nodes [m], shape (m, P, 3); None of cables without."""
-        return None
-
-    @property
-    def broken(self) -> list[int]:
-        """Cables that have broken."""
-        return []
-
-    @property
-    def truth(self) -> Pose | None:
-        """True pose; None where it is not known."""
-        return None
-
-    @property
-    def notice(self) -> str:
-        """Label of a platform that is not feasible."""
-        return ""
+        """HTML of the pose, and of the table of the cables."""
+        return block(pose_line(self.pose) + cable_table(self.heads, self.columns, scale.colors(self.tension)))
 
     def courses(self, sag_scale: float) -> Array:
-        """Points of the cables from frame anchor to platform end (m, P, 3); a broken one stays at its anchor."""
+        """Points of the cables from frame anchor to platform end (m, P, 3); a broken cable stays at its anchor."""
         if self.nodes is not None:
             courses = lines.resampled(self.nodes, lines.points_per_cable(self.robot))
         else:
-            courses = self._free(sag_scale)
+            courses = self._catenaries(sag_scale)
         courses[self.broken] = self.robot.frame_anchors[self.broken, None]
         return courses
 
-    def _free(self, sag_scale: float) -> Array:
+    def _catenaries(self, sag_scale: float) -> Array:
         """Points of catenaries of the lengths, which leave their pulleys where their chords do."""
         robot, pose = self.robot, self.pose
         wraps = lines.wraps(robot, pose, None)
@@ -135,7 +65,32 @@ class InMotion(Drawable):
             wrapped = pulleys_of(robot).radius * np.nan_to_num(touching_angle(robot, pose))
         length = self.length - wrapped - dead_cable(robot)
         length = np.where(length > 0.0, length, np.hypot(span, rise))
-        free = lines.catenaries(
-            ends, Catenary().from_length(robot.cables, span, rise, length, robot.gravity), sag_scale
-        )
+        cables = Catenary().from_length(robot.cables, span, rise, length, robot.gravity)
+        free = lines.catenaries(ends, cables, sag_scale)
         return free if wraps.shape[1] == 1 else np.concatenate((wraps, free), axis=1)
+
+
+Configuration: TypeAlias = Snapshot | InMotion
+
+
+def scaled_position(pose: Pose, other: Pose, factor: float) -> Array:
+    """Position of another pose with its distance scaled by a factor [m], shape (3,)."""
+    return np.asarray(pose.position + factor * (other.position - pose.position))
+
+
+def cable_segments(drawn: Configuration, sag_scale: float) -> Array:
+    """Segments of the cables (m (P - 1), 2, 3), dashed where the pose is not feasible."""
+    return lines.segments(drawn.courses(sag_scale), dashed=not drawn.feasible)
+
+
+def chord_segments(drawn: Configuration, sag_scale: float, apart: float) -> Array:
+    """Segments of the chords where a cable is farther from its own than a distance [m]; else of zero length."""
+    free = drawn.courses(sag_scale)[:, -lines.POINTS :]
+    chords = lines.straight(free[:, [0, -1]])
+    return lines.segments(chords, dashed=False, shown=np.linalg.norm(free - chords, axis=2) > apart)
+
+
+def cable_colors(drawn: Configuration, scale: TensionScale) -> Colors:
+    """Colors of both ends of every segment as viser takes them, shape (m (P - 1), 2, 3)."""
+    ends = 2 * (lines.points_per_cable(drawn.robot) - 1)
+    return np.repeat(scale.linear_colors(drawn.tension), ends, axis=0).reshape(-1, 2, 3)

@@ -1,4 +1,4 @@
-"""View, and the interface of its features."""
+"""Interface of the features of the viewer: the view that they follow, and background tasks."""
 
 from __future__ import annotations
 
@@ -13,53 +13,52 @@ from typing import Final, TypeVar
 
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
-from sagline.viewer.drawn import InMotion
+from sagline.robot.equilibrium import Equilibrium
+from sagline.viewer.drawn import Configuration
 from sagline.viewer.player import Played
 from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
 
 class Reading(Enum):
-    """Readings whose kernels may still be compiled when the cables are drawn."""
+    """Readings whose kernels may still be compiled when the cables are drawn first."""
 
     MARGIN = "capacity margin"
     POLYGON = "polygon of feasible tensions"
-    SHARING = "what further ways of sharing choose"
+    SHARING = "tensions of the other tension distribution methods"
     FREQUENCIES = "natural frequencies"
-    REST = "where the platform rests if the model is approximate"
+    REST = "pose of equilibrium if the model is approximate"
     MODES = "modes with cable mass"
-    SIMULATION = "what follows when a cable is cut"
-    WORKSPACE = "margins over a set of loads"
-    VERDICTS = "whether a pose is feasible at all"
+    SIMULATION = "simulation of a cut cable"
+    WORKSPACE = "margins over a wrench set"
+    VERDICTS = "feasibility of a pose"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """State of the page, and how it is drawn.
+    """State of the page: configuration of the robot, and settings."""
 
-    Attributes:
-        snapshot: The robot.
-        settings: What is set.
-        scale: Colors of tensions.
-        ghost: Whether straight cables are drawn beside the real ones.
-        wrench: External wrench on a platform that is dragged, shape (6,); None for none.
-        played: What is played, if that is shown; None for a pose of one's own.
-        playing: Whether its time goes on.
-    """
-
-    snapshot: Snapshot | InMotion
+    snapshot: Configuration
     settings: Settings
-    scale: TensionScale
-    ghost: bool
-    wrench: Array | None = None
-    played: Played | None = None
-    playing: bool = False
+    scale: TensionScale  # colors of tensions
+    ghost: bool  # whether straight cables are drawn beside the real ones
+    wrench: Array | None = None  # external wrench on a platform that is dragged, shape (6,)
+    played: Played | None = None  # run, simulation or log, if it is shown; None for a pose of the user
+    playing: bool = False  # whether the clock runs
+
+    @property
+    def state(self) -> Equilibrium | None:
+        """The equilibrium that is shown; None in motion, and where the pose is not feasible."""
+        snapshot = self.snapshot
+        if not isinstance(snapshot, Snapshot) or snapshot.plan is None or not snapshot.feasible:
+            return None
+        return snapshot.plan.state
 
 
 class Feature:
-    """A feature of the page, made once with the `Page`: its controls, what it draws and says, what it does on a change.
+    """A feature of the page: its controls, its drawing, its text and its reactions; this one does nothing.
 
-    All of it belongs to the thread that serves; this one does nothing.
+    It is made once, with the `Page`. All its methods are called by the serving thread.
     """
 
     @property
@@ -73,32 +72,32 @@ class Feature:
         return False
 
     def depends(self, view: View) -> Hashable:
-        """All that `follow` depends on: it is called only when this has changed; by default at every view."""
+        """Key of all that `follow` depends on: it is called only when this has changed; by default at every view."""
         return view
 
     def follow(self, view: View) -> None:
-        """Draw and say what there is at a view."""
+        """Draw and write for a new view."""
 
     def tick(self) -> None:
-        """Do what time brings."""
+        """Do what is due; called after every update, and at least every half second."""
 
     def put_on(self, played: Played | None) -> None:
-        """Take note of something else that is played, or nothing."""
+        """React when something else is played, or nothing."""
 
 
 T = TypeVar("T")
 
-PATIENCE = 2.0  # s: the time of a longer calculation is written
-NICENESS: Final = 10  # a drag comes first where both want a processor: it is then drawn up to twice as often
+PATIENCE: Final = 2.0  # s: the elapsed time of a longer calculation is shown
+NICENESS: Final = 10  # a drag has priority on a busy processor: it is then drawn up to twice as often
 
 
 class BackgroundTask:
-    """One calculation at a time in a thread of its own; a new one takes the place of the one before."""
+    """One calculation at a time in a thread of its own; a new one replaces the one before."""
 
     def __init__(self, later: Callable[[Callable[[], None]], None]) -> None:
         """Prepare; `later` has the serving thread call a function, from any thread."""
         self._later = later
-        self._number = 0  # of the calculation asked for last
+        self._number = 0  # of the last calculation
         self._began: float | None = None
         self._next: Callable[[], None] | None = None
 
@@ -108,8 +107,8 @@ class BackgroundTask:
         return self._began is not None
 
     @property
-    def waited(self) -> float:
-        """Time that it has been running [s]; 0 up to `PATIENCE`."""
+    def elapsed(self) -> float:
+        """Time since the start of the calculation [s]; 0 up to `PATIENCE`."""
         elapsed = 0.0 if self._began is None else time.monotonic() - self._began
         return elapsed if elapsed > PATIENCE else 0.0
 
@@ -155,6 +154,6 @@ class BackgroundTask:
 
 
 def _lower_priority() -> None:
-    """Let this thread have a processor where no other wants it."""
+    """Lower the priority of this thread."""
     if sys.platform == "linux":  # elsewhere this would be the whole process
         os.nice(NICENESS)

@@ -1,100 +1,176 @@
-"""Page: all that a feature of the viewer is given."""
+"""Page of a robot: one thread waits for a change, solves and draws; callbacks only wake it."""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
-from collections.abc import Callable
-from typing import Any, TypeVar
+from collections.abc import Callable, Hashable, Sequence
+from os import PathLike, fspath
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import viser
 
 from sagline.calibration.result import Calibration
 from sagline.core.arrays import Array
+from sagline.core.errors import SaglineError
+from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach, home_pose
 from sagline.robot.robot import Robot
-from sagline.viewer import solids
+from sagline.statics.stiffness import modes
+from sagline.viewer import readout, solids
 from sagline.viewer.camera import Framing
 from sagline.viewer.channel import Channel
+from sagline.viewer.drawn import Configuration, InMotion
 from sagline.viewer.feature import Feature, Reading, View
 from sagline.viewer.panel import Panel
 from sagline.viewer.player import Beside, Played, Player
-from sagline.viewer.robot_scene import RobotScene
-from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.state_code import Source
+from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
+from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, taken_at
 from sagline.viewer.tension_scale import TensionScale
+
+FRAME_TIME = 1.0 / 60.0  # s: least time between updates
+SOON = 0.05  # s: longest wait while the result of a background task is expected
+IDLE = 0.5  # s: longest wait; Ctrl-C is not noticed earlier where waiting cannot be interrupted
 
 F = TypeVar("F", bound=Feature)
 
 
+class Source(NamedTuple):
+    """Python expressions for the objects that a page was opened with."""
+
+    robot: str = ""  # "" where it is not known
+    mass: float | None = None  # of the platform with a payload [kg]; None for the robot's own
+    played: str = ""  # plan, simulation or execution; "" for none
+
+    @classmethod
+    def of_robot(cls, name_or_path: str | PathLike[str], mass: float | None = None) -> Source:
+        """A robot by its name or its file, perhaps with another mass [kg]."""
+        return cls(f"sl.load_robot({fspath(name_or_path)!r})", mass)
+
+    @classmethod
+    def of_file(cls, kind: str, file: PathLike[str]) -> Source:
+        """A plan, simulation, execution or calibration in a file."""
+        loaded = f"sl.load_{kind}({fspath(file)!r})"
+        robot = f"{loaded}.state.one_robot" if kind == "plan" else f"{loaded}.robot"
+        return cls(robot, None, "" if kind == "calibration" else loaded)
+
+
 class Page:
-    """A robot on a server, what is shown of it, and what a feature may do; all but `later` and `refresh` by one thread.
+    """A robot, perhaps with a run or a simulation, on a server that the caller has started and will stop.
+
+    Its state belongs to the thread in `serve`; other threads call only `later`, `refresh`, `wait`, `extend` and `stop`.
 
     Attributes:
-        server: A running server.
-        robot: The robot.
-        ready: Whether a reading can be had without waiting.
+        server: A running server with nothing on it.
+        robot: The robot; that of what is played, if anything is.
+        ready: Function that tells if a reading can be shown without waiting; call `refresh` when one has become ready.
         channel: Messages to and from browsers.
         panel: Controls and readings; a feature adds a tab to `panel.readings`.
         scene: The robot in the scene.
-        player: What is played.
+        player: Player of a run, a simulation or a log.
         framing: Cameras of the clients.
         scale: Colors of tensions.
         size: Of the robot [m].
-        home: Where the platform is at first.
-        extent: Lowest and highest corner of what there is to see [m].
-        wrench: External wrench on the platform that is dragged, shape (6,); None for none.
-        found: A calibration of the robot; None for none.
-        mode: Name of the mode that moves at first; "" for none.
-        source: Where all this came from.
-        view: What is shown now; None at first.
+        home: Pose of the platform at first.
+        extent: Lowest and highest corner of all that is drawn [m].
+        wrench: External wrench on the platform while it is dragged, shape (6,), as `inverse` takes it; None for none.
+        found: A calibration of the robot to be shown; None for none.
+        mode: Name of the mode that moves at first, "1" or "massless 1"; "" for none.
+        source: Expressions for what the page was opened with.
+        view: The view that is shown; None at first, and the one before while features follow.
         features: All features, in the order in which they follow.
+        updates: Number of views that were shown.
+        shown: Event that is set when the first view is shown.
     """
 
     def __init__(
         self,
         server: viser.ViserServer,
+        features: Sequence[Callable[[Page], Feature | None]],
         robot: Robot,
-        played: Played | None,
-        ready: Callable[[Reading], bool],
-        wrench: Array | None,
-        pose: Pose | None,
-        mode: str,
-        found: Calibration | None,
-        source: Source,
-        beside: Beside | None,
+        played: Played | None = None,
+        ready: Callable[[Reading], bool] = lambda _: True,
+        wrench: Array | None = None,
+        pose: Pose | None = None,
+        mode: str = "",
+        found: Calibration | None = None,
+        source: Source | None = None,
+        beside: Beside | None = None,
     ) -> None:
-        """Build what all features share; the arguments are those of `Viewer`."""
+        """Build the page; `beside` is a second run of the robot with the same clock. Other arguments: see above."""
         self.server, self.robot, self.ready, self.wrench = server, robot, ready, wrench
-        self.mode, self.found, self.source = mode, found, source
-        self.wake = threading.Event()
-        self.tasks: deque[Callable[[], None]] = deque()  # appended to by any thread
+        self.mode, self.found, self.source = mode, found, source or Source()
+        self._wake, self._stopping = threading.Event(), threading.Event()
+        self._tasks: deque[Callable[[], None]] = deque()  # appended to by any thread
         self.scale, self.size = TensionScale.of(robot), solids.size_of(robot)
         self.channel = Channel(server.gui, self.later)
         server.on_client_connect(self.channel.connect)
         server.on_client_disconnect(self.channel.disconnect)
         home = home_pose(robot) if played is None else played.home
         self.home = home if pose is None else pose
-        self.forget: Callable[[], None] = lambda: None
-        self.panel = Panel(server, robot, self.scale, self.refresh, lambda: self.later(lambda: self.forget()))
+        self.panel = Panel(server, robot, self.scale, self.refresh, lambda: self.later(self._forget))
         self.scene = RobotScene(server.scene, robot, self.home)
         self.extent = self.scene.extent(self.home)
         self.framing = Framing(server, *self.extent)
         self.view: View | None = None
+        self.updates, self.shown = 0, threading.Event()
         self.features: tuple[Feature, ...] = ()
         self.player = Player(played, self._put_on, beside)
+        self.features = tuple(feature for make in features if (feature := make(self)) is not None)
+        self._build_gizmo()
+        self._depended: dict[Feature, Hashable] = {}  # on which each feature depended when it followed last
+        self._traced: tuple[int, int, float] = (0, 0, 0.0)  # key of the traces that are drawn
+        self._extended = 0  # number of extensions of what is played
+        self._changed: tuple[tuple[float, float, float], Robot] | None = None  # settings, and the robot with them
+        self._previous: Plan | None = None  # plan of the pose before, for a method that depends on history
+
+    def serve(self) -> None:
+        """Follow what clients do until `stop`; the calling thread does all the work."""
+        self._update()
+        last = time.monotonic()
+        while not self._stopping.is_set():
+            self._wake.wait(timeout=self._pace)
+            rest = FRAME_TIME - (time.monotonic() - last)
+            if rest > 0.0:
+                time.sleep(rest)
+            now = time.monotonic()
+            if self._wake.is_set() or self.player.clock.playing or self._tasks:
+                self._wake.clear()
+                self.player.advance(now - last)
+                self._work_off()
+                self._update()
+            for feature in self.features:
+                feature.tick()
+            last = now
 
     def later(self, task: Callable[[], None]) -> None:
         """Have the serving thread call a function; from any thread."""
-        self.tasks.append(task)
-        self.wake.set()
+        self._tasks.append(task)
+        self._wake.set()
 
     def refresh(self) -> None:
-        """Show everything once more; from any thread."""
-        self.wake.set()
+        """Show everything again; from any thread."""
+        self._wake.set()
+
+    def wait(self, reason: str) -> None:
+        """Write why the numbers are not there yet; from any thread."""
+        self.panel.wait(reason)
+
+    def extend(self, played: Played) -> None:
+        """Replace what is played by a longer version of it; from any thread.
+
+        A clock at its end moves to the new end; a clock at an earlier time stays there.
+        """
+        self.later(lambda: self._extend(played))
+
+    def stop(self) -> None:
+        """Let `serve` return; from any thread."""
+        self._stopping.set()
+        self._wake.set()
 
     def refresh_on(self, *handles: Any) -> None:
         """Refresh when one of these controls changes."""
@@ -104,27 +180,24 @@ class Page:
     @property
     def state(self) -> Equilibrium | None:
         """The equilibrium that is shown; None in motion, and where the pose is not feasible."""
-        snapshot = None if self.view is None else self.view.snapshot
-        if not isinstance(snapshot, Snapshot) or snapshot.plan is None or not snapshot.feasible:
-            return None
-        return snapshot.plan.state
+        return None if self.view is None else self.view.state
 
     def feature(self, kind: type[F]) -> F:
         """The feature of a type."""
         return next(each for each in self.features if isinstance(each, kind))
 
     def go(self, pose: Pose) -> None:
-        """Put the platform to a pose."""
+        """Move the platform to a pose."""
         self.player.leave()
         self.scene.place(pose)
         self.refresh()
 
     def go_home(self) -> None:
-        """Put the platform home."""
+        """Move the platform home."""
         self.go(self.home)
 
     def go_near(self, pose: Pose) -> None:
-        """Put the platform to a pose, unless it is out of reach."""
+        """Move the platform to a pose, unless it is out of reach."""
         self.check_near(pose)
         self.go(pose)
 
@@ -134,9 +207,92 @@ class Page:
         both = np.stack((self.home.position, pose.position)), np.stack((self.home.quaternion, pose.quaternion))
         check_reach(self.robot, Pose.from_quaternion(*both), "pose")
 
+    @property
+    def _pace(self) -> float:
+        """Longest wait until the next update [s]."""
+        if self.player.clock.playing or any(feature.moving for feature in self.features):
+            return FRAME_TIME
+        return SOON if any(feature.waiting for feature in self.features) else IDLE
+
+    def _work_off(self) -> None:
+        while self._tasks:
+            self._tasks.popleft()()
+
     def _put_on(self, played: Played | None) -> None:
-        """Something else is played, or nothing."""
+        """Play something else, or nothing."""
         if played is None:
             self.scene.show_traces(np.empty((0, 3)), np.empty((0, 3)))
         for feature in self.features:
             feature.put_on(played)
+
+    def _extend(self, played: Played) -> None:
+        self.player.extend(played)
+        self._extended += 1
+
+    def _build_gizmo(self) -> None:
+        @self.scene.gizmo.on_update
+        async def _(event: viser.TransformControlsEvent) -> None:
+            if event.phase == "start":
+                self.later(self.player.leave)
+            self.refresh()
+
+        home = self.server.gui.add_button("Platform back home", icon=viser.Icon.HOME)
+        home.on_click(lambda _: self.later(self.go_home))
+
+    def _forget(self) -> None:
+        self._previous = None
+
+    def _update(self) -> None:
+        """Solve and show once."""
+        player = self.player
+        try:
+            settings = self.panel.settings()
+            snapshot = player.now() if player.following else self._from_gizmo(settings)
+        except SaglineError as error:
+            self.panel.refuse(str(error))
+            return
+        played = player.played if player.following else None
+        self.panel.show_what_if("" if played is None else played.unchanged)
+        playing = player.clock.playing
+        self._show(View(snapshot, settings, self.scale, self.panel.ghost, self.wrench, played, playing=playing))
+
+    def _from_gizmo(self, settings: Settings) -> Snapshot:
+        if self._changed is None or self._changed[0] != settings.changes:
+            self._changed = (settings.changes, settings.applied(self.robot))
+        robot, pose, confirmed = self._changed[1], self.scene.dragged_pose(), self.ready(Reading.REST)
+        snapshot = taken_at(robot, pose, settings, self._previous, confirmed=confirmed, wrench=self.wrench)
+        if not depends_on_history(settings.tension):
+            self._forget()  # the tensions of another method are no history
+        elif snapshot.feasible:
+            self._previous = snapshot.plan
+        return snapshot
+
+    def _show(self, view: View) -> None:
+        snapshot, settings, played = view.snapshot, view.settings, self.player.played
+        with self.server.atomic():
+            if view.played is not None:
+                self.scene.place(snapshot.pose)
+            self.scene.show(snapshot, self.scale, settings.sag_scale, settings.error_scale, ghost=view.ghost)
+            traced = self.player.number, self._extended, settings.error_scale
+            if played is not None and traced != self._traced:
+                self._traced = traced
+                self.scene.show_traces(*played.traces(TRACE_POINTS, settings.error_scale))
+        self.panel.read_out(*self._readings(snapshot))
+        for feature in self.features:
+            key = feature.depends(view)
+            if feature not in self._depended or self._depended[feature] != key:
+                self._depended[feature] = key
+                feature.follow(view)
+        self.view = view
+        self.updates += 1
+        self.shown.set()
+
+    def _readings(self, snapshot: Configuration) -> tuple[str, str]:
+        """Verdict and numbers."""
+        if isinstance(snapshot, InMotion):
+            return snapshot.verdict, snapshot.numbers(self.scale)
+        verdict, held = readout.verdict(snapshot, capacity=self.ready(Reading.MARGIN)), snapshot.feasible
+        if not self.ready(Reading.FREQUENCIES):
+            return verdict, readout.numbers(snapshot, self.scale, None, frequencies_later=held)
+        frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and held else None
+        return verdict, readout.numbers(snapshot, self.scale, frequencies)

@@ -17,110 +17,18 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.drawn import InMotion
-from sagline.viewer.readout import block, box, cable_table, definitions, pose_line
+from sagline.viewer.readout import box, definitions
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import ForceUnit, TensionScale, force_unit, number
+from sagline.viewer.tension_scale import ForceUnit, force_unit, number
 from sagline.viewer.timeline import Chart, Mark, Track, cable_names, infeasible_spans, limit_violations, tension_limits
 
-CABLES = {
+CABLES: Final = {
     "none": "massless cables",
     "lumped": "cables with mass, as chains of nodes",
     "modal": "cables with mass, as their linear modes",
 }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Moment(InMotion):
-    """A robot in motion.
-
-    Attributes:
-        simulation: The simulation.
-        index: Number of the sample.
-    """
-
-    simulation: Simulation
-    index: int
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-        return self.simulation.robot
-
-    @property
-    def pose(self) -> Pose:
-        """Pose of the platform."""
-        return self.simulation.pose[self.index]
-
-    @property
-    def time(self) -> float:
-        """Since the start [s]."""
-        return float(self.simulation.time[self.index] - self.simulation.time[0])
-
-    @property
-    def past(self) -> tuple[Occurrence, ...]:
-        """Events so far."""
-        now = float(self.simulation.time[self.index])
-        return tuple(event for event in self.simulation.events if event.time <= now)
-
-    @property
-    def broken(self) -> list[int]:
-        """Cables that have broken."""
-        return [event.cable for event in self.past if event.kind == "break" and event.cable is not None]
-
-    @property
-    def tension(self) -> Array:
-        """Tensions at the frame ends [N], shape (m,); NaN of a broken cable."""
-        tension: Array = self.simulation.tensions[self.index].copy()
-        tension[self.broken] = np.nan
-        return tension
-
-    @property
-    def length(self) -> Array:
-        """Unstrained lengths off the drums [m], shape (m,)."""
-        return np.asarray(self.simulation.length[self.index])
-
-    def verdict(self) -> str:
-        """HTML of the kind of simulation, the numbers of the moment, and the events so far."""
-        simulation, unit = self.simulation, force_unit(self.robot)
-        speed, energy = float(np.linalg.norm(simulation.twist[self.index, :3])), simulation.energy
-        size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
-        rows = [
-            ("Cables", CABLES.get(simulation.cable_mass, simulation.cable_mass)),
-            ("Time", f"{self.time:.3f} s"),
-            ("Speed", n(speed, ".3g", "m/s")),
-            ("Tensions", f"{unit.bare(np.nanmin(self.tension))} to {unit.written(np.nanmax(self.tension))}"),
-            ("Energy error", n(energy.error[self.index], ".2g", "J", size=size)),
-        ]
-        rows += [("Event", event_text(event, unit)) for event in self.past]
-        return box("quiet", "Simulated", definitions(rows))
-
-    def numbers(self, scale: TensionScale) -> str:
-        """HTML of the pose, and of tension and length of every cable."""
-        unit, length = force_unit(self.robot), self.simulation.length[self.index]
-        heads = ("cable", f"at the winch<br>[{unit.name}]", "length<br>[m]")
-        columns = [unit.bare(each) for each in self.tension], [number(each, ".4f") for each in length]
-        return block(pose_line(self.pose) + cable_table(heads, columns, scale.colors(self.tension)))
-
-    @property
-    def why_no_choice(self) -> str:
-        """Reason why tensions are not chosen."""
-        return "In motion nothing is chosen: tensions follow from lengths and from where the platform is."
-
-    @property
-    def feasible(self) -> bool:
-        """True: any motion is drawn as feasible."""
-        return True
-
-    @property
-    def rest(self) -> None:
-        """No second pose."""
-        return None
-
-    @property
-    def nodes(self) -> Array | None:
-        """Positions of the cables at their nodes [m], shape (m, P, 3); None of cables without."""
-        return None if self.simulation.nodes is None else np.asarray(self.simulation.nodes[self.index])
+NO_CHOICE: Final = "In motion, tensions are not chosen: they follow from the lengths and from the pose."
 
 
 def event_text(event: Occurrence, unit: ForceUnit) -> str:
@@ -132,20 +40,14 @@ def event_text(event: Occurrence, unit: ForceUnit) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Run:
-    """A plan of N poses, with the poses confirmed by forward kinematics.
-
-    Attributes:
-        plan: The plan.
-        confirmation: The plan confirmed with exact cables.
-        time: Time of each sample [s], shape (N,), from 0 on; one second a sample for poses without a path.
-    """
+    """A plan of N poses, with the poses confirmed by forward kinematics."""
 
     plan: Plan
-    confirmation: Confirmation
-    time: Array
+    confirmation: Confirmation  # with exact cables
+    time: Array  # of the samples, from 0 on [s], shape (N,); one second a sample for poses without a path
 
     name = "run"
-    still = "A run is what it was planned as; drag the platform to ask what if."
+    unchanged = "A run keeps its robot and loads; drag the platform to change them."
 
     @classmethod
     def of(cls, plan: Plan, progress: Progress | None = None) -> Run:
@@ -173,18 +75,24 @@ class Run:
         return float(self.time[-1])
 
     def index_at(self, time: float) -> int:
-        """The sample at or before a time."""
+        """Number of the sample at or before a time [s]."""
         return _sample_at(self.time, time)
 
-    def snapshot(self, index: int) -> Snapshot:
-        """One sample."""
+    def at(self, time: float) -> Snapshot:
+        """The sample at or before a time [s]."""
+        index = self.index_at(time)
         plan = _sample(self.plan, index)
         rest = self.confirmation.pose[index] if plan.feasible else None
         return Snapshot(plan.state.one_robot, plan.state.pose, plan, rest)
 
-    def sight(self, time: float) -> Snapshot:
-        """The sample at or before a time [s]."""
-        return self.snapshot(self.index_at(time))
+    def code(self, source: str, time: float) -> list[str]:
+        """Lines of Python of a sample; `source` is an expression for the plan."""
+        index = self.index_at(time)
+        lines = [f"plan = {source}", f"index = {index}"]
+        lines += ["robot, pose = plan.state.one_robot, plan.state.pose[index]", "tension = plan.chord_tension[index]"]
+        if self.plan.feasible[index]:
+            lines.append("rest = sl.confirm(plan).pose[index]  # where it really rests")
+        return lines
 
     def track(self) -> Track:
         """Charts of the limited tensions and the lengths, and spans of infeasible poses."""
@@ -218,16 +126,12 @@ FAILURES: Final = ("break", "stall", "slack", "saturate")  # kinds of events
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Playback:
-    """A simulation of N samples, from time 0 on.
-
-    Attributes:
-        simulation: The simulation.
-    """
+    """A simulation of N samples, from time 0 on."""
 
     simulation: Simulation
 
     name = "simulation"
-    still = "A simulation is what it was started as; drag the platform to ask what if."
+    unchanged = "A simulation keeps its robot and loads; drag the platform to change them."
 
     @property
     def robot(self) -> Robot:
@@ -249,9 +153,42 @@ class Playback:
         """Time of the last sample [s]."""
         return float(self.time[-1])
 
-    def sight(self, time: float) -> Moment:
+    def at(self, time: float) -> InMotion:
         """The sample at or before a time [s]."""
-        return Moment(self.simulation, _sample_at(self.time, time))
+        simulation, unit, k = self.simulation, force_unit(self.robot), _sample_at(self.time, time)
+        now = float(simulation.time[k])
+        past = [event for event in simulation.events if event.time <= now]
+        broken = [event.cable for event in past if event.kind == "break" and event.cable is not None]
+        tension = simulation.tensions[k].copy()
+        tension[broken] = np.nan
+        length, pose = np.asarray(simulation.length[k]), simulation.pose[k]
+        energy = simulation.energy
+        size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
+        rows = [
+            ("Cables", CABLES.get(simulation.cable_mass, simulation.cable_mass)),
+            ("Time", f"{now - simulation.time[0]:.3f} s"),
+            ("Speed", n(np.linalg.norm(simulation.twist[k, :3]), ".3g", "m/s")),
+            ("Tensions", f"{unit.bare(np.nanmin(tension))} to {unit.written(np.nanmax(tension))}"),
+            ("Energy error", n(energy.error[k], ".2g", "J", size=size)),
+            *(("Event", event_text(event, unit)) for event in past),
+        ]
+        heads = ("cable", f"at the winch<br>[{unit.name}]", "length<br>[m]")
+        columns = [unit.bare(each) for each in tension], [number(each, ".4f") for each in length]
+        verdict = box("quiet", "Simulated", definitions(rows))
+        nodes = None if simulation.nodes is None else np.asarray(simulation.nodes[k])
+        return InMotion(
+            self.robot, pose, k, tension, length, verdict, heads, columns, NO_CHOICE, nodes=nodes, broken=broken
+        )
+
+    def code(self, source: str, time: float) -> list[str]:
+        """Lines of Python of a sample; `source` is an expression for the simulation."""
+        index = _sample_at(self.time, time)
+        return [
+            f"simulation = {source}",
+            f"index = {index}  # {self.time[index]:g} s",
+            "robot, pose = simulation.robot, simulation.pose[index]",
+            "tension = simulation.tensions[index]",
+        ]
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """No desired positions, and the actual ones (n, 3), n <= most."""

@@ -9,8 +9,7 @@ from typing import NamedTuple, Protocol
 from sagline.core.arrays import Array
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.drawn import InMotion
-from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.drawn import Configuration
 from sagline.viewer.timeline import Track
 
 
@@ -34,81 +33,66 @@ class Played(Protocol):
         """Time of its end [s]."""
 
     @property
-    def still(self) -> str:
+    def unchanged(self) -> str:
         """Text in place of the controls that would change the robot."""
 
-    def sight(self, time: float) -> Snapshot | InMotion:
-        """State at a time [s]."""
+    def at(self, time: float) -> Configuration:
+        """Configuration at a time [s]."""
+
+    def code(self, source: str, time: float) -> list[str]:
+        """Lines of Python of the sample at a time [s]; `source` is an expression for what is played."""
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
+        """Desired and actual positions (n, 3), n <= most, the error scaled by a factor; NaN in gaps."""
 
     def track(self) -> Track:
         """Charts of the timeline."""
 
 
 class Beside(NamedTuple):
-    """Another run beside what is played, with the same clock.
-
-    Attributes:
-        played: The other one.
-        names: What both are called on the timeline, what is played first.
-    """
+    """A second run with the same clock."""
 
     played: Played
-    names: tuple[str, str]
+    names: tuple[str, str]  # of both on the timeline, this one last
 
 
 @dataclass(frozen=True, slots=True)
 class Timeline:
-    """Clock of a playback.
+    """Clock of a playback."""
 
-    Attributes:
-        duration: Time of the end [s].
-        time: Time shown [s], 0 to duration.
-        playing: Whether time goes on.
-    """
-
-    duration: float
-    time: float = 0.0
-    playing: bool = False
+    duration: float  # time of the end [s]
+    time: float = 0.0  # that is shown [s], 0 to duration
+    playing: bool = False  # whether the clock runs
 
     def advanced(self, elapsed: float, speed: float) -> Timeline:
-        """After a while of real time [s] at a speed [times]; stops at the end."""
+        """Clock after an interval of real time [s] at a speed, the ratio of times; it stops at the end."""
         if not self.playing:
             return self
         time = self.time + max(elapsed, 0.0) * speed
         return Timeline(self.duration, min(time, self.duration), time < self.duration)
 
     def extended(self, duration: float) -> Timeline:
-        """With an end that has moved on [s]; who stood at the end stands there again."""
+        """Clock with a later end [s]; a paused clock at the end stays at the end."""
         time = duration if self.time >= self.duration and not self.playing else self.time
         return Timeline(duration, time, self.playing)
 
     def toggled(self) -> Timeline:
-        """Play, from the start again if at the end; or pause."""
+        """Clock that runs if it was paused, from the start if it was at the end; else a paused one."""
         time = 0.0 if not self.playing and self.time >= self.duration else self.time
         return Timeline(self.duration, time, not self.playing)
 
     def scrubbed(self, time: float) -> Timeline:
-        """At another time [s], paused; a time outside is taken as the nearer end."""
+        """Paused clock at another time [s], limited to its ends."""
         return Timeline(self.duration, min(max(time, 0.0), self.duration), False)
 
 
 class PlayerState(NamedTuple):
-    """State of a player.
-
-    Attributes:
-        played: What; None for nothing.
-        given: Whether it is what the page was opened with.
-        clock: Where it was.
-        following: Whether it was shown, and not a pose of one's own.
-    """
+    """State of a player."""
 
     played: Played | None
-    given: bool
+    original: bool  # whether the page was opened with it
     clock: Timeline
-    following: bool
+    following: bool  # whether it was shown, and not a pose of the user
 
 
 class Player:
@@ -116,35 +100,35 @@ class Player:
 
     Attributes:
         played: What is played; None for nothing.
-        clock: Where it is.
-        following: Whether what is played is shown, and not a pose of one's own.
-        speed: Time of what is played a second.
-        number: Of what is played; it stays what it is when that goes on.
+        clock: Its clock.
+        following: Whether it is shown, and not a pose of the user.
+        speed: Ratio of its time to real time.
+        number: Number of what is played; a longer version has the same.
     """
 
     def __init__(
         self,
-        given: Played | None,
+        original: Played | None,
         put_on: Callable[[Played | None], None],
         beside: Beside | None = None,
     ) -> None:
-        """Put something on, or nothing."""
-        self._put_on, self._given, self._beside = put_on, given, beside
+        """Play something, or nothing; `put_on` is called whenever something else is played."""
+        self._put_on, self._original, self._beside = put_on, original, beside
         self.speed, self.number = 1.0, 0
-        self.play(given)
+        self.play(original)
 
     @property
-    def given(self) -> bool:
+    def is_original(self) -> bool:
         """True if the page was opened with what is played."""
-        return self.played is self._given
+        return self.played is self._original
 
     @property
     def beside(self) -> Beside | None:
         """The second run."""
-        return self._beside if self.played is not None and self.played is self._given else None
+        return self._beside if self.played is not None and self.is_original else None
 
     def play(self, played: Played | None, *, at_once: bool = False) -> None:
-        """Put something on the timeline in place of what was there, or nothing."""
+        """Play something else, or nothing."""
         self.played = played
         self.number += 1
         self.following = played is not None
@@ -152,42 +136,42 @@ class Player:
         self._put_on(played)
 
     def extend(self, played: Played) -> None:
-        """Have what was given go on; who looks at its end sees the new end."""
-        looked_at = self.played is self._given  # or else at what a cut brought
-        self._given = played
-        if looked_at:
+        """Replace the original by a longer version; a clock at its end moves to the new end."""
+        shown = self.is_original  # else the simulation of a cut is shown
+        self._original = played
+        if shown:
             self.played = played
             self.clock = self.clock.extended(self._duration())
 
     def grow(self, played: Played) -> None:
-        """Have what a cut brought go on; a clock that has come to its end waits for the rest, and goes on."""
+        """Replace the simulation of a cut by a longer version; a clock that has reached its end runs on."""
         waits = self.clock.time >= self.clock.duration
         self.played = played
         self.clock = Timeline(self._duration(), self.clock.time, self.clock.playing or waits)
 
     def save(self) -> PlayerState:
         """State to return to later."""
-        return PlayerState(self.played, self.played is self._given, self.clock, self.following)
+        return PlayerState(self.played, self.is_original, self.clock, self.following)
 
     def restore(self, kept: PlayerState) -> None:
-        """Play what was kept, where its clock stood; of what was given as much as there is by now."""
-        self.play(self._given if kept.given else kept.played)
+        """Return to a state; the original is played as far as it has been extended since."""
+        self.play(self._original if kept.original else kept.played)
         self.clock = self.clock.scrubbed(kept.clock.time)
         if kept.clock.playing:
             self.clock = self.clock.toggled()
         self.following = kept.following
 
     def advance(self, elapsed: float) -> None:
-        """Some real time has passed [s]."""
+        """Advance the clock by an interval of real time [s]."""
         self.clock = self.clock.advanced(elapsed, self.speed)
 
-    def sight(self) -> Snapshot | InMotion:
-        """State at the present time."""
+    def now(self) -> Configuration:
+        """Configuration at the present time."""
         assert self.played is not None
-        return self.played.sight(self.clock.time)
+        return self.played.at(self.clock.time)
 
     def leave(self) -> None:
-        """Stop, and show a pose of one's own."""
+        """Pause, and show the pose of the user."""
         self.clock = self.clock.scrubbed(self.clock.time)
         self.following = False
 
@@ -201,7 +185,7 @@ class Player:
         self.follow()
 
     def scrub_to(self, time: float) -> None:
-        """Look at another time [s], paused."""
+        """Pause at another time [s]."""
         self.clock = self.clock.scrubbed(time)
         self.follow()
 

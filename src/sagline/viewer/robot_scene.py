@@ -14,7 +14,14 @@ from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
 from sagline.viewer import lines, solids
-from sagline.viewer.drawn import InMotion
+from sagline.viewer.drawn import (
+    Configuration,
+    InMotion,
+    cable_colors,
+    cable_segments,
+    chord_segments,
+    scaled_position,
+)
 from sagline.viewer.readout import headline
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
@@ -103,11 +110,11 @@ class RobotScene:
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def show(
-        self, snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
+        self, snapshot: Configuration, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
     ) -> None:
         """Draw a snapshot, or a moment of a simulation; the platform itself follows the gizmo."""
-        self._cables.points = snapshot.cable_segments(sag_scale).astype(np.float32)
-        self._cables.colors = snapshot.cable_colors(scale)
+        self._cables.points = cable_segments(snapshot, sag_scale).astype(np.float32)
+        self._cables.colors = cable_colors(snapshot, scale)
         if self._wheels is not None:
             turns = solids.pulley_rotations(snapshot.robot, snapshot.pose)[self._over_pulleys]
             self._wheels.batched_wxyzs = turns.astype(np.float32)
@@ -120,24 +127,15 @@ class RobotScene:
             self._show_truth(snapshot, error_scale)
         self._ghost.visible = ghost
         if ghost:
-            self._ghost.points = snapshot.ghost_segments(sag_scale, APART * self._size).astype(np.float32)
-        rest = snapshot.scaled_position(snapshot.rest, error_scale)
-        shown = rest is not None and bool(np.isfinite(rest).all())
-        self._rest_frame.visible = shown
-        if shown and rest is not None and snapshot.rest is not None:
-            self._rest_frame.position = rest
-            self._rest_frame.wxyz = np.roll(snapshot.rest.quaternion, 1)
+            self._ghost.points = chord_segments(snapshot, sag_scale, APART * self._size).astype(np.float32)
+        _move(self._rest_frame, snapshot.pose, snapshot.rest, error_scale)
 
     def _show_truth(self, drawn: InMotion, error_scale: float) -> None:
-        truth = drawn.truth
-        place = drawn.scaled_position(truth, error_scale)
-        if self._truth is None and truth is not None:
+        if self._truth is None and drawn.truth is not None:
             self._truth = self._scene.add_frame("/truth", show_axes=False)
             self._scene.add_mesh_simple("/truth/body", self._body.vertices, self._body.faces, color=TRUTH, opacity=0.55)
         if self._truth is not None:
-            self._truth.visible = truth is not None
-        if truth is not None and place is not None:
-            self._truth.position, self._truth.wxyz = place, np.roll(truth.quaternion, 1)
+            _move(self._truth, drawn.pose, drawn.truth, error_scale)
 
     def swing(self, rest: Pose, pose: Pose, courses: Array) -> None:
         """Draw the platform elsewhere than its gizmo, which stays at its rest, and the cables (m, P, 3) with it."""
@@ -243,9 +241,12 @@ class RobotScene:
         )  # fmt: skip
 
 
-def stroke(color: tuple[int, int, int]) -> str:
-    """HTML of a short line of a color, for a key."""
-    return f'<span class="stroke" style="border-color:rgb{color}"></span>'
+def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> None:
+    """Move a frame to another pose, its distance scaled by a factor; hide it where that is not known."""
+    frame.visible = other is not None and bool(np.isfinite(other.position).all())
+    if frame.visible and other is not None:
+        frame.position = scaled_position(pose, other, error_scale)
+        frame.wxyz = np.roll(other.quaternion, 1)
 
 
 def _neighbors(points: Array, near: float) -> list[tuple[Array, list[int]]]:

@@ -20,59 +20,41 @@ from sagline.files.mcap_reader import Log, LogReader
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.drawn import InMotion
-from sagline.viewer.readout import block, box, cable_table, definitions, pose_line
+from sagline.viewer.readout import box, definitions
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
-from sagline.viewer.tension_scale import TensionScale, force_unit, number
+from sagline.viewer.tension_scale import force_unit, number
 from sagline.viewer.timeline import Chart, Mark, Span, Track, cable_names, limit_violations, spans_of, tension_limits
 
 PER_METER = 1e3  # mm
 MOST_EVENTS = 8  # that are listed, the newest
+NO_CHOICE = "Tensions of a log are not chosen: they are those that the load cells read."
 WRONG = (State.FAULT, State.EMERGENCY)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Session:
-    """N cycles of a controller, from time 0 on.
-
-    Attributes:
-        robot: The robot.
-        time: Of the cycles, from 0 on [s], shape (N,).
-        began: The first of them on the clock of the link [s].
-        state: Codes of `State`, shape (N,).
-        late: By how much each began too late [s], shape (N,).
-        position: Of the platform's origin, estimated [m], shape (N, 3); NaN where it is not known.
-        quaternion: Rotation, estimated, shape (N, 4).
-        planned: Position that was planned [m], shape (N, 3); NaN beside a plan.
-        planned_quaternion: Rotation that was planned, shape (N, 4).
-        true: Position in truth [m], shape (N, 3); None where nobody knows.
-        true_quaternion: Rotation in truth, shape (N, 4).
-        tension: At the frame ends, as read [N], shape (N, m).
-        planned_tension: As planned [N], shape (N, m).
-        length: From the encoders, with the zero of homing [m], shape (N, m).
-        set_length: That was asked for [m], shape (N, m).
-        events: What happened.
-    """
+    """N cycles of a controller, from time 0 on."""
 
     robot: Robot
-    time: Array
-    began: float
-    state: Codes
-    late: Array
-    position: Array
-    quaternion: Array
-    planned: Array
-    planned_quaternion: Array
-    true: Array | None
-    true_quaternion: Array | None
-    tension: Array
-    planned_tension: Array
-    length: Array
-    set_length: Array
+    time: Array  # of the cycles, from 0 on [s], shape (N,)
+    began: float  # time of the first cycle on the clock of the link [s]
+    state: Codes  # of `State`, shape (N,)
+    late: Array  # delay of each cycle [s], shape (N,)
+    position: Array  # of the platform's origin, estimated [m], shape (N, 3); NaN where it is not known
+    quaternion: Array  # estimated, shape (N, 4)
+    planned: Array  # position [m], shape (N, 3); NaN without a plan
+    planned_quaternion: Array  # shape (N, 4)
+    true: Array | None  # true position [m], shape (N, 3); None where it is not known
+    true_quaternion: Array | None  # shape (N, 4)
+    tension: Array  # at the frame ends, as read [N], shape (N, m)
+    planned_tension: Array  # [N], shape (N, m)
+    length: Array  # from the encoders, with the zero of homing [m], shape (N, m)
+    set_length: Array  # set points [m], shape (N, m)
     events: tuple[Event, ...]
-    shown: Array = field(init=False)  # numbers of cycles: the last before each whose place is known
+    shown: Array = field(init=False)  # number of the last cycle before each whose position is known, or the first
 
     name = "log"
-    still = "A log is what it was recorded as; drag the platform to ask what if."
+    unchanged = "A log keeps its robot and loads; drag the platform to change them."
 
     def __post_init__(self) -> None:
         """Find what to show where nothing is known: what was known before, or first."""
@@ -101,10 +83,65 @@ class Session:
         box, anchors = self.robot.test_box, self.robot.frame_anchors
         return Pose(anchors.mean(axis=0) if box is None else 0.5 * (box.low + box.high), np.eye(3))
 
-    def sight(self, time: float) -> SessionMoment:
+    def at(self, time: float) -> InMotion:
         """The cycle at or before a time [s]."""
+        k, unit = self._index_at(time), force_unit(self.robot)
+        state, tension = State(int(self.state[k])), np.asarray(self.tension[k])
+        rest, truth = self._pose(self.position, self.quaternion, k), self._pose(self.true, self.true_quaternion, k)
+        rows = [("Time", f"{self.time[k]:.2f} s"), ("Cycle late", n(self.late[k], ".2g", "s"))]
+        for name, pose, other in (
+            ("Estimated less planned", rest, self.planned[k]),
+            ("True less planned", truth, self.planned[k]),
+            ("True less estimated", truth, None if rest is None else rest.position),
+        ):
+            if pose is not None and other is not None and np.isfinite(other).all():
+                rows.append((name, n(PER_METER * float(np.linalg.norm(pose.position - other)), ".3g", "mm")))
+        if np.isfinite(tension).any():
+            rows.append(("Tensions", f"{unit.bare(np.nanmin(tension))} to {unit.written(np.nanmax(tension))}"))
+        past = [event for event in self.events if event.time <= self.began + self.time[k]]
+        rows += [(f"{event.time - self.began:.2f} s", f"{event.name}: {event.text}") for event in past[-MOST_EVENTS:]]
+        heads = ("cable", f"tension<br>[{unit.name}]", "less planned<br>[N]", "set less read<br>[mm]")
+        columns = (
+            [unit.bare(each) for each in tension],
+            [number(each, ".1f") for each in tension - self.planned_tension[k]],
+            [number(each, ".2f") for each in PER_METER * (self.set_length[k] - self.length[k])],
+        )
+        feasible = state not in WRONG
+        return InMotion(
+            self.robot,
+            self.pose_at(k),
+            k,
+            tension,
+            np.asarray(self.length[k]),
+            box("quiet" if feasible else "bad", state.name, definitions((name, escape(text)) for name, text in rows)),
+            heads,
+            columns,
+            NO_CHOICE,
+            feasible,
+            rest,
+            truth,
+            notice="" if feasible else state.name,
+        )
+
+    def code(self, source: str, time: float) -> list[str]:
+        """Lines of Python of a cycle; `source` is an expression for the execution."""
+        index = self._index_at(time)
+        return [
+            f"log = {source}",
+            f"index = {index}  # {self.time[index]:g} s",
+            "robot, tension = log.robot, log.samples.tension[index]",
+        ]
+
+    def _index_at(self, time: float) -> int:
         index = int(np.searchsorted(self.time, time, side="right")) - 1
-        return SessionMoment(self, min(max(index, 0), self.time.size - 1))
+        return min(max(index, 0), self.time.size - 1)
+
+    @staticmethod
+    def _pose(positions: Array | None, quaternions: Array | None, k: int) -> Pose | None:
+        """Pose of a cycle; None where it is not known."""
+        if positions is None or quaternions is None or not np.isfinite(positions[k]).all():
+            return None
+        return Pose.from_quaternion(positions[k], quaternions[k])
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
         """Planned and estimated positions (n, 3), n <= most."""
@@ -147,118 +184,6 @@ class Session:
 
         faults = spans_of(self.time, np.isin(self.state, WRONG), why)
         return tuple(sorted(faults + limit_violations(self.robot, self.time, self.tension, force_unit(self.robot))))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SessionMoment(InMotion):
-    """One cycle.
-
-    Attributes:
-        session: The log.
-        index: Number of the cycle.
-    """
-
-    session: Session
-    index: int
-
-    @property
-    def robot(self) -> Robot:
-        """The robot."""
-        return self.session.robot
-
-    @property
-    def pose(self) -> Pose:
-        """Planned pose, or without a plan the estimated one."""
-        return self.session.pose_at(self.index)
-
-    @property
-    def tension(self) -> Array:
-        """As the load cells read it [N], shape (m,)."""
-        return np.asarray(self.session.tension[self.index])
-
-    @property
-    def length(self) -> Array:
-        """From the encoders [m], shape (m,)."""
-        return np.asarray(self.session.length[self.index])
-
-    @property
-    def time(self) -> float:
-        """Since the first cycle [s]."""
-        return float(self.session.time[self.index])
-
-    @property
-    def state(self) -> State:
-        """Of the controller."""
-        return State(int(self.session.state[self.index]))
-
-    @property
-    def past(self) -> tuple[Event, ...]:
-        """Events so far."""
-        now = self.session.began + self.time
-        return tuple(event for event in self.session.events if event.time <= now)
-
-    @property
-    def feasible(self) -> bool:
-        """True if there is no fault."""
-        return self.state not in WRONG
-
-    @property
-    def notice(self) -> str:
-        """Name of the fault."""
-        return "" if self.feasible else self.state.name
-
-    @property
-    def rest(self) -> Pose | None:
-        """Estimated pose."""
-        return self._beside(self.session.position, self.session.quaternion)
-
-    @property
-    def truth(self) -> Pose | None:
-        """True pose."""
-        if self.session.true is None or self.session.true_quaternion is None:
-            return None
-        return self._beside(self.session.true, self.session.true_quaternion)
-
-    def verdict(self) -> str:
-        """HTML of the state, the errors of pose and tensions, and the latest events."""
-        session, k, unit = self.session, self.index, force_unit(self.robot)
-        rows = [("Time", f"{self.time:.2f} s"), ("Cycle late", n(session.late[k], ".2g", "s"))]
-        rest, truth, planned = self.rest, self.truth, session.planned[k]
-        for name, pose, other in (
-            ("Estimated less planned", rest, planned),
-            ("True less planned", truth, planned),
-            ("True less estimated", truth, None if rest is None else rest.position),
-        ):
-            if pose is not None and other is not None and np.isfinite(other).all():
-                away = PER_METER * float(np.linalg.norm(pose.position - other))
-                rows.append((name, n(away, ".3g", "mm")))
-        if np.isfinite(self.tension).any():
-            low, high = np.nanmin(self.tension), np.nanmax(self.tension)
-            rows.append(("Tensions", f"{unit.bare(low)} to {unit.written(high)}"))
-        for event in self.past[-MOST_EVENTS:]:
-            rows.append((f"{event.time - session.began:.2f} s", f"{event.name}: {event.text}"))
-        text = definitions((name, escape(what)) for name, what in rows)
-        return box("quiet" if self.feasible else "bad", self.state.name, text)
-
-    def numbers(self, scale: TensionScale) -> str:
-        """HTML of the pose, and of tension and its error and the error of the length of every cable."""
-        session, k, unit = self.session, self.index, force_unit(self.robot)
-        heads = ("cable", f"tension<br>[{unit.name}]", "less planned<br>[N]", "set less read<br>[mm]")
-        columns = (
-            [unit.bare(each) for each in self.tension],
-            [number(each, ".1f") for each in self.tension - session.planned_tension[k]],
-            [number(each, ".2f") for each in PER_METER * (session.set_length[k] - session.length[k])],
-        )
-        return block(pose_line(self.pose) + cable_table(heads, columns, scale.colors(self.tension)))
-
-    @property
-    def why_no_choice(self) -> str:
-        """Reason why tensions are not chosen."""
-        return "What a machine did is not chosen any more: its tensions are those that its load cells read."
-
-    def _beside(self, positions: Array, quaternions: Array) -> Pose | None:
-        place = positions[self.index]
-        return Pose.from_quaternion(place, quaternions[self.index]) if np.isfinite(place).all() else None
 
 
 class LogFollower:

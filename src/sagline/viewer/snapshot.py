@@ -26,7 +26,6 @@ from sagline.tension.methods import METHODS as ALL_METHODS
 from sagline.tension.methods import MinimumNorm
 from sagline.viewer import lines
 from sagline.viewer.by_hand import BY_HAND, ByHand
-from sagline.viewer.drawn import Drawable
 from sagline.viewer.tension_scale import force_unit
 
 MODEL_NAMES: dict[type[CableModel], str] = {  # those that say more than the name of their class
@@ -108,7 +107,7 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Snapshot(Drawable):
+class Snapshot:
     """A robot held at one pose.
 
     Attributes:
@@ -121,10 +120,10 @@ class Snapshot(Drawable):
         previous: Tensions from which a method that depends on history continued [N], shape (m,); None for none.
     """
 
-    robot: Robot = field()  # without it the property of the base would be the default
-    pose: Pose = field()
+    robot: Robot
+    pose: Pose
     plan: Plan | None
-    rest: Pose | None = field()
+    rest: Pose | None
     refusal: str = ""
     previous: Array | None = None
 

@@ -24,7 +24,7 @@
     waiting.set(name, answered);
     if (!heard.has(topic)) {
       heard.add(topic);
-      window.sagline.on(`${topic}-told`, ({ to, ...answer }) => {
+      window.sagline.on(`${topic}-reply`, ({ to, ...answer }) => {
         waiting.get(to)?.(answer);
         waiting.delete(to);
       });

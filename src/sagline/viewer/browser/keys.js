@@ -87,7 +87,7 @@
   window.sagline.on("scene", (told) => {
     scene = told;
   });
-  window.sagline.on("nudge-told", (refused) => {
+  window.sagline.on("nudge-reply", (refused) => {
     if (refused) window.sagline.say(refused);
   });
   window.sagline.dress(() => {

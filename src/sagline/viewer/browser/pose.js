@@ -9,7 +9,7 @@
   let refusal = "";
   const show = () => {
     const input = field();
-    const told = document.getElementById("sagline-pose-told");
+    const told = document.getElementById("sagline-pose-reply");
     if (told && told.textContent !== refusal) told.textContent = refusal;
     if (input && !typing && input.value !== present) input.value = present;
   };

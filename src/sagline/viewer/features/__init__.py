@@ -1,4 +1,4 @@
-"""Features of the viewer, one a file; a new one is added to `FEATURES`."""
+"""Features of the viewer, one file each; a new one is added to `FEATURES`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 from sagline.viewer.feature import Feature
+from sagline.viewer.features.calibration import CalibrationFeature
 from sagline.viewer.features.cut import CutFeature
 from sagline.viewer.features.export import ExportFeature
 from sagline.viewer.features.keyboard import KeyboardFeature
@@ -19,8 +20,9 @@ from sagline.viewer.features.tensions import TensionsFeature
 from sagline.viewer.features.timeline import TimelineFeature
 from sagline.viewer.page import Page
 
-# in the order in which their controls stand on the page and in which they follow a view; the state knows all controls
-FEATURES: Final[tuple[Callable[[Page], Feature], ...]] = (
+# in the order of their controls on the page, in which they also follow a view; the state is last: it needs all controls
+FEATURES: Final[tuple[Callable[[Page], Feature | None], ...]] = (
+    CalibrationFeature.of_page,
     ModesFeature,
     RegionFeature,
     PushFeature,

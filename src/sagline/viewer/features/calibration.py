@@ -172,6 +172,11 @@ class CalibrationFeature(Feature):
         self._poses: bool | None = None
         self._row: str | None = None
 
+    @classmethod
+    def of_page(cls, page: Page) -> CalibrationFeature | None:
+        """The feature of a page with a calibration; None for a page without."""
+        return None if page.found is None else cls(page, page.found)
+
     def _build_tab(self, page: Page, factor: float) -> None:
         gui, found = page.server.gui, self._found
         with page.panel.readings.add_tab("Calibration"):

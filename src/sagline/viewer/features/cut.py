@@ -126,7 +126,7 @@ class CutFeature(Feature):
 
     def follow(self, view: View) -> None:
         """Mark the cable that would be cut, with its tension and a button."""
-        state, nodes, cable = self._page.state, self._nodes, self._chosen
+        state, nodes, cable = view.state, self._nodes, self._chosen
         self._button.visible = shown = self._is_marked and state is not None
         if not shown or state is None:
             nodes.hide("/chosen", "/chosen_name")
@@ -139,8 +139,8 @@ class CutFeature(Feature):
 
     def tick(self) -> None:
         """Write the time that the simulation has taken, until there is something to see."""
-        if self._task.waited and self._player.played is None:
-            self._text.content = sentence(f"Simulating: {self._task.waited:.0f} s so far")
+        if self._task.elapsed and self._player.played is None:
+            self._text.content = sentence(f"Simulating: {self._task.elapsed:.0f} s so far")
 
     def cut(self) -> None:
         """Simulate the break of the chosen cable from the equilibrium that is shown, and play it as it comes."""

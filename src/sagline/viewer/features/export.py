@@ -131,7 +131,7 @@ def filmed(
             for time in times:
                 if cancelled():
                     return
-                sight = replace(view, snapshot=played.sight(float(time)))
+                sight = replace(view, snapshot=played.at(float(time)))
                 scene.show(sight)
                 messages.send(CLOCK, _clock(sight, float(time), speed))
                 scene.take("jpeg")

@@ -104,10 +104,10 @@ class KeyboardFeature(Feature):
         try:
             self._go(pose)
         except SaglineError as error:
-            self._channel.send("nudge-told", str(error))
+            self._channel.send("nudge-reply", str(error))
         else:
             self._pose = pose  # more may come before this is shown
-            self._channel.send("nudge-told", None)
+            self._channel.send("nudge-reply", None)
 
 
 def nudged(pose: Pose, way: Array, turn: Array) -> Pose:

@@ -187,8 +187,8 @@ class ModesFeature(Feature):
             self._due = None
             state, up_to = self._state, self._highest
             self._task.start(lambda: vibrating(state, up_to), self._receive, self._refuse)
-        if self._task.waited:
-            self._text.content = sentence(f"Working out the modes: {self._task.waited:.0f} s so far")
+        if self._task.elapsed:
+            self._text.content = sentence(f"Working out the modes: {self._task.elapsed:.0f} s so far")
         if self.swing is not None:
             phase = 2.0 * np.pi * now / PERIOD
             self._scene.swing(self.swing.state.pose, self.swing.pose(phase), self.swing.courses(phase))

@@ -152,7 +152,7 @@ class PushFeature(Feature):
         self._force.value = 0.0
 
     def _respond(self, view: View) -> None:
-        push, state, ready = self._typed(), self._page.state, self._page.ready
+        push, state, ready = self._typed(), view.state, self._page.ready
         if push is None:
             self._show_none("")
         elif state is None:

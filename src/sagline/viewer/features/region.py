@@ -164,8 +164,8 @@ class RegionFeature(Feature):
 
     def tick(self) -> None:
         """Write the progress of a hull."""
-        if self._region_box.value and self._task.waited:
-            text = f"The region is worked out: {100.0 * self._progress:.0f} %, {self._task.waited:.0f} s so far"
+        if self._region_box.value and self._task.elapsed:
+            text = f"The region is worked out: {100.0 * self._progress:.0f} %, {self._task.elapsed:.0f} s so far"
             self._hull_html.content = sentence(text)
 
     def _arrange(self) -> None:

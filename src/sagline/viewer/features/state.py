@@ -1,42 +1,58 @@
-"""Pose field, and the state as code or as a link."""
+"""Field of the pose, and the state of the page as code or as a link."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import fields
+from functools import partial
 from typing import Any, Final
 
-import viser
+import numpy as np
 
+from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.files.pose_text import pose_of
+from sagline.files.pose_text import STRONGEST, pose_of
 from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+from sagline.tension.methods import QuadraticProgram
+from sagline.viewer.by_hand import ByHand
+from sagline.viewer.drawn import InMotion
 from sagline.viewer.feature import Feature, View
-from sagline.viewer.link import LinkedControls, Linking
-from sagline.viewer.page import Page
+from sagline.viewer.link import (
+    STEP,
+    LinkedControls,
+    check_robot,
+    link_text,
+    listed,
+    name_of,
+    numbers_of,
+    parts_of,
+    pose_part,
+    shortest,
+)
+from sagline.viewer.page import Page, Source
 from sagline.viewer.readout import block
-from sagline.viewer.state_code import code_of
+from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import number
 
-FIRST: Final = -0.9  # among the controls: above all but what is played
+FIRST: Final = -0.9  # order among the controls: above all but what is played
 EXAMPLE: Final = "1, 0, 1.5 or 1, 0, 1.5, 10, 0, 0"
-STEP: Final = f"Give meters, and degrees about z, y and x: {EXAMPLE}."
-HINT: Final = "Position in meters, and if need be angles about z, y and x in degrees. Enter goes there."
+POSE_STEP: Final = f"Give meters, and degrees about z, y and x: {EXAMPLE}."
+HINT: Final = "Position in meters; angles about z, y and x in degrees, if any. Enter moves the platform there."
 _CONTENT: Final = block(
     '<div class="state"><label for="sagline-pose">x, y, z [m], α, β, γ [°]</label>'
     f'<input id="sagline-pose" type="text" autocomplete="off" spellcheck="false" title="{HINT}"'
-    ' aria-describedby="sagline-pose-told">'
-    '<div id="sagline-pose-told" class="bad" role="alert"></div>'
-    '<div class="copies"><button type="button" data-copy="code" title="Lines of Python for what is shown">'
+    ' aria-describedby="sagline-pose-reply">'
+    '<div id="sagline-pose-reply" class="bad" role="alert"></div>'
+    '<div class="copies"><button type="button" data-copy="code" title="Lines of Python for this state">'
     "Copy as code</button>"
-    '<button type="button" data-copy="link" title="A link that brings another page to the same">Copy link</button>'
-    '<button type="button" data-keys class="small" aria-label="Keys" title="What keys do">?</button></div></div>'
+    '<button type="button" data-copy="link" title="A link that opens this state on another page">Copy link</button>'
+    '<button type="button" data-keys class="small" aria-label="Keys" title="List of the keys">?</button></div></div>'
 )
-
-
-def add_state_panel(gui: viser.GuiApi) -> None:
-    """Build it."""
-    gui.add_html(_CONTENT, order=FIRST)
+LONGEST_NAME: Final = 40  # characters of the name of a request
+MASS, SHARING, HAND = "platform-load", "tensions", "by-hand"  # names of two controls, and of tensions chosen by hand
+SHOWN: Final = "print(tension)  # [N], cable by cable"
 
 
 def pose_text(pose: Pose) -> str:
@@ -50,75 +66,51 @@ def _short(value: float, form: str) -> str:
     return number(value, form).rstrip("0").rstrip(".")
 
 
-LONGEST_NAME = 40  # characters of what a page calls its question
-
-
 class StateFeature(Feature):
     """Field of the pose, and the state as code or as a link."""
 
     def __init__(self, page: Page) -> None:
-        """Build the panel; last of all, as it knows the controls that there are."""
-        channel = page.channel
-        add_state_panel(page.server.gui)
-        self.linking = Linking(page, LinkedControls(page.server.gui))
-        self._channel, self._player, self._robot, self._source = channel, page.player, page.robot, page.source
-        self._go = page.go_near
+        """Build the panel, after all other controls, as links contain them."""
+        page.server.gui.add_html(_CONTENT, order=FIRST)
+        self._page, self._channel, self._robot = page, page.channel, page.robot
+        self._controls = LinkedControls(page.server.gui)
         self._view: View | None = None
         self._time = 0.0
-        self._asked: deque[tuple[Any, int]] = deque()  # what is to be given as text, and to whom
-        channel.on("pose", self._on_pose)
-        channel.on("copy", self._on_copy)
-        channel.on("link", self._on_link)
+        self._requests: deque[tuple[Any, int]] = deque()  # for texts, and their clients
+        page.channel.on("pose", self._on_pose)
+        page.channel.on("copy", lambda value, client: self._requests.append((value, client)))
+        page.channel.on("link", self._on_link)
 
     def follow(self, view: View) -> None:
         """Send the pose."""
-        self._view, self._time = view, self._player.clock.time
+        self._view, self._time = view, self._page.player.clock.time
         self._channel.send("pose", pose_text(view.snapshot.pose))
 
     def tick(self) -> None:
-        """Send the texts that were asked for, after the messages before them are shown."""
-        while self._asked:
-            self._send_text(*self._asked.popleft())
+        """Answer the requests for texts, when the changes before them are shown."""
+        while self._requests:
+            value, client = self._requests.popleft()
+            self._answer(client, "copy-reply", value, partial(self._copy, client))
 
     def _on_pose(self, value: Any, client: int) -> None:
         """Go to a pose that was typed."""
 
         def go(text: str) -> dict[str, str]:
-            self._go(pose_of(text, "the pose", STEP))
+            self._page.go_near(pose_of(text, "the pose", POSE_STEP))
             return {}
 
-        self._answer(client, "pose-told", value, go)
-
-    def _on_copy(self, value: Any, client: int) -> None:
-        """Queue a text that is asked for."""
-        self._asked.append((value, client))
-
-    def _send_text(self, value: Any, client: int) -> None:
-        """Send a text that was asked for."""
-        self._answer(client, "copy-told", value, lambda what: self._copy(what, client))
+        self._answer(client, "pose-reply", value, go)
 
     def _on_link(self, value: Any, client: int) -> None:
-        """Follow a link."""
+        """Open a link."""
 
         def follow(text: str) -> dict[str, str]:
-            self.linking.follow(text, client)
+            self._open_link(text, client)
             return {}
 
-        self._answer(client, "link-told", value, follow)
+        self._answer(client, "link-reply", value, follow)
 
-    def _copy(self, what: str, client: int) -> dict[str, str]:
-        if self._view is None:
-            raise InvalidValueError("the view", "not there yet", "something on the screen", "Wait until it stands.")
-        if what == "link":
-            return {"text": self.linking.link_to(self._view, client)}
-        if what != "code":
-            raise InvalidValueError("what to copy", repr(what), "code or link", "Press one of the buttons.")
-        if self._view.played is not None and not (self._player.given and self._source.played):
-            step = "Copy the pose that it begins with, and simulate from there."
-            raise InvalidValueError(f"the {self._view.played.name}", "in no file", "what lines can load", step)
-        return {"text": code_of(self._view, self._robot, self._source, self._time)}
-
-    def _answer(self, client: int, topic: str, value: Any, done: Callable[[str], dict[str, str]]) -> None:
+    def _answer(self, client: int, topic: str, value: Any, reply: Callable[[str], dict[str, str]]) -> None:
         """Handle a request [name, text] of a page, and send the answer {"to": name, ...} to it alone."""
         if not isinstance(value, list) or len(value) != 2 or not all(isinstance(each, str) for each in value):
             return
@@ -126,7 +118,146 @@ class StateFeature(Feature):
         if len(name) > LONGEST_NAME:
             return
         try:
-            answer = done(text)
+            answer = reply(text)
         except SaglineError as error:
             answer = {"refused": str(error)}
         self._channel.send_to(client, topic, {"to": name, **answer})
+
+    def _copy(self, client: int, kind: str) -> dict[str, str]:
+        """Code or link of the view."""
+        view, source = self._view, self._page.source
+        if view is None:
+            raise InvalidValueError("the view", "not there yet", "a view that is shown", "Wait until it is shown.")
+        if kind == "link":
+            return {"text": self._link_to(view, client)}
+        if kind != "code":
+            raise InvalidValueError("what to copy", repr(kind), "code or link", "Press one of the buttons.")
+        if view.played is not None and not (self._page.player.is_original and source.played):
+            step = "Copy the pose at its start, and simulate from there."
+            raise InvalidValueError(f"the {view.played.name}", "in no file", "one that was loaded from a file", step)
+        return {"text": code_of(view, self._robot, source, self._time)}
+
+    def _link_to(self, view: View, client: int) -> str:
+        """A link to a view, through the camera of a client."""
+        parts = {"robot": name_of(self._robot)}
+        if view.played is not None:
+            parts["time"] = repr(float(self._page.player.clock.time))
+        else:
+            parts["pose"] = pose_part(view.snapshot.pose)
+        if view.wrench is not None:
+            parts["wrench"] = listed(view.wrench)
+        camera = self._page.framing.moved(client)
+        if camera is not None:
+            parts["camera"] = listed(camera)
+        controls = self._controls.changes()
+        if MASS in controls or self._page.source.mass is not None:
+            controls[MASS] = shortest(view.settings.mass)
+        if isinstance(view.settings.tension, ByHand):
+            controls.pop(SHARING, None)
+            parts[HAND] = listed(np.asarray(view.settings.tension.target))
+        return link_text({**parts, **controls})
+
+    def _open_link(self, text: str, client: int) -> None:
+        """Bring the page, and the camera of a client, to the state of a link; nothing changes if it is refused."""
+        parts = parts_of(text)
+        check_robot(parts.pop("robot"), self._robot)
+        place, framing = self._place(parts), self._page.framing
+        wrench = _six(parts.pop("wrench", None), "wrench", "N or N m", STRONGEST)
+        camera = _six(parts.pop("camera", None), "camera", "m", framing.farthest)
+        if camera is not None and np.array_equal(camera[:3], camera[3:]):
+            raise InvalidValueError("the camera of the link", "at its own target", "two different points", STEP)
+        hand = parts.pop(HAND, None)
+        method = None
+        if hand is not None:
+            method = ByHand(target=numbers_of(hand, HAND, "N", self._robot.cable_count, STRONGEST))
+        self._controls.read(parts)()
+        self._page.wrench = wrench
+        if method is not None:
+            self._page.panel.choose_by_hand(method)
+        place()
+        if camera is not None:
+            framing.look(client, camera)
+        self._page.refresh()
+
+    def _place(self, parts: dict[str, str]) -> Callable[[], None]:
+        """Function that goes to the pose or the time of a link."""
+        time, pose, player = parts.pop("time", None), parts.pop("pose", None), self._page.player
+        if (time is None) == (pose is None):
+            raise InvalidValueError("the link", "with both or none", "a pose or a time", STEP)
+        if pose is not None:
+            target = pose_of(pose, "the pose of the link", STEP)
+            self._page.check_near(target)
+            return lambda: self._page.go(target)
+        if player.played is None:
+            step = "Open it with the same run: sagline view ROBOT RUN."
+            raise InvalidValueError("the link", "with a time of a run", "a pose, where nothing is played", step)
+        moment = float(numbers_of(time or "", "the time of the link", "s", 1, player.clock.duration)[0])
+        return lambda: player.scrub_to(max(moment, 0.0))
+
+
+def _six(text: str | None, item: str, unit: str, largest: float) -> Array | None:
+    return None if text is None else numbers_of(text, f"the {item} of the link", unit, 6, largest)
+
+
+def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
+    """Lines of Python whose last names hold what is shown: `robot`, `pose`, `tension`."""
+    snapshot = view.snapshot
+    if view.played is not None:
+        lines = view.played.code(source.played, time)
+    else:
+        assert not isinstance(snapshot, InMotion)
+        lines = [f"robot = {source.robot or f'sl.load_robot({robot.name!r})'}"]
+        lines += [] if source.mass is None else [_weighed(source.mass)]
+        lines += [*_changes(view.settings, robot), *_planned(snapshot, view)]
+    return "\n".join(["import sagline as sl", "", *lines, SHOWN, ""])
+
+
+def _changes(settings: Settings, robot: Robot) -> list[str]:
+    """Lines of the changes of a robot by the settings."""
+    lines = [] if settings.mass == robot.mass else [_weighed(settings.mass)]
+    factors = {"linear_density": settings.density, "axial_stiffness": settings.stiffness}
+    changed = [f"    {name}=cables.{name} * {factor!r}," for name, factor in factors.items() if factor != 1.0]
+    if changed:
+        lines += ["cables = robot.cables", "robot = robot.replace(cables=cables.replace(", *changed, "))"]
+    return lines
+
+
+def _weighed(mass: float) -> str:
+    return f"robot = robot.replace(mass={mass!r}, inertia=robot.inertia * ({mass!r} / robot.mass))"
+
+
+def _planned(snapshot: Snapshot, view: View) -> list[str]:
+    """Lines of the plan of a pose."""
+    settings, pose = view.settings, snapshot.pose
+    angles = ", ".join(number(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
+    arguments = [
+        f"model={_constructor(settings.model)}",
+        f"tension={_constructor(settings.tension)}",
+        *([] if view.wrench is None else [f"wrench={_plain(view.wrench)}"]),
+        *([] if snapshot.previous is None else [f"previous={_plain(snapshot.previous)}"]),
+    ]
+    return [
+        f"# alpha, beta, gamma = {angles} degrees",
+        f"pose = sl.Pose.from_quaternion({_plain(pose.position)}, {_plain(pose.quaternion)})",
+        *("plan = sl.inverse(", "    robot,", "    pose,"),
+        *(f"    {argument}," for argument in arguments),
+        *(")", "tension = plan.chord_tension"),
+        *([] if snapshot.rest is None else ["rest = sl.confirm(plan).pose  # where it really rests"]),
+    ]
+
+
+def _constructor(choice: Any) -> str:
+    """Call that makes a cable model or a tension distribution method, without default arguments."""
+    kind = QuadraticProgram if isinstance(choice, QuadraticProgram) else type(choice)  # by hand or not
+    default = kind()
+    values = {field.name: (getattr(choice, field.name), getattr(default, field.name)) for field in fields(default)}
+    arguments = [f"{name}={_plain(value)}" for name, (value, usual) in values.items() if not _same(value, usual)]
+    return f"sl.{kind.__name__}({', '.join(arguments)})"
+
+
+def _same(one: Any, other: Any) -> bool:
+    return one is other or (one is not None and other is not None and bool(np.array_equal(one, other)))
+
+
+def _plain(value: Any) -> str:
+    return repr(value.tolist() if isinstance(value, np.ndarray) else value)

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from sagline.viewer import lines, solids
+from sagline.viewer.drawn import cable_segments
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
@@ -71,10 +72,10 @@ class TimelineFeature(Feature):
         if beside is None:
             self._nodes.hide("/beside", "/beside_cables")
         else:
-            other = beside.played.sight(self._player.clock.time)
+            other = beside.played.at(self._player.clock.time)
             self._nodes.body("/beside", self._body, GHOST, 0.5, other.pose)
             self._nodes.label("/beside/name", beside.names[1], (0.0, 0.0, self._above))
-            self._nodes.lines("/beside_cables", other.cable_segments(sag_scale), GHOST, GHOST_WIDTH)
+            self._nodes.lines("/beside_cables", cable_segments(other, sag_scale), GHOST, GHOST_WIDTH)
         cable = self._cable
         if cable is None or cable >= view.snapshot.robot.cable_count:
             self._nodes.hide("/pointed")
