@@ -12,8 +12,8 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 import sagline as sl
-from sagline.robot.reach import home_pose
 from sagline.viewer.features import export
+from sagline.viewer.page import home_pose
 from sagline.viewer.playback import Run
 from sagline.viewer.solids import size_of
 from sagline.viewer.tension_scale import TensionScale

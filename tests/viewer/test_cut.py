@@ -10,13 +10,12 @@ import pytest
 from viser import CameraHandle
 
 import sagline as sl
-from sagline.robot.reach import home_pose
 from sagline.viewer import swing
 from sagline.viewer.camera import Camera
 from sagline.viewer.drawn import InMotion
 from sagline.viewer.features import FEATURES, cut
 from sagline.viewer.features.cut import Before, CutFeature
-from sagline.viewer.page import Page
+from sagline.viewer.page import Page, home_pose
 from sagline.viewer.playback import Playback
 from sagline.viewer.player import Played, Player
 from sagline.viewer.server import started, stop

@@ -13,12 +13,11 @@ import pytest
 from scipy.optimize import minimize
 
 import sagline as sl
-from sagline.robot.reach import home_pose
 from sagline.viewer.by_hand import BY_HAND, ByHand, DotField
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
 from sagline.viewer.features.tensions import Marks, field_of, grouped, polygon_figure
-from sagline.viewer.page import Page, Source
+from sagline.viewer.page import Page, Source, home_pose
 from sagline.viewer.snapshot import METHODS, Settings, Snapshot, taken_at
 from tests.effort import best_rate
 from tests.tiers import extended, wide

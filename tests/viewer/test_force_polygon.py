@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.robot.reach import home_pose
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.proof import cable_forces, force_polygon_figure, forces_on_platform, residual
 from sagline.viewer.missing import missing_of
-from sagline.viewer.page import Page
+from sagline.viewer.page import Page, home_pose
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import force_unit
 from tests.tiers import wide

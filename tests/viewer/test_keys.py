@@ -10,11 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.robot.reach import home_pose
 from sagline.viewer.feature import View
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.keyboard import MOST, TURN, nudged, place_of, screen_reader_text
-from sagline.viewer.page import Page
+from sagline.viewer.page import Page, home_pose
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
 from tests.tiers import extended

@@ -11,12 +11,11 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError, vibration
-from sagline.robot.reach import home_pose
 from sagline.viewer import lines, readout, swing
 from sagline.viewer.feature import BackgroundTask
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.modes import ModesFeature
-from sagline.viewer.page import Page
+from sagline.viewer.page import Page, home_pose
 from sagline.viewer.playback import Playback
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.swing import PERIOD, mode_of

@@ -10,8 +10,8 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline import structure_matrix
-from sagline.robot.reach import home_pose
 from sagline.viewer.features import push
+from sagline.viewer.page import home_pose
 from sagline.viewer.push import Push, push_response, semi_axes
 from tests.refusal import refused
 from tests.tiers import wide

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.robot.reach import home_pose
 from sagline.viewer import readout
+from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, REST, WANTED
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale

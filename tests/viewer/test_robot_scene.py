@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.robot.reach import home_pose
 from sagline.viewer import solids
+from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import RobotScene
 from sagline.viewer.server import Server, started, stop
 from sagline.viewer.snapshot import Settings, taken_at

@@ -18,7 +18,8 @@ from sagline.core.errors import SaglineError
 from sagline.kinematics.plan import Plan
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.robot.reach import check_reach, home_pose
+from sagline.robot.reach import check_reach
+from sagline.robot.reach import home_pose as home_pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
 from sagline.viewer import readout, solids
