@@ -53,7 +53,7 @@ class Explanation(NamedTuple):
         return frozenset(parameter.name for parameter in self.parameters)
 
 
-class Tangent(NamedTuple):
+class _Tangent(NamedTuple):
     """Positions about some errors of a model's parameters, to first order.
 
     Attributes:
@@ -79,7 +79,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         far = []
         for i, one in zip(moving, near, strict=True):
             right = measured.ravel() - one.error + one.slopes @ values[i]
-            step = bounded_least_squares(models[i], one.slopes, right) - values[i]
+            step = _bounded_least_squares(models[i], one.slopes, right) - values[i]
             if step @ steps[i] < 0.0:  # it swings about where it should end
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
@@ -105,7 +105,7 @@ def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
 
-def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[Tangent]:
+def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[_Tangent]:
     """Each model about its values, by differences away from the limits."""
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
@@ -116,7 +116,9 @@ def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]
     rows = [_errors(model, row) for model, some in zip(models, points, strict=True) for row in some]
     found = error_of(rows).reshape(len(rows), -1)
     parts = np.split(found, np.cumsum([len(some) for some in points])[:-1])
-    return [Tangent(part[0], ((part[1:] - part[0]) / step[:, None]).T) for part, step in zip(parts, steps, strict=True)]
+    return [
+        _Tangent(part[0], ((part[1:] - part[0]) / step[:, None]).T) for part, step in zip(parts, steps, strict=True)
+    ]
 
 
 def limits(model: Model) -> tuple[Array, Array]:
@@ -125,7 +127,7 @@ def limits(model: Model) -> tuple[Array, Array]:
     return np.where([parameter.positive for parameter in model], 0.0, -high), high
 
 
-def bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
+def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
     """Least squares within the limits; each unknown is counted in its upper one, which makes them comparable."""
     from scipy.optimize import lsq_linear
 
@@ -158,7 +160,7 @@ def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple
     }
     slopes = [np.hstack([near[parameter].slopes for parameter in model]) for model in models]
     values = [
-        bounded_least_squares(model, one, measured.ravel() - near[model[0]].error)
+        _bounded_least_squares(model, one, measured.ravel() - near[model[0]].error)
         for model, one in zip(models, slopes, strict=True)
     ]
     return values, slopes
@@ -195,7 +197,7 @@ def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
     """Cross-validation: root mean square residual of each pose by the fit to the others, linearized [m]."""
     right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
     left = [
-        right[pose == k] - slopes[pose == k] @ bounded_least_squares(model, slopes[pose != k], right[pose != k])
+        right[pose == k] - slopes[pose == k] @ _bounded_least_squares(model, slopes[pose != k], right[pose != k])
         for k in range(len(rest))
     ]
     return float(np.sqrt(np.mean(np.square(left))))

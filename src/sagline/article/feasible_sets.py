@@ -42,7 +42,7 @@ class End(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FeasibleSets:
+class _FeasibleSets:
     """The sets psi for some lengths, the curve Psi over all, and the line pi through its projection.
 
     Attributes:
@@ -80,7 +80,7 @@ class FeasibleSets:
 
 def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
-) -> FeasibleSets:
+) -> _FeasibleSets:
     """The article's psi and Psi, exactly.
 
     The map from (T, L) to B is one to one at a given L, so the outline of psi is the image of the outline of the
@@ -99,7 +99,7 @@ def feasible_sets(
     lengths = model.from_tension(cable, end.span, end.rise, psi_tensions * stretch, GRAVITY).unstrained_length
     outline = np.asarray(end) + tolerance * _diamond(points)
     psi = model.from_length(cable, outline[:, 0], outline[:, 1], lengths[:, None], GRAVITY)
-    return FeasibleSets(
+    return _FeasibleSets(
         cable=cable,
         end=end,
         tolerance=tolerance,
@@ -135,7 +135,7 @@ def feasible_chapter() -> Chapter:
     )
 
 
-def _psi(studies: list[FeasibleSets], draw: Drawings) -> Finding:
+def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
     extents = np.array([np.ptp(study.psi[SHOWN, :, 0]) for study in studies])
     length = float(studies[0].psi_lengths[SHOWN])
     figure, ax = axes("$T_x$ [N]", "$T_z$ [N]")
@@ -175,7 +175,7 @@ def _psi(studies: list[FeasibleSets], draw: Drawings) -> Finding:
     )
 
 
-def _curve(study: FeasibleSets, draw: Drawings) -> Finding:
+def _curve(study: _FeasibleSets, draw: Drawings) -> Finding:
     figure, ax = axes("$T_x$ [N]", "$d = L - D$ [mm]")
     ax.plot(study.tensions, 1e3 * (study.lengths - CHORD), color=BLUE, linewidth=1.3, label=r"$\Psi$, exact")
     for k, (length, outline) in enumerate(zip(study.psi_lengths, study.psi, strict=True)):
@@ -205,7 +205,7 @@ def _curve(study: FeasibleSets, draw: Drawings) -> Finding:
     )
 
 
-def _line(study: FeasibleSets, draw: Drawings) -> Finding:
+def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
     line = study.line
     rest = study.vertical - (line.slope * study.tensions + line.intercept)
     taut = study.tensions >= LOW_PART

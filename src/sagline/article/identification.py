@@ -116,7 +116,7 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
 def _measured() -> Finding:
     cable, rows, numbers = simulated_cable(), [], []
     for name, lowest, highest, unknowns in CASES:
-        fit = made_up_fit(cable, lowest, highest, unknowns)
+        fit = _made_up_fit(cable, lowest, highest, unknowns)
         rows.append(
             (
                 f"{name} ({n(lowest)} to {n(highest, unit='N')})",
@@ -168,7 +168,7 @@ def _measured() -> Finding:
     )
 
 
-def made_up_fit(cable: sl.Cable, lowest: float, highest: float, unknowns: tuple[str, ...]) -> CableFit:
+def _made_up_fit(cable: sl.Cable, lowest: float, highest: float, unknowns: tuple[str, ...]) -> CableFit:
     """Identify a known cable from measurements with seeded scatter, over a range of chord tensions [N]."""
     random = np.random.default_rng(SEED)
     span, rise = random.uniform(2.0, 12.0, SAMPLES), random.uniform(-4.0, 2.0, SAMPLES)

@@ -44,7 +44,7 @@ USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0)) 
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ModelErrors:
+class _ModelErrors:
     """Errors of the five models for every combination of four quantities of a cable, against the exact one.
 
     All models are asked for the same horizontal tension, so a length error is what a winch would wind wrongly, and a
@@ -82,7 +82,7 @@ class ModelErrors:
 
 def model_errors(
     axial_stiffness: float, chords: ArrayLike, angles: ArrayLike, densities: ArrayLike, tensions: ArrayLike
-) -> ModelErrors:
+) -> _ModelErrors:
     """Compare the five models on a grid.
 
     Raises:
@@ -98,7 +98,7 @@ def model_errors(
     cable, span, rise = sl.Cable(density, axial_stiffness), chord * np.abs(np.cos(angle)), chord * np.sin(angle)
     states = [model.from_tension(cable, span, rise, tension, GRAVITY) for model in MODELS]
     exact = states[-1]
-    return ModelErrors(
+    return _ModelErrors(
         MODELS,
         float(axial_stiffness),
         *axes,
@@ -127,7 +127,7 @@ def _name(model: object) -> str:
     return type(model).__name__
 
 
-def _study(**varied: Array) -> ModelErrors:
+def _study(**varied: Array) -> _ModelErrors:
     """Errors with the given quantities varied and the others at their reference."""
     at = (varied.get(name, np.array([REFERENCE[name]])) for name in ("chord", "angle", "density", "tension"))
     return model_errors(float(simulated_cable().axial_stiffness), *at)

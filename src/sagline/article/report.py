@@ -76,7 +76,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
         progress(len(chapters), len(chapters), "done")
     numbers = {c.key: {finding.key: plain(finding.numbers) for finding in c.findings} for c in chapters}
     made = f"Made by sagline {version('sagline')}: sagline article {' '.join(parts)}".rstrip() + "."
-    text = page(TITLE, LEAD, NOTATION, chapters, picture(chapters), made)
+    text = page(TITLE, LEAD, NOTATION, chapters, _picture(chapters), made)
     return ArticleReport(*write_page(folder, NAMES, text, numbers), tuple(chapters), numbers)
 
 
@@ -118,7 +118,7 @@ PARTS = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Selection:
+class _Selection:
     """Chapters, figures and tables that are requested.
 
     Attributes:
@@ -146,14 +146,14 @@ class Selection:
         return replace(chapter, findings=tuple(kept))
 
 
-def selection(words: Sequence[str]) -> Selection:
+def selection(words: Sequence[str]) -> _Selection:
     """Read what is asked for; nothing means everything.
 
     Raises:
         InvalidValueError: If a word is none of these, or a figure has no data.
     """
     if not words:
-        return Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
+        return _Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
     whole: set[str] = set()
     wanted: dict[str, set[int]] = {"figures": set(), "tables": set()}
     kind, open_word = "figures", ""
@@ -170,7 +170,7 @@ def selection(words: Sequence[str]) -> Selection:
             raise _unknown(word)
     if open_word:
         raise sl.InvalidValueError(open_word, "without numbers", f"{open_word} 6-9", "Give the numbers after it.")
-    return Selection(frozenset(whole), frozenset(wanted["figures"]), frozenset(wanted["tables"]))
+    return _Selection(frozenset(whole), frozenset(wanted["figures"]), frozenset(wanted["tables"]))
 
 
 def _checked_range(kind: str, word: str, first: int, last: int) -> set[int]:
@@ -189,7 +189,7 @@ def _unknown(word: str) -> sl.InvalidValueError:
     return sl.InvalidValueError("part", repr(word), f"{', '.join(keys)}, figures N-M, table 2", step)
 
 
-def picture(chapters: Sequence[Chapter]) -> Panel | None:
+def _picture(chapters: Sequence[Chapter]) -> Panel | None:
     """The largest position error of each model for both robots; None where the report does not have them."""
     numbers = next((f.numbers for c in chapters for f in c.findings if f.key == KEY), None)
     if numbers is None:

@@ -128,7 +128,7 @@ def directions(group: str) -> tuple[Quantity, ...]:
 DIRECTIONS: Final = {group: directions(group) for group in ("gauge", "cannot_tell_apart")}
 
 
-def check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
+def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
     """Refuse a data set that is no calibration, given its two robots and the quantities of its sensors."""
     m = robot.cable_count
     if before.cable_count != m:
@@ -229,7 +229,7 @@ def unpack(path: Path, data: Dataset) -> Calibration:
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
     measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # which is always there
     sensors = [_sensor(name, data.variables[name].ndim) for name in dict.fromkeys(measured)]
-    check_calibration(data, robot, before, sensors)
+    _check_calibration(data, robot, before, sensors)
     values = partial(values_of, data)
 
     def number(quantity: Quantity) -> Any:

@@ -176,11 +176,11 @@ def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bo
     instance(robot, Robot, "robot")
     real = np.float32 if instance(single_precision, bool, "single_precision") else np.float64
     path = _checked_name(file, ".c", "C source", "sagline")
-    check_exportable(robot)
+    _check_exportable(robot)
     header = path.with_suffix(".h")
     texts = {
         path: _filled("c/sagline.c", {}).replace('"sagline.h"', f'"{header.name}"'),
-        header: header_text(robot, real),
+        header: _header_text(robot, real),
         path.with_suffix(".scl"): _filled("c/sagline.scl", {}),
     }
     with atomic_files(path.parent, [place.name for place in texts]) as partials:
@@ -190,7 +190,7 @@ def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bo
     return source, beside, scl
 
 
-def check_exportable(robot: Robot) -> None:
+def _check_exportable(robot: Robot) -> None:
     """Refuse a robot without two redundant cables, with anything behind its frame anchors, or with other limits."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     if m != n + REDUNDANT:
@@ -208,7 +208,7 @@ def check_exportable(robot: Robot) -> None:
         raise InvalidValueError(f"{robot.name}: tension_limits_of", robot.tension_limits_of, "chord", step)
 
 
-def header_text(robot: Robot, real: type[np.floating]) -> str:
+def _header_text(robot: Robot, real: type[np.floating]) -> str:
     """Header of a robot in C99, with numbers of float64 or float32."""
     cables = robot.cables
     constants: dict[str, Array | float] = {

@@ -90,7 +90,7 @@ def _sensors(entry: _Sensors) -> Sensors:
     return Sensors(**values)
 
 
-def comments_of_sensors(sensors: Sensors) -> Iterator[str]:
+def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
     """Comments from which `sensors_of_comments` has the same sensors."""
     for name, unit in DEVIATIONS.items():
         value: Array | None = getattr(sensors, name)
@@ -201,7 +201,7 @@ def _commanded(table: Table) -> Pose | None:
     return Pose.from_quaternion(position, rotation)
 
 
-def log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
+def _log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
     """Name with unit, and numbers of shape (N,), of each column of a log."""
     m = log.readings.shape[1]
     if log.time is not None:
@@ -294,8 +294,8 @@ def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
 
 def dump_log(log: WinchLog) -> str:
     """A log as CSV text, in SI units, with the sensors in comments."""
-    columns = dict(log_columns(instance(log, WinchLog, "log")))
-    lines = [*comments_of_sensors(log.sensors), ",".join(columns)]
+    columns = dict(_log_columns(instance(log, WinchLog, "log")))
+    lines = [*_comments_of_sensors(log.sensors), ",".join(columns)]
     rows = np.column_stack(list(columns.values())).tolist()
     lines += [",".join("" if v != v else repr(v).removesuffix(".0") for v in row) for row in rows]
     return "\n".join(lines) + "\n"

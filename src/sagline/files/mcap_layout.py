@@ -111,7 +111,7 @@ SHARE_TF, SHARE_SCENE = 10, 100  # one of so many cycles
 PER_METER: Final = 1e3  # mm
 
 
-class CycleField(NamedTuple):
+class _CycleField(NamedTuple):
     """A quantity of `/cycle`, of which people need not all digits: `/record` has them.
 
     Attributes:
@@ -128,14 +128,14 @@ class CycleField(NamedTuple):
 
 
 CYCLE_FIELDS: Final = {
-    "time": CycleField(2, "s", "on the clock of the link"),
-    "late": CycleField(4, "s", "by how much the cycle began too late"),
-    "clock": CycleField(2, "s", "where on the plan, from its start"),
-    "position": CycleField(5, "m", "of the platform's origin, estimated from the encoders", True),
-    "tension": CycleField(1, "N", "at the frame ends, as the load cells read it", True),
-    "planned_tension": CycleField(1, "N", "the same as planned", True),
-    "length_error": CycleField(2, "mm", "length that is asked for less that of the encoder", True),
-    "correction": CycleField(2, "mm", "what the tension loop has in the lengths", True),
+    "time": _CycleField(2, "s", "on the clock of the link"),
+    "late": _CycleField(4, "s", "by how much the cycle began too late"),
+    "clock": _CycleField(2, "s", "where on the plan, from its start"),
+    "position": _CycleField(5, "m", "of the platform's origin, estimated from the encoders", True),
+    "tension": _CycleField(1, "N", "at the frame ends, as the load cells read it", True),
+    "planned_tension": _CycleField(1, "N", "the same as planned", True),
+    "length_error": _CycleField(2, "mm", "length that is asked for less that of the encoder", True),
+    "correction": _CycleField(2, "mm", "what the tension loop has in the lengths", True),
 }
 
 
@@ -143,7 +143,7 @@ def _schema(title: str, properties: dict[str, Any]) -> bytes:
     return json.dumps({"title": title, "type": "object", "properties": properties}).encode()
 
 
-def _number(shown: CycleField) -> dict[str, Any]:
+def _number(shown: _CycleField) -> dict[str, Any]:
     """Schema of a quantity of a cycle."""
     said = {"description": f"{shown.what} [{shown.unit}]"}
     return {"type": "array", "items": {"type": "number"}, **said} if shown.several else {"type": "number", **said}
@@ -163,9 +163,9 @@ SCHEMAS: Final = {
     TRUTH: _schema(
         "sagline.Truth",
         {
-            "time": _number(CycleField(0, "s", "on the clock of the twin")),
-            "position": _number(CycleField(0, "m", "of the platform's origin", True)),
-            "quaternion": _number(CycleField(0, "1", "rotation from platform to world, scalar last", True)),
+            "time": _number(_CycleField(0, "s", "on the clock of the twin")),
+            "position": _number(_CycleField(0, "m", "of the platform's origin", True)),
+            "quaternion": _number(_CycleField(0, "1", "rotation from platform to world, scalar last", True)),
         },
     ),
 }

@@ -9,7 +9,6 @@ are those of a pulley that swivels.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from decimal import ROUND_DOWN, Context
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -48,6 +47,7 @@ _NOTE = (
     "robot's: it lets the platform come to rest, and acts on slack cables too. "
 )
 _RADIUS = 0.002  # of ends of cables, which are only drawn, to the size of the robot
+_DRAWN = {"contype": "0", "conaffinity": "0"}  # touches nothing
 _THINNEST = 0.02  # of a box that is only drawn, to its longest edge
 _STEPS = 20.0  # in a period of the fastest motion
 _LONGEST_STEP = 0.002  # MuJoCo's own [s]
@@ -58,22 +58,15 @@ _ROUNDING = 1e-12
 _SHORTEST = 1e-6  # of a cable [m]
 
 
-class Lead(NamedTuple):
-    """First points of the tendons.
-
-    Attributes:
-        start: Where, in the world [m], shape (m, 3).
-        side: Points beside the pulleys, on the side on which the cables lie [m], shape (m, 3).
-        missing: Length of cable off the drum that is not in the tendon [m], shape (m,); negative where a tendon is
-            longer.
-    """
+class _Lead(NamedTuple):
+    """First points of the tendons, and points beside the pulleys, in the world [m], (m, 3)."""
 
     start: Array
-    side: Array
-    missing: Array
+    side: Array  # on which the cables lie
+    missing: Array  # cable off the drum that is not in the tendon [m], (m,); negative where a tendon is longer
 
 
-def lead_of(robot: Robot, pose: Pose) -> Lead:
+def _lead_of(robot: Robot, pose: Pose) -> _Lead:
     """First points of the tendons, at the frame anchors or at their pulleys."""
     radius, entry = pulleys_of(robot)
     wrap = touching_angle(robot, pose)
@@ -87,47 +80,33 @@ def lead_of(robot: Robot, pose: Pose) -> Lead:
     start = points_on_pulleys(robot, pose, first) - (off * radius)[:, None] * along
     centers = pulley_centers(robot, pose)
     side = centers + _BESIDE * (points_on_pulleys(robot, pose, 0.5 * (first + wrap)) - centers)
-    return Lead(start, side, dead_cable(robot) + radius * (first - off))
+    return _Lead(start, side, dead_cable(robot) + radius * (first - off))
 
 
-def free_chords(robot: Robot, pose: Pose) -> Array:
+def _free_chords(robot: Robot, pose: Pose) -> Array:
     """Chords from where straight cables leave the frame to their platform ends [m], shape (m, 3)."""
     exits = points_on_pulleys(robot, pose, np.nan_to_num(touching_angle(robot, pose)))
     return np.asarray(pose.transform(robot.platform_anchors) - exits)
 
 
-def add_pulleys(world: Element, robot: Robot, pose: Pose, lead: Lead) -> None:
+def _add_pulleys(world: Element, robot: Robot, pose: Pose, lead: _Lead) -> None:
     """Add the pulleys, each a body of its own that stands still."""
     radius = pulleys_of(robot).radius
     toward, centers = outward(robot, pose), pulley_centers(robot, pose)
     for i in np.flatnonzero(radius > 0.0):
-        body = SubElement(world, "body", name=f"pulley_{i}")
-        wheel = SubElement(body, "geom", name=f"pulley_{i}", type="cylinder", pos=numbers_text(centers[i]))
-        wheel.set("size", numbers_text((radius[i], 0.5 * _WIDTH * radius[i])))
-        wheel.set("zaxis", numbers_text((-toward[i, 1], toward[i, 0], 0.0)))
-        for key in ("contype", "conaffinity"):
-            wheel.set(key, "0")
-        site = SubElement(body, "site", name=f"side_{i}", pos=numbers_text(lead.side[i]), rgba="0 0 0 0")
-        site.set("size", numbers_text((0.01 * radius[i],)))
+        body = _add(world, "body", name=f"pulley_{i}")
+        size, axis = (radius[i], 0.5 * _WIDTH * radius[i]), (-toward[i, 1], toward[i, 0], 0.0)
+        _add(body, "geom", name=f"pulley_{i}", type="cylinder", pos=centers[i], size=size, zaxis=axis, **_DRAWN)
+        _add(body, "site", name=f"side_{i}", pos=lead.side[i], rgba="0 0 0 0", size=0.01 * radius[i])
 
 
-def numbers_text(values: Iterable[float]) -> str:
-    """Numbers of an attribute, to their last bit."""
-    return " ".join(repr(float(value)) for value in values)
-
-
-class _Dynamics(NamedTuple):
-    """Time step and damping of the model.
-
-    Attributes:
-        step: Time step [s].
-        stretch_time: Damping of a cable over its stiffness [s].
-        drag: Damping of each joint [N s/m, N m s/rad]; zero where the cables resist every motion.
-    """
-
-    step: float
-    stretch_time: float
-    drag: float
+def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
+    """Add an element; numbers in its attributes are written to their last bit."""
+    texts = {
+        name: value if isinstance(value, str) else " ".join(map(repr, np.ravel(value).tolist()))
+        for name, value in attributes.items()
+    }
+    return SubElement(parent, tag, texts)
 
 
 def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = None) -> str:
@@ -167,36 +146,43 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
         raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Write one model a pose.")
     lengths = _lengths_at_rest(robot, pose) if unstrained_length is None else _check_lengths(robot, unstrained_length)
     stiffness = robot.cables.axial_stiffness / lengths
-    lead, over_pulley = lead_of(robot, pose), pulleys_of(robot).radius > 0.0
-    dynamics = _dynamics(robot, pose, stiffness)
+    lead, over_pulley = _lead_of(robot, pose), pulleys_of(robot).radius > 0.0
+    time_step, stretch_time, drag = _step_and_damping(robot, pose, stiffness)
     root = Element("mujoco", model=robot.name)
     root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
-    SubElement(root, "compiler", angle="radian", inertiafromgeom="false")
-    option = SubElement(root, "option", gravity=numbers_text((0.0, 0.0, -robot.gravity)))
-    option.set("timestep", f"{_DOWN.create_decimal_from_float(dynamics.step):g}")
-    option.set("integrator", "implicitfast")  # which takes damping implicitly: it never limits the step
+    _add(root, "compiler", angle="radian", inertiafromgeom="false")
+    step = f"{_DOWN.create_decimal_from_float(time_step):g}"
+    # implicitfast takes damping implicitly: it never limits the step
+    _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator="implicitfast")
     radius = _RADIUS * _add_view(root, robot)
-    world = SubElement(root, "worldbody")
+    world = _add(root, "worldbody")
     for i, point in enumerate(lead.start):
-        SubElement(world, "site", name=f"frame_{i}", pos=numbers_text(point), size=numbers_text((radius,)))
-    _add_platform(world, robot, pose, radius, dynamics.drag)
-    add_pulleys(world, robot, pose, lead)
-    listed = SubElement(root, "tendon")
+        _add(world, "site", name=f"frame_{i}", pos=point, size=radius)
+    _add_platform(world, robot, pose, radius, drag)
+    _add_pulleys(world, robot, pose, lead)
+    listed = _add(root, "tendon")
     for i, length in enumerate(lengths):
-        tendon = SubElement(listed, "spatial", name=f"cable_{i}", stiffness=numbers_text((stiffness[i],)))
-        tendon.set("springlength", numbers_text((0.0, length - lead.missing[i])))
-        tendon.set("damping", numbers_text((dynamics.stretch_time * stiffness[i],)))
-        tendon.set("width", numbers_text((0.3 * radius,)))
-        SubElement(tendon, "site", site=f"frame_{i}")
+        tendon = _add(
+            listed,
+            "spatial",
+            name=f"cable_{i}",
+            stiffness=stiffness[i],
+            springlength=(0.0, length - lead.missing[i]),
+            damping=stretch_time * stiffness[i],
+            width=0.3 * radius,
+        )
+        _add(tendon, "site", site=f"frame_{i}")
         if over_pulley[i]:
-            SubElement(tendon, "geom", geom=f"pulley_{i}", sidesite=f"side_{i}")
-        SubElement(tendon, "site", site=f"platform_{i}")
+            _add(tendon, "geom", geom=f"pulley_{i}", sidesite=f"side_{i}")
+        _add(tendon, "site", site=f"platform_{i}")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _dynamics(robot: Robot, pose: Pose, stiffness: Array) -> _Dynamics:
-    """Time step and damping from the robot's own frequencies.
+def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
+    """Time step [s], damping of a cable over its stiffness [s], and damping of each joint [N s/m, N m s/rad].
+
+    The last is zero where the cables resist every motion.
 
     The cables' springs are the same at every pose, so none of its motions is faster than if each cable pulled where the
     platform gives way most easily: the square of its frequency is at most the sum over the cables of stiffness times
@@ -210,14 +196,14 @@ def _dynamics(robot: Robot, pose: Pose, stiffness: Array) -> _Dynamics:
     mobility = np.swapaxes(moved, 1, 2) @ np.linalg.solve(masses, moved)
     fastest = float(np.sqrt(stiffness @ np.linalg.eigvalsh(mobility)[:, -1]))
     step = min(_LONGEST_STEP, 2.0 * np.pi / (_STEPS * fastest))
-    cables = free_chords(robot, pose)
+    cables = _free_chords(robot, pose)
     distance = np.linalg.norm(cables, axis=1)
     directions = cables / np.where(distance > 0.0, distance, 1.0)[:, None]
     stretch = np.einsum("ik,ijk->ij", directions, moved)
     slowest = eigh((stretch.T * stiffness) @ stretch, masses, eigvals_only=True)[0]
     swing = robot.gravity / max(distance.max(), _SHORTEST)  # of a pendulum as long as the longest cable, squared
     drag = _SWING_DAMPING * robot.mass * np.sqrt(swing) if slowest < swing else 0.0
-    return _Dynamics(step, _STRETCH_DAMPING / fastest, float(drag))
+    return step, _STRETCH_DAMPING / fastest, float(drag)
 
 
 def _lengths_at_rest(robot: Robot, pose: Pose) -> Array:
@@ -248,26 +234,23 @@ def _add_view(root: Element, robot: Robot) -> float:
     """Add center and extent of the frame for MuJoCo's camera; returns the size of the robot [m]."""
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     size = float(np.linalg.norm(high - low)) + float(np.linalg.norm(np.ptp(robot.platform_anchors, axis=0)))
-    SubElement(root, "statistic", center=numbers_text(0.5 * (low + high)), extent=numbers_text((size,)))
+    _add(root, "statistic", center=0.5 * (low + high), extent=size)
     return size
 
 
 def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag: float) -> None:
     x, y, z, w = pose.quaternion
-    body = SubElement(world, "body", name="platform", pos=numbers_text(pose.position), quat=numbers_text((w, x, y, z)))
+    body = _add(world, "body", name="platform", pos=pose.position, quat=(w, x, y, z))
     _add_joints(body, robot, pose, drag)
     inertia = _inertia(robot, pose)
     moments = [inertia[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
-    inertial = SubElement(body, "inertial", pos=numbers_text(robot.center_of_mass), mass=numbers_text((robot.mass,)))
-    inertial.set("fullinertia", numbers_text(moments))
+    _add(body, "inertial", pos=robot.center_of_mass, mass=robot.mass, fullinertia=moments)
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
     edges = high - low if robot.platform_size is None else robot.platform_size
     half = np.maximum(0.5 * edges, max(0.5 * _THINNEST * float(edges.max()), radius))
-    box = SubElement(body, "geom", type="box", pos=numbers_text(0.5 * (low + high)), size=numbers_text(half))
-    for key in ("contype", "conaffinity"):
-        box.set(key, "0")
+    _add(body, "geom", type="box", pos=0.5 * (low + high), size=half, **_DRAWN)
     for i, point in enumerate(robot.platform_anchors):
-        SubElement(body, "site", name=f"platform_{i}", pos=numbers_text(point), size=numbers_text((radius,)))
+        _add(body, "site", name=f"platform_{i}", pos=point, size=radius)
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
@@ -285,14 +268,10 @@ def _inertia(robot: Robot, pose: Pose) -> Array:
 
 def _add_joints(body: Element, robot: Robot, pose: Pose, drag: float) -> None:
     """A free joint, or one slide or hinge for each free motion; their axes are in the body's own frame."""
+    damping = {"damping": drag} if drag > 0.0 else {}
     if robot.motion_pattern == "3R3T":
-        joints = [SubElement(body, "joint", name="pose", type="free")]
-    else:
-        joints = []
-        for k, row in enumerate(robot.freedom):
-            kind, axis = ("slide", row[:3]) if row[:3].any() else ("hinge", row[3:])
-            joints.append(
-                SubElement(body, "joint", name=f"freedom_{k}", type=kind, axis=numbers_text(axis @ pose.matrix))
-            )
-    for joint in joints if drag > 0.0 else ():
-        joint.set("damping", numbers_text((drag,)))
+        _add(body, "joint", name="pose", type="free", **damping)
+        return
+    for k, row in enumerate(robot.freedom):
+        kind, axis = ("slide", row[:3]) if row[:3].any() else ("hinge", row[3:])
+        _add(body, "joint", name=f"freedom_{k}", type=kind, axis=axis @ pose.matrix, **damping)

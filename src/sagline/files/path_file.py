@@ -36,7 +36,7 @@ TIMING_UNITS = {
 PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 
-def path_from_table(path: FilePath, text: str) -> Path:
+def _path_from_table(path: FilePath, text: str) -> Path:
     """The path of a CSV text."""
     table = Table.read(path, text, UNITS)
     _check_columns(table)
@@ -111,7 +111,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
         >>> path = sl.load_path("own_path.yaml")  # doctest: +SKIP
     """
     path = file_path(file)
-    yaml, table = (_path_from_yaml, YAML_LIMIT), (path_from_table, TABLE_LIMIT)
+    yaml, table = (_path_from_yaml, YAML_LIMIT), (_path_from_table, TABLE_LIMIT)
     readers = {".yaml": yaml, ".yml": yaml, ".csv": table}
     if path.suffix.lower() not in readers:
         step = "Give waypoints as .yaml, or time and pose as .csv."

@@ -168,7 +168,7 @@ FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension
 STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 
-def check_plan(data: Dataset, cables: int) -> None:
+def _check_plan(data: Dataset, cables: int) -> None:
     """Refuse a data set that is no plan of a robot with this number of cables."""
     status = data.variables["pose_status"]
     rows = tuple(str(name) for name in status.dims)
@@ -252,7 +252,7 @@ def plan_dataset(plan: Plan) -> Dataset:
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "when the platform stands"})
     data = labeled_dataset(variables, _attributes(plan), coordinates)
-    check_plan(data, cables)
+    _check_plan(data, cables)
     return data
 
 
@@ -268,7 +268,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
 def plan_of(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     """Plan of a data set that `plan_dataset` made; file and name of the robot are for messages."""
     robot = robot_of(path, data, item)
-    check_plan(data, robot.cable_count)
+    _check_plan(data, robot.cable_count)
     values = partial(values_of, data)
     behind = MACHINE[0].name in data.variables
     if behind != has_routing(robot):

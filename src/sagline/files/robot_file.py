@@ -73,14 +73,14 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
 
 def parse_robot(text: str, origin: Path | str) -> Robot:
     """A robot from the text of a robot file."""
-    entry = robot_entry(text, origin)
+    entry = _robot_entry(text, origin)
     try:
         return entry.robot()
     except InvalidValueError as error:
         raise FileError.of(origin, error) from None
 
 
-def robot_entry(text: str, origin: Path | str) -> RobotEntry:
+def _robot_entry(text: str, origin: Path | str) -> RobotEntry:
     """Entry of a robot file with known keys of the right type; values are not checked."""
     return validate(_on_base(parse_mapping(text, origin), origin), RobotEntry, origin)
 
@@ -194,7 +194,7 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
         >>> sl.clearance(plan.state, around).distance  # doctest: +SKIP
     """
     path = file_path(file, "file")
-    entry = robot_entry(read_text(path, YAML_LIMIT), path)
+    entry = _robot_entry(read_text(path, YAML_LIMIT), path)
     return tuple(_obstacle(place, f"scene[{k}]", path) for k, place in enumerate(entry.scene))
 
 

@@ -85,7 +85,7 @@ ROWS: Final = "time"
 ROUNDING: Final = 1e-12  # of the largest energy
 
 
-def check_simulation(data: Dataset, cables: int) -> None:
+def _check_simulation(data: Dataset, cables: int) -> None:
     """Refuse a data set that is no simulation of a robot with this number of cables."""
     _check_settings(data.attrs)
     time = data.variables[TIME.name].values
@@ -99,7 +99,7 @@ def check_simulation(data: Dataset, cables: int) -> None:
         allowed = "given for cables with mass, and for no others"
         raise InvalidValueError(NODES.name, "given" if nodes else "not given", allowed, STEP)
     broken = np.full(cables, np.inf)
-    if has_events(data):
+    if _has_events(data):
         check_variables(data, EVENTS, sizes)
         broken = _check_events(data, time, cables)
     for name in ("length", *(one.name for one in nodes)):
@@ -107,7 +107,7 @@ def check_simulation(data: Dataset, cables: int) -> None:
     _check_balance(data)
 
 
-def has_events(data: Dataset) -> bool:
+def _has_events(data: Dataset) -> bool:
     """True if a data set has a variable of events."""
     return any(quantity.name in data.variables for quantity in EVENTS)
 
@@ -209,7 +209,7 @@ def pack(simulation: Simulation) -> Dataset:
     cables = simulation.robot.cable_count
     coordinates = {"cable": index_coordinate("cable", cables), **variables_of(simulation, (TIME,), (ROWS,))}
     data = labeled_dataset(variables, _attributes(simulation), coordinates)
-    check_simulation(data, cables)
+    _check_simulation(data, cables)
     return data
 
 
@@ -231,11 +231,11 @@ def _attributes(simulation: Simulation) -> dict[str, Any]:
 def unpack(path: FilePath, data: Dataset) -> Simulation:
     """Simulation of a data set; its path is for messages."""
     robot = robot_of(path, data)
-    check_simulation(data, robot.cable_count)
+    _check_simulation(data, robot.cable_count)
     values, winches = partial(values_of, data), data.attrs["winches"]
     found = {quantity.place: values(quantity.name) for quantity in (TIME, *SAMPLES)}
     energy = {place.removeprefix("energy."): found.pop(place) for place in list(found) if place.startswith("energy.")}
-    events = _occurrences(data) if has_events(data) else ()
+    events = _occurrences(data) if _has_events(data) else ()
     return Simulation(
         robot=robot,
         pose=Pose.from_quaternion(found.pop("pose.position"), found.pop("pose.quaternion")),

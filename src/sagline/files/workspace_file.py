@@ -82,7 +82,7 @@ UNITS = ("m³", "m²")
 KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Capsule, Sphere, Mesh)}
 
 
-def check_workspace(data: Dataset, cables: int) -> None:
+def _check_workspace(data: Dataset, cables: int) -> None:
     """Refuse a data set that is no workspace of a robot with this number of cables."""
     choice(data.attrs["volume_units"], "volume_units", UNITS)
     choice(data.attrs["need"], "need", ("all", "any"))
@@ -101,7 +101,7 @@ def check_workspace(data: Dataset, cables: int) -> None:
     check_indices(data, ranges)
 
 
-def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
+def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], dict[str, Any]]:
     """Attributes of criteria, and variables of the obstacles among them; InvalidValueError for foreign kinds."""
     attributes: dict[str, Any] = {}
     variables: dict[str, Any] = {}
@@ -121,8 +121,8 @@ def criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any], 
     return attributes, variables
 
 
-def criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
-    """Criteria that `criteria_attributes` wrote, in their order; the path is for messages."""
+def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
+    """Criteria that `_criteria_attributes` wrote, in their order; the path is for messages."""
     found: list[Criterion] = []
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
@@ -186,7 +186,7 @@ def pack(space: Workspace) -> Dataset:
     for one in QUANTITIES:
         if one.values is int:  # indices of any size are stored in 64 bits
             variables[one.name] = one.parts, one.of(space).astype(np.int64), one.attributes
-    attributes, obstacles = criteria_attributes(space.criteria)
+    attributes, obstacles = _criteria_attributes(space.criteria)
     return labeled_dataset(variables | obstacles, _attributes(space) | attributes)
 
 
@@ -216,7 +216,7 @@ def _attributes(space: Workspace) -> dict[str, Any]:
 def unpack(path: FilePath, data: Dataset) -> Workspace:
     """Workspace of a data set; its path is for messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
-    check_workspace(data, robot.cable_count)
+    _check_workspace(data, robot.cable_count)
 
     def values(name: str) -> Any:
         found = values_of(data, name)
@@ -232,7 +232,7 @@ def unpack(path: FilePath, data: Dataset) -> Workspace:
         box=PoseBox(attributes["box_low"], attributes["box_high"], float(attributes["box_tilt"])),
         wrenches=WrenchSet(*map(values, loads)),
         orientations=Orientations._of(values("rotation"), attributes["need"]),
-        criteria=criteria_of(path, data),
+        criteria=_criteria_of(path, data),
         model=choice_of(path, data.attrs, "model", MODELS),
         tension=choice_of(path, data.attrs, "tension", METHODS),
         moment_arm=None if arm is None else float(arm),

@@ -102,7 +102,7 @@ TRAVELS: Final = 20.0  # of a stretch wave from end to end: a cable without tens
 STRETCH: Final = 1.1  # of the longest length that is asked for: room for winches that overshoot
 
 
-class ChainRecords(Records):
+class _ChainRecords(Records):
     """Records of N steps from the kernel, with the shapes of the cables."""
 
     def __init__(self, count: int, cables: int, points: int) -> None:
@@ -190,9 +190,9 @@ class ChainPlant(Plant):
             self._stock,
         )
 
-    def records(self, count: int) -> ChainRecords:
+    def records(self, count: int) -> _ChainRecords:
         """Room for records of so many steps."""
-        return ChainRecords(count, len(self.cables), self.nodes + 1)
+        return _ChainRecords(count, len(self.cables), self.nodes + 1)
 
     def platform_states(self, states: Array) -> Array:
         """Recorded states as those of the platform by itself."""

@@ -19,7 +19,7 @@ NEUTRAL = 1e-12  # of the largest stiffness: smaller ones are rounding
 LONGEST_STEP = 0.2  # of a force: a longer one is shortened, which keeps far starts from folding a chain
 
 
-class ChainsAtRest(NamedTuple):
+class _ChainsAtRest(NamedTuple):
     """Chains in equilibrium with a platform.
 
     Attributes:
@@ -34,7 +34,7 @@ class ChainsAtRest(NamedTuple):
     force: Array
 
 
-class LumpedCables(NamedTuple):
+class _LumpedCables(NamedTuple):
     """Cables divided into elements.
 
     Attributes:
@@ -80,7 +80,7 @@ class LumpedCables(NamedTuple):
         return compliance
 
 
-def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
+def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
     """The chains into which the cables of an equilibrium are divided, at rest at the same lengths.
 
     An element's force is the exact cable's at its middle: a chain reaches as far as the midpoint rule says. Pose and
@@ -91,7 +91,7 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
     """
     robot, exits = state.one_robot, state.exit_point
     length, material = state.free_length, state.cables.cable
-    chains = LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
+    chains = _LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
     center, freedom = robot.center_of_mass, robot.freedom
     given = state.wrench - np.array([0.0, 0.0, robot.mass * robot.gravity, 0.0, 0.0, 0.0])
     force = platform_end_forces(state)
@@ -115,10 +115,10 @@ def chains_at_rest(state: Equilibrium, nodes: int) -> ChainsAtRest:
     place[:, 0] = ends
     place[:, 1:] = ends[:, None] - np.cumsum(chains.steps(force), axis=1)
     place[:, -1] = exits
-    return ChainsAtRest(pose, np.ascontiguousarray(np.swapaxes(place, 1, 2)), force)
+    return _ChainsAtRest(pose, np.ascontiguousarray(np.swapaxes(place, 1, 2)), force)
 
 
-def _refuse_slack(force: Array, chains: LumpedCables) -> None:
+def _refuse_slack(force: Array, chains: _LumpedCables) -> None:
     slack = np.flatnonzero(~(chains.elements(force)[1].min(axis=1) > 0.0))
     if slack.size:
         raise _no_rest(f"cable {slack[0]}", "slack at the start")
@@ -129,7 +129,7 @@ def _no_rest(item: str, value: str) -> InvalidValueError:
     return InvalidValueError(item, value, "taut cables that hold the platform", step)
 
 
-def _solve_chains(chains: LumpedCables, chord: Array, force: Array) -> Array:
+def _solve_chains(chains: _LumpedCables, chord: Array, force: Array) -> Array:
     """Forces on the platform ends of chains that reach along given chords (m, 3), from forces near them."""
     near = False
     for _ in range(STEPS):

@@ -29,7 +29,7 @@ SHORTER: Final = "Simulate a shorter time, or record less often."
 SMALL: Final = 0.02  # of its length: what a cable may be let out
 
 
-class ModalModel(NamedTuple):
+class _ModalModel(NamedTuple):
     """Response of the modes of a state to changes u = (dL, dw) of lengths and wrench, (m + 6,).
 
     Attributes:
@@ -47,7 +47,7 @@ class ModalModel(NamedTuple):
     tension: Array
 
 
-class ModalMotion(NamedTuple):
+class _ModalMotion(NamedTuple):
     """Modes at N instants: amplitudes and rates, (N, K); work done on them and energy lost since the start, (N,)."""
 
     amplitude: Array
@@ -56,7 +56,7 @@ class ModalMotion(NamedTuple):
     lost: Array
 
 
-def modal_model(state: Equilibrium, damping: Damping) -> ModalModel:
+def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
     """Modal model of a state.
 
     Source:
@@ -80,7 +80,7 @@ def modal_model(state: Equilibrium, damping: Damping) -> ModalModel:
     whole = np.concatenate((rest.length_sensitivity, rest.compliance), axis=1)
     tension = np.concatenate((rest.tension_sensitivity, by_wrench), axis=1)
     slow = drive / square[:, None]
-    return ModalModel(found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow)
+    return _ModalModel(found, drive, whole - found.shape @ slow, pulled, tension - pulled @ slow)
 
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
@@ -108,7 +108,7 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
     return force
 
 
-def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> ModalMotion:
+def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> _ModalMotion:
     """Modes that rest at first, under forces that are straight between instants: exact but for rounding.
 
     Shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s].
@@ -134,7 +134,7 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
     taken = 0.5 * step * (power[1:] + power[:-1]) - step * step / 12.0 * np.diff(bend, axis=0)
     start = np.zeros(1)
     supplied = np.concatenate((start, np.cumsum(work.sum(axis=1))))
-    return ModalMotion(amplitude, rate, supplied, np.concatenate((start, np.cumsum(taken.sum(axis=1)))))
+    return _ModalMotion(amplitude, rate, supplied, np.concatenate((start, np.cumsum(taken.sum(axis=1)))))
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:

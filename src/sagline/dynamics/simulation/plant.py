@@ -90,7 +90,7 @@ class Plant:
         """
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data
-        moments, self.axes = principal_axes(robot, pose)
+        moments, self.axes = _principal_axes(robot, pose)
         self.turn = Rotation.from_matrix(self.axes).as_quat()
         self.turn_back = locked(self.turn * [-1.0, -1.0, -1.0, 1.0])
         self.inertia = np.array([robot.mass, *moments])
@@ -194,7 +194,7 @@ class Plant:
         return Pose.from_quaternion(position, turned.as_quat())
 
 
-def principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
+def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
     """Principal moments of the platform [kg m^2], (3,), infinite where it does not turn, and axes, one a column."""
     if robot.motion_pattern == "3R3T":
         moments, axes = np.linalg.eigh(robot.inertia)

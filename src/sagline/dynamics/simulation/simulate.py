@@ -172,11 +172,11 @@ def started_run(
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
     settings = {"integrator": get_args(Integrator)[code], "winches": winches, "winding": winding, "damping": losses}
     return Run(
-        plant, rules, numbers, (set_points(given, plant, kind), given.wrench, air), every, count, happening, settings
+        plant, rules, numbers, (_set_points(given, plant, kind), given.wrench, air), every, count, happening, settings
     )
 
 
-def set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
+def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
     """Set points of the drives: lengths; of drums lengths along the path of winding, and tensions."""
     if kind != d.DRUMS:
         return given.lengths

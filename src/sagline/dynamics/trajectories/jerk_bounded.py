@@ -38,7 +38,7 @@ class JerkProfile:
 
     def at(self, time: Array) -> Array:
         """Parameter and its first three derivatives by time, shape (4, N)."""
-        state = integration_matrices(len(self.jerk)) @ self.jerk  # at the knots
+        state = _integration_matrices(len(self.jerk)) @ self.jerk  # at the knots
         scaled = np.clip(time / self.duration, 0.0, 1.0) * len(self.jerk)
         k = np.minimum(scaled.astype(np.intp), len(self.jerk) - 1)
         h = (scaled - k) / len(self.jerk)
@@ -53,7 +53,7 @@ class JerkProfile:
         return np.stack([value / self.duration**order for order, value in enumerate(values)])
 
 
-def integration_matrices(pieces: int) -> Array:
+def _integration_matrices(pieces: int) -> Array:
     """Parameter, its rate and its second rate at the knots by the jerk of each piece, shape (3, P + 1, P)."""
     h = 1.0 / pieces
     since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h  # since each piece's begin
@@ -74,7 +74,7 @@ def fastest_jerk_profile(
     from scipy.optimize import linprog  # takes longer to load than all the rest of dynamics
 
     course = _first(curve, limits, least)
-    state = integration_matrices(PIECES)
+    state = _integration_matrices(PIECES)
     jet = curve.at(np.clip(state[0] @ course.jerk, 0.0, 1.0))
     balances = ForceBalance.at(robot, jet, inverse(robot, jet.pose))
     ends = np.hstack((state[:, -1], np.zeros((3, 1))))
@@ -84,7 +84,7 @@ def fastest_jerk_profile(
         square = course.duration**2
         jet = curve.at(np.clip(place, 0.0, 1.0))
         balances = balances.at_poses(jet).near_motion(np.stack((rate, speed**2), axis=1) / square)
-        planes = without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
+        planes = _without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
         rows, bounds = zip(
             _within(planes, state, speed),
             (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # never back
@@ -109,7 +109,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfi
     """The profile of 5th degree, in a time in which it may keep the limits."""
     middle = (np.arange(PIECES) + 0.5) / PIECES
     jerk = 60.0 - 360.0 * middle + 360.0 * middle**2
-    state = integration_matrices(PIECES)
+    state = _integration_matrices(PIECES)
     jerk -= state[:, -1].T @ np.linalg.solve(state[:, -1] @ state[:, -1].T, state[:, -1] @ jerk - (1.0, 0.0, 0.0))
     rates = curve.at(state[0] @ jerk).rates[0]
     extents = (np.linalg.norm(rates[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
@@ -159,7 +159,7 @@ def _unit(vectors: Array) -> Array:
     return unit
 
 
-def without_redundant(planes: HalfPlanes) -> HalfPlanes:
+def _without_redundant(planes: HalfPlanes) -> HalfPlanes:
     """Half planes that contain the origin, without those that the border shows in none of some directions."""
     normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)

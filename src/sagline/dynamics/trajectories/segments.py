@@ -51,7 +51,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LineCurve:
+class _LineCurve:
     """A straight way with a turn about a fixed axis; its parameter is the share of both that is done.
 
     Attributes:
@@ -61,7 +61,7 @@ class LineCurve:
     ends: Segments
 
     @classmethod
-    def between(cls, pose: Pose) -> LineCurve:
+    def between(cls, pose: Pose) -> _LineCurve:
         """The line from the first pose of a batch to the last."""
         return cls(Segments.between(pose[np.array([0, -1])], QUINTIC))
 
@@ -313,7 +313,7 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
     """A curve through samples, and its parameter with its derivatives at each, shape (K, n)."""
-    line = LineCurve.between(pose)
+    line = _LineCurve.between(pose)
     if line.moves:
         parameter, square = line.parameter(pose), float(line.direction @ line.direction)
         values = np.stack((parameter, *(rate @ line.direction / square for rate in rates)))

@@ -295,14 +295,14 @@ def shaped(path: Path, shaper: Shaper) -> Path:
     def motion(k: int, time: Array) -> tuple[Pose, Array]:
         curve = segments[k].curve
         assert curve is not None
-        parameter = shaped_parameter(segments[k], shaper, time)
+        parameter = _shaped_parameter(segments[k], shaper, time)
         jet = curve.at(parameter[0])
         return jet.pose, jet.twists(parameter)
 
     return joined_path(path, segments, longer, motion, with_jerk=path.jerk is not None)
 
 
-def shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) -> Array:
+def _shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) -> Array:
     """Parameter of a shaped move and its first three derivatives at times since its begin, shape (4, N)."""
     motion = np.zeros((4, time.size))
     for delay, share in zip(shaper.time, shaper.amplitude, strict=True):

@@ -17,7 +17,7 @@ from sagline.statics.strings import Strings
 
 
 @cache
-def lobatto() -> Lobatto:
+def _lobatto() -> Lobatto:
     """The nodes and what belongs to them."""
     n = LARGEST_DEGREE + 1
     rule = Lobatto(np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n, n)), np.zeros((n, n, n)))
@@ -148,7 +148,7 @@ def component_modes(strings: Strings, row: int, up_to: float) -> Components:
     t, n = taut.size, int(counts.max(initial=2))
     points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
     plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
-    spectral_matrices(table, omega, lobatto(), points, plane, normal, carried, mass)
+    spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
     free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is held
     first = 0 if table[:, columns.BEHIND_X :].any() else 1  # and so is a frame end that does not give way
     inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
@@ -184,7 +184,7 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
     return still
 
 
-def node_motion(components: Components, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
+def _node_motion(components: Components, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
     """Motion of the nodes times the roots of their masses: in the planes and normal to them.
 
     Shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K).
@@ -203,8 +203,8 @@ def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: 
     mesh = components.mesh
     t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
     values = np.empty((t, count, n))
-    interpolate(mesh.table, mesh.omega, lobatto(), mesh.points, values)
-    plane, normal = node_motion(components, ends, amplitudes)
+    interpolate(mesh.table, mesh.omega, _lobatto(), mesh.points, values)
+    plane, normal = _node_motion(components, ends, amplitudes)
     inside = plane.reshape(t, n, 2, k)
     behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
     slide = np.hypot(*behind.T)  # a frame end that gives way has one motion in the plane
@@ -223,7 +223,7 @@ def stretch_energy(components: Components, ends: Array, amplitudes: Array) -> Ar
 
     Returns (t, K) [1/s^2].
     """
-    plane, _ = node_motion(components, ends, amplitudes)
+    plane, _ = _node_motion(components, ends, amplitudes)
     return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
 
 
@@ -240,5 +240,5 @@ def stretch_stiffness(components: Components) -> Array:
 def _stretch_matrices(mesh: Mesh) -> Array:
     n = mesh.points.shape[1]
     matrices = np.empty((mesh.taut.size, 2 * n, 2 * n))
-    stretch_matrices(mesh.table, mesh.omega, lobatto(), mesh.points, matrices)
+    stretch_matrices(mesh.table, mesh.omega, _lobatto(), mesh.points, matrices)
     return matrices

@@ -90,7 +90,7 @@ def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivative
     spins = np.einsum("ia,jb->ijab", turns, turns)
     moved = swings.motion[:3]
     own = -np.einsum("mabc,pmc->pmab", swings.by_force, rest.by_datum) - swings.by_datum
-    own = own + lever_form(swings.motion[3:], rest.slopes.levers, rest.by_datum)
+    own = own + _lever_form(swings.motion[3:], rest.slopes.levers, rest.by_datum)
     sink = -robot.gravity * rest.compliance[:, 2]
     return SquareDerivatives(
         datum=own + np.einsum("kab,pkm->pmab", pose, rest.settling),
@@ -112,7 +112,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
     pulled = np.einsum("mai,bkmi->kab", swings.end_force, onto)
     form += pulled + np.swapaxes(pulled, -1, -2)
     form += (
-        lever_form(swings.motion[3:], moved, slopes.force) + lever_form(swings.motion[3:], slopes.levers, forces)
+        _lever_form(swings.motion[3:], moved, slopes.force) + _lever_form(swings.motion[3:], slopes.levers, forces)
     ).sum(axis=1)
     inertia = rest.mass[3:, 3:]
     for k, cross in enumerate(_cross_matrices()):
@@ -122,7 +122,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
     return kept
 
 
-def lever_form(turns: Array, levers: Array, force: Array) -> Array:
+def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
     """Geometric stiffness of forces on levers against rotations: r T^T - r.T, in its symmetric part.
 
     Shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g).
@@ -155,7 +155,7 @@ class Cable(NamedTuple):
     density: float
 
 
-class Waves(NamedTuple):
+class _Waves(NamedTuple):
     """Displacement and force along a cable for each component of the force on its frame end.
 
     Attributes:
@@ -220,13 +220,13 @@ def _correction(rest: StateSlopes, cables: tuple[Cable, ...], omega: float, grou
     return float(-np.trace(np.linalg.solve(change, np.diag(values[-group:]))) / group)
 
 
-def _equations(rest: StateSlopes, waves: list[Waves], omega: float, scale: Array | None = None) -> tuple[Array, Array]:
+def _equations(rest: StateSlopes, waves: list[_Waves], omega: float, scale: Array | None = None) -> tuple[Array, Array]:
     """Balance of the free motions and ends that meet, (n + 3 m, n + 3 m), and what its columns were multiplied by."""
     freedom, levers = rest.state.one_robot.freedom, rest.slopes.levers
     n, ends = len(freedom), motions_of_ends(levers)
     matrix = np.zeros((n + 3 * len(waves), n + 3 * len(waves)))
     held = -(omega**2) * rest.mass
-    held[3:, 3:] += lever_form(np.eye(3), levers, rest.slopes.force).sum(axis=0)
+    held[3:, 3:] += _lever_form(np.eye(3), levers, rest.slopes.force).sum(axis=0)
     matrix[:n, :n] = freedom @ held @ freedom.T
     for i, wave in enumerate(waves):
         own = slice(n + 3 * i, n + 3 * i + 3)
@@ -239,7 +239,7 @@ def _equations(rest: StateSlopes, waves: list[Waves], omega: float, scale: Array
     return matrix * scale, scale
 
 
-def _waves(cable: Cable, omega: float) -> Waves:
+def _waves(cable: Cable, omega: float) -> _Waves:
     """Waves of a cable for unit forces on its frame end, by collocation at Gauss points of its elements."""
     edges = _edges(cable, omega)
     size = np.diff(edges)
@@ -261,7 +261,7 @@ def _waves(cable: Cable, omega: float) -> Waves:
         at = across[e] @ at
     found = within_each.reshape(-1, 6, 3)
     share = (size[:, None] * WEIGHTS).reshape(-1)
-    return Waves(force.reshape(-1, 3), below.reshape(-1), share, found[:, :3], found[:, 3:], at.reshape(2, 3, 3))
+    return _Waves(force.reshape(-1, 3), below.reshape(-1), share, found[:, :3], found[:, 3:], at.reshape(2, 3, 3))
 
 
 def _flexible(force: Array, stiffness: float) -> Array:
@@ -293,7 +293,7 @@ def _longest(cable: Cable, omega: float, start: Array, end: Array) -> Array:
 
 
 def _forms(
-    rest: StateSlopes, cables: tuple[Cable, ...], waves: list[Waves], motion: Array, pulls: Array, omega: float
+    rest: StateSlopes, cables: tuple[Cable, ...], waves: list[_Waves], motion: Array, pulls: Array, omega: float
 ) -> ModeGroup:
     gravity = 0.0 if rest.state.cables.model.weightless else rest.state.cables.gravity
     end_force, by_force, by_datum = [], [], []

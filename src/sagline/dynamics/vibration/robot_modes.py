@@ -49,7 +49,7 @@ class VibrationModel(NamedTuple):
         return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
 
 
-class ReducedModel(NamedTuple):
+class _ReducedModel(NamedTuple):
     """The eigenproblem of one state.
 
     Attributes:
@@ -96,7 +96,7 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
     )
 
 
-def reduced_model(model: VibrationModel, row: int, up_to: float) -> ReducedModel:
+def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
     """The eigenproblem of one state for its modes below a frequency.
 
     The cables' modes a little above it are its unknowns; what those beyond answer to slow motions of the platform is
@@ -124,7 +124,7 @@ def reduced_model(model: VibrationModel, row: int, up_to: float) -> ReducedModel
     matrix[:n, n:] = -pulled.T
     np.fill_diagonal(matrix[n : n + count, n : n + count], square)
     matrix[n + count :, n + count :] = slow
-    return ReducedModel(matrix, freedom.T @ upper, driven, kept, beyond, components)
+    return _ReducedModel(matrix, freedom.T @ upper, driven, kept, beyond, components)
 
 
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
@@ -209,7 +209,7 @@ class StateModes:
     platform: Array
     ends: Array
     number: int
-    problem: ReducedModel
+    problem: _ReducedModel
     vectors: Array
 
     @property

@@ -56,7 +56,7 @@ _NEAR: Final = 3.0  # times: excitations that differ by less both count
 _INSTANTS: Final = 2000  # of a move, where its inertia is taken
 
 
-def most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
+def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
     """The frequencies that a path excites most: one, or two where the second is excited a third as much or more.
 
     Shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz].
@@ -150,7 +150,7 @@ class Vibration(Result):
         Raises:
             InvalidValueError: As `sagline.to_shape`.
         """
-        return most_excited(self.state, self.frequency, self.shape, path)
+        return _most_excited(self.state, self.frequency, self.shape, path)
 
 
 POINTS: Final = 41  # of a cable's shape
@@ -280,4 +280,4 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
     if state.pose.shape:
         value = f"of {len(state.pose)} states"
         raise InvalidValueError("modes", value, "of a single state", "Take those of the last: modes(plan.state[-1]).")
-    return most_excited(state, modes.frequency, modes.shape, path)
+    return _most_excited(state, modes.frequency, modes.shape, path)
