@@ -161,7 +161,7 @@ def test_an_explanation_stays_within_what_is_plausible() -> None:
 
 
 def test_a_fit_that_does_not_converge_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sagline.article.explanations.NEWTON_STEPS", 1)
+    monkeypatch.setattr("sagline.article.explanations.ITERATIONS", 1)
     pulley = BY_NAME[PULLEY]
     with refused("the fit of pulley radius", "still moving after 1 steps", kind=sl.InvalidValueError):
         explanations(

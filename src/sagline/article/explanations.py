@@ -13,8 +13,8 @@ from sagline.article.machine import Errors, Parameter
 from sagline.core.arrays import Array, Flags
 
 STEP = 0.01  # of a plausible error, for the slopes
-NEWTON_STEPS = 20
-SETTLED = 1e-5  # m, by which a step moves the platform; the positions are printed in millimeters
+ITERATIONS = 20
+CONVERGED = 1e-5  # m, by which a step moves the platform; the positions are printed in millimeters
 NEAR = 1e-3  # of a plausible error: what is nearer to a limit has run into it
 
 Model: TypeAlias = tuple[Parameter, ...]
@@ -74,7 +74,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
     values, slopes = _start(error_of, measured, models)
     steps = [np.zeros(len(model)) for model in models]
     moving = list(range(len(models)))
-    for _ in range(NEWTON_STEPS):
+    for _ in range(ITERATIONS):
         near = tangents(error_of, [models[i] for i in moving], [values[i] for i in moving])
         far = []
         for i, one in zip(moving, near, strict=True):
@@ -83,7 +83,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
             if step @ steps[i] < 0.0:  # it swings about where it should end
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
-            if np.abs(one.slopes @ step).max() > SETTLED:
+            if np.abs(one.slopes @ step).max() > CONVERGED:
                 far.append(i)
         moving = far
         if not moving:
@@ -92,7 +92,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         names = ", ".join(parameter.name for parameter in models[moving[0]])
         raise sl.InvalidValueError(
             f"the fit of {names}",
-            f"still moving after {NEWTON_STEPS} steps",
+            f"still moving after {ITERATIONS} steps",
             "fits that settle",
             "Leave this model out.",
         )

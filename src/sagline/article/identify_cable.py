@@ -21,7 +21,7 @@ TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
 TOO_LOOSE = 0.5  # relative standard error from which on a value is not determined
 TOO_CLOSE = 0.95  # correlation from which on two values are not told apart
-ROUNDS = 30  # of the tension at the chord from that at an end
+ITERATIONS = 30  # of the tension at the chord from that at an end
 WEIGHTINGS = 3  # the weights depend on the answer, but little
 _ADVICE = {
     "linear_density": "measure at lower tensions or longer spans, where the cable sags more",
@@ -176,7 +176,7 @@ class _Measured:
         floor = 1e-3 * tension  # a tension below half the cable's weight is none; the search must survive it
         tau = np.maximum(side * half * self.rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
         state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
-        for _ in range(ROUNDS if side else 0):
+        for _ in range(ITERATIONS if side else 0):
             measured = state.frame_end_tension if side > 0.0 else state.platform_end_tension
             step = tension - measured
             tau = np.maximum(tau + step, floor)

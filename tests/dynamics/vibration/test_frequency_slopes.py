@@ -186,12 +186,13 @@ def test_what_is_refused() -> None:
         (plan.state, "a batch of 2", "a single state"),
         (plan.state[1], "one without lengths", "a state that was solved"),
         (plan, "a Plan", "an Equilibrium", "Give plan.state."),
-        (shallow, "one of cables of Parabolic"),
         (sl.vibration(plan.state[1], up_to=1.0), "one whose status is NO_LENGTHS"),
     )
     for given, *parts in cases:
         with refused("state", *parts, kind=sl.InvalidValueError):
             sl.frequency_slopes(given)
+    with refused("the state's cable model", "Parabolic", "Catenary, Elastic"):
+        sl.frequency_slopes(shallow)
     with refused("together", "-1", ">= 0, finite"):
         sl.frequency_slopes(plan.state[0], together=-1.0)
 

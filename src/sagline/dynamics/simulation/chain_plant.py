@@ -99,7 +99,7 @@ FEWEST, MOST = 4, 500  # elements a cable
 SHORTEST: Final = 0.86  # of l sqrt(rho/EA): the limit of steps where the element at the frame is 0.4 l
 SPARE: Final = 8  # nodes
 TRAVELS: Final = 20.0  # of a stretch wave from end to end: a cable without tension for so long is slack
-STRETCH: Final = 1.1  # of the longest length that is asked for: room for winches that overshoot
+STRETCH: Final = 1.1  # of the longest length that is asked for; winches may overshoot
 
 
 class _ChainRecords(Records):
@@ -143,10 +143,10 @@ class ChainPlant(Plant):
         self.counters = np.zeros(COUNTERS + 1, dtype=np.int64)
         table = _chain_table(given, rest.place, nodes, losses, data)
         longest = STRETCH * given.lengths.value.max(axis=0)[:m] / table[:, c.ELEMENT]
-        room = int(np.ceil(np.maximum(longest, nodes)).max()) + SPARE
-        place = np.zeros((m, 3, room))
+        capacity = int(np.ceil(np.maximum(longest, nodes)).max()) + SPARE
+        place = np.zeros((m, 3, capacity))
         place[:, :, : nodes + 1] = rest.place
-        self._chains = [table, place, np.zeros_like(place), np.zeros((m, room)), np.full(m, nodes - 1, dtype=np.int64)]
+        self._chains = [table, place, np.zeros_like(place), np.zeros((m, capacity)), np.full(m, nodes - 1, dtype=np.int64)]
         self._stock = np.full(2, np.nan)
         self._travel = nodes * table[:, c.ELEMENT] * np.sqrt(table[:, c.DENSITY] / table[:, c.STIFFNESS])
         self._ends = (robot.platform_anchors - robot.center_of_mass) @ self.axes
@@ -167,14 +167,14 @@ class ChainPlant(Plant):
     def arguments(self, rules: Any, numbers: Any, inputs: Any) -> Any:
         """As those of `Plant`, for the kernel of chains."""
         lengths: TimeTable = inputs[0]
-        if self._room.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
-            self._room = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
+        if self._work.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
+            self._work = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
         ends = self._table.copy()
         ends[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1] = self._carrier.levers(self._ends)[self.cables]
         freedom = self.robot.freedom
         handle = self._carrier.levers(np.zeros(3))
         whole = tuple(locked(array) for array in (ends, self._carrier.inertia.copy(), freedom.T @ freedom, handle))
-        kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._room)
+        kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._work)
         given = tuple(table.arrays for table in inputs)
         _integrator, kind, remembered, _work, stride = rules
         step, _loss_time, _air, filtering = numbers

@@ -107,7 +107,7 @@ class Plant:
         self.now[d.STORED] = data[d.WINDING_STRAIN]
         self.layers = np.zeros((m, 1))
         self.audit, self.counters = np.zeros(d.AUDIT_SIZE), np.zeros(k.COUNTERS, dtype=np.int64)
-        self._room = np.zeros(0)
+        self._work = np.zeros(0)
 
     def remember_winding(self, longest: float) -> None:
         """Let the drums remember the strain at which cable was wound in, up to a length off the drum [m] and MARGIN.
@@ -123,11 +123,11 @@ class Plant:
         lengths, wrenches, winds = inputs
         wide = lengths.value.shape[1]
         needed = 6 * 6 + 3 * body.STATE_COLUMNS + 4 * len(self.cables) + 2 * wide + 9
-        if self._room.size != needed:
-            self._room = np.zeros(needed)
+        if self._work.size != needed:
+            self._work = np.zeros(needed)
         platform = locked(np.array([self.inertia[0], self.robot.gravity, 0.0, 0.0, 0.0]))
         robot = (locked(self._table.view()), platform, locked(self.inertia.copy()), self.robot.freedom)
-        kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._room)
+        kept = (self.state, self.rows, self.now, self.layers, self.audit, self.counters, self._work)
         terms = (self.model.code, *self.model.parameters, self.robot.gravity, self._behind)
         given: tuple[TimeTable, TimeTable, TimeTable] = (lengths, wrenches, winds)
         return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept

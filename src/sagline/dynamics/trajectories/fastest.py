@@ -25,8 +25,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
 
 _PLACES: Final = 201  # along a move, at which limits are looked at
-_ROUNDS: Final = 8  # of the cables' sag
-_SETTLED: Final = 1e-7  # of the time, that a round changes
+_ITERATIONS: Final = 8  # of the cables' sag
+_CONVERGED: Final = 1e-7  # of the time, that a round changes
 _INSTANTS: Final = 4001  # of a move, at which its limits are checked in the end
 _SLOWER: Final = 1e-6  # of the time, that is given first where a limit is missed; four times as much each time
 _TRIES: Final = 12
@@ -149,12 +149,12 @@ def _fastest_segment(
         raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s at rest", rest)
     balances, speeds = ForceBalance.at(robot, jet, rest), _winch_speed_bounds(robot, curve, place, rest)
     bounds, least = speeds(place), np.inf
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         profile = fastest_speed_profile(place, balances.half_planes().joined(bounds))
         if profile is None:
             raise _infeasible_error(f"from {segment.begin:g} s to {segment.end:g} s in motion", rest)
         before, least = least, profile.duration
-        if abs(least - before) <= _SETTLED * least:
+        if abs(least - before) <= _CONVERGED * least:
             break
         balances = balances.near_motion(profile.motion)
     motion: Profile | JerkProfile | None = profile

@@ -238,9 +238,9 @@ def _range(rates: Array, bound: Array) -> tuple[float, float]:
     slope, level = rates[:, 1] / np.where(flat, 1.0, rates[:, 0]), bound / np.where(flat, 1.0, rates[:, 0])
     # what bounds the first from above, less what bounds it from below, must leave something
     rate = np.concatenate(((slope[up][:, None] - slope[down]).ravel(), rates[flat, 1]))
-    room = np.concatenate(((level[up][:, None] - level[down]).ravel(), bound[flat]))
+    gap = np.concatenate(((level[up][:, None] - level[down]).ravel(), bound[flat]))
     size = np.abs(rate).max(initial=0.0) * _FLAT
     above, below = rate > size, rate < -size
-    low = max(0.0, float(np.max(room[below] / rate[below], initial=0.0)))
-    high = float(np.min(room[above] / rate[above], initial=np.inf))
+    low = max(0.0, float(np.max(gap[below] / rate[below], initial=0.0)))
+    high = float(np.min(gap[above] / rate[above], initial=np.inf))
     return low, high

@@ -17,9 +17,9 @@ from sagline.robot.robot import Robot
 Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # what else holds at parameters
 
 PIECES: Final = 100  # of constant jerk
-_ROUNDS: Final = 40
-_DONE: Final = 1e-6  # of the time, that a round changes
-_SLOWER: Final = 1.2  # times the least time: where the rounds begin
+_ITERATIONS: Final = 40
+_CONVERGED: Final = 1e-6  # of the time, that a round changes
+_SLOWER: Final = 1.2  # times the least time: where the iterations begin
 _NOTHING: Final = 1e-30
 _SIDES: Final = 32  # directions in which a polygon's border is looked for
 
@@ -67,7 +67,7 @@ def fastest_jerk_profile(
     """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk.
 
     Linear in the jerk and in the square of the time, but for where the platform is at each share of the time, the
-    square of its speed and the time's third power: those are taken anew in rounds, each a linear program.
+    square of its speed and the time's third power: those are computed anew in iterations, each a linear program.
 
     Units: limits [m/s^3]; least [s].
     """
@@ -79,7 +79,7 @@ def fastest_jerk_profile(
     balances = ForceBalance.at(robot, jet, inverse(robot, jet.pose))
     ends = np.hstack((state[:, -1], np.zeros((3, 1))))
     cost = np.append(np.zeros(PIECES), 1.0)
-    for _ in range(_ROUNDS):
+    for _ in range(_ITERATIONS):
         place, speed, rate = state @ course.jerk
         square = course.duration**2
         jet = curve.at(np.clip(place, 0.0, 1.0))
@@ -100,7 +100,7 @@ def fastest_jerk_profile(
         if found.x is None:
             return None
         before, course = course, JerkProfile(found.x[:-1], float(np.sqrt(found.x[-1])))
-        if abs(course.duration - before.duration) <= _DONE * course.duration:
+        if abs(course.duration - before.duration) <= _CONVERGED * course.duration:
             break
     return course
 
@@ -131,7 +131,7 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
 def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
     """Rows that keep a jerk, R1 s''' + 3 R2 s' s'' + R3 s'^3, within its limit in some directions at all knots.
 
-    Along the way and across, and in its own direction, so that the rounds end with its size within the limit.
+    Along the way and across, and in its own direction, so that the iterations end with its size within the limit.
 
     Shapes: rates (3, P + 1, 3).
     """

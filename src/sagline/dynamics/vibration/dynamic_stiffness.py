@@ -86,7 +86,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     Source:
         docs/model.md, section 11.
     """
-    one_state(state)
+    check_model(single_state(state))
     given = checked(frequency, "frequency", "Hz", low=0.0)
     if given.ndim > 1:
         raise InvalidValueError("frequency", f"of shape {given.shape}", "one frequency or a list", "Flatten it.")
@@ -99,12 +99,11 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     return locked(found if given.ndim else found[0])
 
 
-def one_state(state: Equilibrium) -> Equilibrium:
+def single_state(state: Equilibrium) -> Equilibrium:
     """A single equilibrium, as it is."""
     if instance(state, Equilibrium, "state").pose.shape:
-        step = "Take the poses one by one, state[i]; frequency_map takes many."
-        raise InvalidValueError("state", f"a batch of {len(state)}", "a single equilibrium", step)
-    check_model(state)
+        step = "Take the poses one by one: state[i]."
+        raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", step)
     return state
 
 
@@ -136,9 +135,9 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
     taut = np.flatnonzero(strings.taut[0])
     part = np.empty((1, frequency.size, taut.size, collocation.FOUND), dtype=kind)
     counts = np.empty((*part.shape[:-1], 2), dtype=np.int64)
-    room = np.empty(collocation.ROOM, dtype=kind)
+    work = np.empty(collocation.ROOM, dtype=kind)
     real = waves if damping is not None else np.ascontiguousarray(waves.real)
-    dynamic_stiffnesses(np.ascontiguousarray(strings.table[:, taut]), real, EXACT, room, part, counts)
+    dynamic_stiffnesses(np.ascontiguousarray(strings.table[:, taut]), real, EXACT, work, part, counts)
     check_counts(counts, frequency)
     found[:, :, taut] = part
     return in_world(found[0], strings.axes[0])
@@ -184,12 +183,7 @@ def waves_of(frequency: Array, damping: Damping | None) -> Complex:
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)
     waves[0, :, collocation.OMEGA], waves[0, :, collocation.SQUARE] = omega, omega**2
     waves[0, :, collocation.DRAG] = 0.0 if damping is None else 1j * omega * damping.air_damping
-    waves[0, :, collocation.ACROSS] = 1.0 / _loss(damping)
+    waves[0, :, collocation.ACROSS] = 1.0 / (1.0 if damping is None else 1.0 + 2j * damping.modal_damping)
     stretch = 1.0 if damping is None else 1.0 + 1j * omega * damping.loss_time
     waves[0, :, collocation.ALONG] = waves[0, :, collocation.ACROSS] / stretch
     return waves
-
-
-def _loss(damping: Damping | None) -> complex:
-    """Complex factor of all stiffness by the modal damping."""
-    return 1.0 if damping is None else 1.0 + 2j * damping.modal_damping

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -122,7 +122,7 @@ def frequency_map(
     state = inverse(robot, poses, tension=tension).state
     check_model(state)
     status = np.full(len(poses), VibrationStatus.NO_LENGTHS, dtype=np.int8)
-    found = np.full((len(_Row._fields), len(poses)), np.nan)
+    found = np.full((5, len(poses)), np.nan)
     for part in blocks(len(poses), BLOCK, report):
         own = state[part]
         model = vibration_model(own)
@@ -132,21 +132,10 @@ def frequency_map(
             if status[index] not in (VibrationStatus.SOLVED, VibrationStatus.FOLDED):
                 continue
             try:
-                found[:, index] = _row(own, model, k, limit, known)
+                found[:, index] = _numbers_of_pose(own, model, k, limit, known, lowest)
             except SaglineError as error:
                 raise _at_pose(index, error) from None
-            found[1, index] = lowest
     return FrequencyMap(robot, poses, limit, known, locked(status), *(locked(row) for row in found))
-
-
-class _Row(NamedTuple):
-    """Numbers of one pose, as in `FrequencyMap`."""
-
-    frequency: float
-    massless_frequency: float
-    platform_share: float
-    peak: float
-    peak_frequency: float
 
 
 def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
@@ -160,19 +149,22 @@ def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
     return VibrationStatus.SOLVED if taut else VibrationStatus.FOLDED, float(frequency[0])
 
 
-def _row(state: Equilibrium, model: VibrationModel, row: int, up_to: float, damping: Damping) -> _Row:
+def _numbers_of_pose(
+    state: Equilibrium, model: VibrationModel, row: int, up_to: float, damping: Damping, lowest: float
+) -> tuple[float, ...]:
+    """Numbers of one pose in the order of `FrequencyMap`; `lowest` is the lowest frequency on massless cables [Hz]."""
     freedom = model.freedom
     rest = compliance_of(freedom, model.stiffness[row])[:3, :3]
     found = state_modes(model, row, up_to)
     if not found.number:
-        return _Row(np.nan, np.nan, np.nan, float(np.linalg.norm(rest, 2)), 0.0)
+        return np.nan, lowest, np.nan, float(np.linalg.norm(rest, 2)), 0.0
     first = found.platform[:, 0]
     receptance = modal_receptance(found, rest, damping.modal_damping)
     if damping.loss_time > 0.0 or damping.air_damping > 0.0:
         slopes = cable_slopes(state[row])
         receptance = coupled_receptance(Receptance(model.at(row), slopes.matrix, slopes.blocks, damping), up_to)
     peak, at = peak_receptance(receptance, found.frequency, _ratios(state, model, row, found, damping), damping)
-    return _Row(float(found.frequency[0]), np.nan, float(first @ model.mass[row] @ first), peak, at)
+    return float(found.frequency[0]), lowest, float(first @ model.mass[row] @ first), peak, at
 
 
 def _ratios(state: Equilibrium, model: VibrationModel, row: int, found: StateModes, damping: Damping) -> Array:

@@ -8,12 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from sagline.cables.models import Catenary, Elastic
-from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
-from sagline.dynamics.vibration.dynamic_stiffness import check_lengths
+from sagline.dynamics.vibration.dynamic_stiffness import check_lengths, check_model, single_state
 from sagline.dynamics.vibration.flexibility import Flexibility, flexibility
 from sagline.dynamics.vibration.mode_sensitivities import (
     ModeGroup,
@@ -101,10 +99,11 @@ def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> 
     together = number(together, "together", "", low=0.0)
     if isinstance(state, Vibration):
         return _with_cable_mass(state, together)
-    rest = _rest(instance(state, Equilibrium, "state"))
+    rest = _rest(state)
     found, flexible = modes(state), flexibility(state, rest.slopes.force)
     groups = list(_groups(found.frequency, together))
-    swings = (_massless(rest, flexible, found.shape[:, k], _square(found.frequency[k])) for k in groups)
+    squares = (float((2.0 * np.pi * found.frequency[k].mean()) ** 2) for k in groups)
+    swings = (_massless(rest, flexible, found.shape[:, k], square) for k, square in zip(groups, squares, strict=True))
     return _result(state, False, found.frequency, groups, [square_derivatives(rest, one) for one in swings])
 
 
@@ -119,12 +118,7 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
 
 
 def _rest(state: Equilibrium) -> StateSlopes:
-    if state.pose.shape:
-        raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", "Take one of them: state[0].")
-    model = state.cables.model
-    if not isinstance(model, Catenary | Elastic):
-        value, allowed = f"one of cables of {type(model).__name__}", "of Catenary or Elastic, which have an energy"
-        raise InvalidValueError("state", value, allowed, "Solve it with model=Catenary().")
+    check_model(single_state(state))
     if state.contact is not None:
         value, allowed = "one of cables with something behind them", "cables that hang from their frame anchors"
         raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
@@ -139,10 +133,6 @@ def _groups(frequency: Array, together: float) -> Iterator[Indices]:
     for first, last in pairwise(borders):
         if last > first:
             yield np.arange(first, last)
-
-
-def _square(frequency: Array) -> float:
-    return float((2.0 * np.pi * frequency.mean()) ** 2)
 
 
 def _massless(rest: StateSlopes, flexible: Flexibility, motion: Array, square: float) -> ModeGroup:

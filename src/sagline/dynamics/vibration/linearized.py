@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
-from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.dynamics.vibration.dynamic_stiffness import Damping, single_state
 from sagline.dynamics.vibration.flexibility import flexibility
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import (
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from scipy.signal import StateSpace
 
 Inputs: TypeAlias = Literal["lengths", "speeds"]
+_Matrices: TypeAlias = tuple[Array, Array, Array, Array]  # A, B, C, D
 
 _TINY = 1e-300
 _MOTIONS = (*(f"displacement {axis}" for axis in "xyz"), *(f"rotation {axis}" for axis in "xyz"))
@@ -85,31 +86,6 @@ class Linearized(Result):
         return StateSpace(self.A, self.B, self.C, self.D)
 
 
-class _Matrices(NamedTuple):
-    """A, B, C, D."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-
-
-class _Loss(NamedTuple):
-    """Terms of a loss in the cables' stretch.
-
-    Attributes:
-        by_motion: Wrench of the cables against a velocity of the platform, shape (6, 6).
-        by_speed: The same for the rates of the lengths, shape (6, m).
-        tension_by_motion: Tension at the frame ends for a velocity of the platform, shape (m, 6).
-        tension_by_speed: The same for the rate of the cable's own length, shape (m,).
-    """
-
-    by_motion: Array
-    by_speed: Array
-    tension_by_motion: Array
-    tension_by_speed: Array
-
-
 def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Inputs = "lengths") -> Linearized:
     """The robot about a state as a linear system, from winches and wrench to pose, tensions and lengths.
 
@@ -150,8 +126,7 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
 
 
 def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
-    if instance(state, Equilibrium, "state").pose.shape:
-        raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", "Take one of them: state[0].")
+    single_state(state)
     if damping.air_damping:
         value = f"{damping.air_damping:g} N s/m^2"
         raise InvalidValueError("air_damping", value, "0, for cables without mass", "See vibration, or leave it out.")
@@ -196,8 +171,9 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     robot, slopes = state.one_robot, _solved_slopes(state)
     freedom, n, m = robot.freedom, len(robot.freedom), robot.cable_count
     freed = np.linalg.inv(freedom @ mass_matrix(state) @ freedom.T) @ freedom  # from wrench to acceleration
-    tension, loss = tension_slopes(state, slopes), _loss(state, slopes, damping.loss_time)
-    drag = loss.by_motion + _modal_drag(state, damping.modal_damping)
+    tension, loss = tension_slopes(state, slopes), _stretch_loss(state, slopes, damping.loss_time)
+    by_motion, by_speed, tension_by_motion, tension_by_speed = loss
+    drag = by_motion + _modal_drag(state, damping.modal_damping)
     size, outputs = 2 * n + m, 6 + 2 * m
     place, speed, length, tensions = slice(0, n), slice(n, 2 * n), slice(2 * n, None), slice(6, 6 + m)
     A, B = np.zeros((size, size)), np.zeros((size, m + 6))
@@ -206,27 +182,23 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
     A[speed, place] = -freed @ slopes.matrix @ freedom.T
     A[speed, speed] = -freed @ drag @ freedom.T
     A[speed, length] = -freed @ on_platform(slopes.by_length, slopes.levers)
-    B[speed, :m], B[speed, m:] = -freed @ loss.by_speed, freed
+    B[speed, :m], B[speed, m:] = -freed @ by_speed, freed
     B[length, :m] = np.eye(m)
     C[:6, place] = freedom.T
     C[tensions, place] = tension.by_motion @ freedom.T
-    C[tensions, speed] = loss.tension_by_motion @ freedom.T
+    C[tensions, speed] = tension_by_motion @ freedom.T
     C[tensions, length] = np.diag(tension.by_length)
     C[6 + m :, length] = np.eye(m)
-    D[tensions, :m] = np.diag(loss.tension_by_speed)
-    return _Matrices(A, B, C, D)
+    D[tensions, :m] = np.diag(tension_by_speed)
+    return A, B, C, D
 
 
 def _driven_by_lengths(found: _Matrices, size: int) -> _Matrices:
     """The lengths as inputs, where nothing follows their rates."""
     A, B, C, D = found
     m = len(A) - size
-    return _Matrices(
-        A[:size, :size],
-        np.concatenate((A[:size, size:], B[:size, m:]), axis=1),
-        C[:, :size],
-        np.concatenate((C[:, size:], D[:, m:]), axis=1),
-    )
+    B, D = (np.concatenate(pair, axis=1) for pair in ((A[:size, size:], B[:size, m:]), (C[:, size:], D[:, m:])))
+    return A[:size, :size], B, C[:, :size], D
 
 
 def _solved_slopes(state: Equilibrium) -> CableSlopes:
@@ -237,11 +209,15 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
     raise InvalidValueError("state", "one without lengths or stiffness", "a state that was solved", step)
 
 
-def _loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> _Loss:
-    """Loss of the stretch to first order: K(omega) = K + i omega eta K S K, S the part that is stretch."""
+def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
+    """Loss of the stretch to first order: K(omega) = K + i omega eta K S K, S the part that is stretch.
+
+    Wrenches against the platform's velocity (6, 6) and the rates of the lengths (6, m); tensions at the frame ends by
+    that velocity (m, 6) and by the rate of the cable's own length (m,).
+    """
     m = state.one_robot.cable_count
     if not loss_time:
-        return _Loss(np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m))
+        return np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m)
     follows = loss_time * slopes.blocks @ flexibility(state, slopes.force).stretch
     per_motion = follows @ slopes.blocks  # N s/m, of the platform ends
     per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # what is wound off need not stretch
@@ -252,7 +228,7 @@ def _loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> _Loss:
     by_motion = np.stack([on_platform(forces[:, k], slopes.levers).sum(axis=-1) for k in range(6)], axis=-1)
     at_frame = frame_end_forces(state)
     direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
-    return _Loss(
+    return (
         by_motion,
         on_platform(per_speed, slopes.levers),
         np.einsum("ia,ika->ik", direction, forces),

@@ -19,23 +19,14 @@ COUPLED: Final = 1.5  # of the same: losses couple modes up to there, those beyo
 BLOCK: Final = 128  # frequencies at once
 
 
-class FixedEndModes(NamedTuple):
-    """The cables of one state with both ends held.
-
-    Attributes:
-        components: Their motions.
-        lost: What the loss in their stretch takes, as of `stretch_of_motions`; None if it takes nothing.
-    """
-
-    components: Components
-    lost: Array | None
+FixedEndModes: TypeAlias = tuple[Components, Array | None]  # of one state; loss matrices of their stretch, if any
 
 
 class Receptance(NamedTuple):
     """Receptance of the platform.
 
     Attributes:
-        setting: Of one state, with a leading axis 1.
+        model: Of one state, with a leading axis 1.
         matrix: Stiffness of the platform, not symmetric where a moment is given, shape (6, 6).
         cables: That of the cables' platform ends, shape (m, 3, 3).
         damping: What takes energy out.
@@ -52,7 +43,7 @@ class Receptance(NamedTuple):
         Units: up_to [Hz].
         """
         components = component_modes(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
-        return FixedEndModes(components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None)
+        return components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None
 
     def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
         """The compliance by the modes of the cables, and that on massless cables.
@@ -139,7 +130,7 @@ def _driven_stiffness_with_loss(
 ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacement by force (F, 3, 3) at frequencies (F,)
 
 LIKELY: Final = 0.4  # of the strongest answer at a mode: those near whose modes a stronger one is looked for
-ROUNDS: Final = 2  # of looking more closely
+REFINEMENTS: Final = 2  # of looking more closely
 CLOSER: Final = 5  # frequencies between two
 WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # of half a peak, about a mode: where
 
@@ -184,7 +175,7 @@ def peak_receptance(
     likely = np.flatnonzero(sizes[1:] >= LIKELY * sizes.max())
     near = natural[likely, None] * (1.0 + ratios[likely, None] * WIDTHS)
     frequency = np.unique(np.concatenate((around[:1], near.ravel())))
-    for _ in range(ROUNDS):
+    for _ in range(REFINEMENTS):
         found = receptance(frequency)
         norms = np.sqrt(np.linalg.eigvalsh(np.swapaxes(found.conj(), -1, -2) @ found)[:, -1])
         best = int(np.argmax(norms))

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
-from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_lengths, one_state
+from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_lengths, check_model, single_state
 from sagline.dynamics.vibration.receptance import LOWEST, Receptance
 from sagline.dynamics.vibration.robot_modes import check_mode_count, massless_modes, modes_below, vibration_model
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
@@ -86,7 +86,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     Source:
         docs/model.md, section 11.
     """
-    one_state(state)
+    check_model(single_state(state))
     given = checked(frequency, "frequency", "Hz", low=0.0)
     if given.ndim != 1 or not given.size:
         raise InvalidValueError("frequency", f"of shape {given.shape}", "a list of frequencies", "Give one or more.")

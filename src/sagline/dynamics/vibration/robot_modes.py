@@ -175,8 +175,8 @@ def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
     found = np.empty((1, 1, taut.size, collocation.FOUND))
     counts = np.empty((1, 1, taut.size, 2), dtype=np.int64)
     table = np.ascontiguousarray(model.strings.table[row : row + 1, taut])
-    room = np.empty(collocation.ROOM)
-    dynamic_stiffnesses(table, undamped(given[None]), COUNTING, room, found, counts)
+    work = np.empty(collocation.ROOM)
+    dynamic_stiffnesses(table, undamped(given[None]), COUNTING, work, found, counts)
     check_counts(counts, given)
     moving = np.zeros((model.strings.taut.shape[1], 3, 3))
     moving[taut] = in_world(found[0], model.strings.axes[row, taut])[0].real

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.dynamics.trajectories.segments import RestToRestSegment, segments_of
 from sagline.dynamics.vibration.component_modes import cable_shapes
-from sagline.dynamics.vibration.dynamic_stiffness import Damping, one_state
+from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_model, single_state
 from sagline.dynamics.vibration.robot_modes import (
     cable_shares,
     damping_ratios,
@@ -190,55 +190,38 @@ def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = Non
     Source:
         docs/model.md, section 11.
     """
-    one_state(state)
+    check_model(single_state(state))
     limit = number(up_to, "up_to", "Hz", above=0.0)
     given = optional(damping, Damping, "damping") or Damping()
     model = vibration_model(state)
-    slack = tuple(int(i) for i in np.flatnonzero(~model.strings.taut[0]))
-    known: dict[str, Any] = {
-        "state": state,
-        "up_to": limit,
-        "damping": given,
-        "massless_frequency": locked(np.full(len(model.freedom), np.nan)),
-        "slack_cables": slack,
+    slack: tuple[int, ...] = tuple(int(i) for i in np.flatnonzero(~model.strings.taut[0]))
+    cables, none = state.cables.shape[-1], np.empty(0)
+    arrays = {  # without modes
+        "massless_frequency": np.full(len(model.freedom), np.nan),
+        "negative_directions": np.empty((6, 0)),
+        **{"frequency": none, "platform_share": none, "loss": none, "shape": np.empty((6, 0))},
+        **{"cable_share": np.empty((cables, 0)), "cable_shape": np.empty((0, cables, POINTS, 3))},
     }
+    status, count = VibrationStatus.NO_LENGTHS, 0
     if np.isnan(model.stiffness).any():
-        return _without_modes(known | {"slack_cables": ()}, VibrationStatus.NO_LENGTHS, np.empty((6, 0)))
-    frequency, leaving = massless_modes(model, 0)
-    known["massless_frequency"] = locked(frequency)
-    if leaving.shape[1]:
-        return _without_modes(known, VibrationStatus.UNSTABLE, leaving)
-    found = state_modes(model, 0, limit)
-    shares = cable_shares(model, 0, found)
-    return Vibration(
-        **known,
-        status=VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED,
-        frequency=locked(found.frequency),
-        shape=locked(found.platform),
-        platform_share=locked(1.0 - shares.sum(axis=0)),
-        cable_share=locked(shares),
-        cable_shape=locked(cable_shapes(found.components, found.ends, found.amplitudes, POINTS)),
-        loss=locked(damping_ratios(state.one_robot.cables.linear_density, found, shares, given)),
-        count=found.number,
-        negative_directions=locked(leaving),
-    )
-
-
-def _without_modes(known: dict[str, Any], status: VibrationStatus, leaving: Array) -> Vibration:
-    """The answer without modes."""
-    cables = known["state"].cables.shape[-1]
-    return Vibration(
-        **known,
-        status=status,
-        frequency=locked(np.empty(0)),
-        shape=locked(np.empty((6, 0))),
-        platform_share=locked(np.empty(0)),
-        cable_share=locked(np.empty((cables, 0))),
-        cable_shape=locked(np.empty((0, cables, POINTS, 3))),
-        loss=locked(np.empty(0)),
-        count=0,
-        negative_directions=locked(leaving),
-    )
+        slack = ()
+    else:
+        status = VibrationStatus.UNSTABLE
+        arrays["massless_frequency"], arrays["negative_directions"] = massless_modes(model, 0)
+        if not arrays["negative_directions"].shape[1]:
+            status = VibrationStatus.FOLDED if slack else VibrationStatus.SOLVED
+            found = state_modes(model, 0, limit)
+            shares, count = cable_shares(model, 0, found), found.number
+            arrays |= {
+                "frequency": found.frequency,
+                "shape": found.platform,
+                "platform_share": np.asarray(1.0 - shares.sum(axis=0)),
+                "cable_share": shares,
+                "cable_shape": cable_shapes(found.components, found.ends, found.amplitudes, POINTS),
+                "loss": damping_ratios(state.one_robot.cables.linear_density, found, shares, given),
+            }
+    kept = {name: locked(array) for name, array in arrays.items()}
+    return Vibration(state=state, up_to=limit, damping=given, status=status, count=count, slack_cables=slack, **kept)
 
 
 def to_shape(modes: Modes | Vibration, path: Path) -> Array:
