@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, TypeAlias
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -15,21 +15,26 @@ from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.reading import exists
 from sagline.files.robot_xml import (
-    STEEL_ROPE_DENSITY,
-    STEEL_ROPE_STIFFNESS,
     Imported,
+    cables_of_file,
     number,
     numbers,
     only_child,
     read_xml,
+    vertical_axis,
     with_losses,
 )
 from sagline.robot.pattern import MotionPattern
 from sagline.robot.robot import Robot
-from sagline.robot.winch import UPRIGHT, Winch
+from sagline.robot.winch import Winch
 
+_Vector: TypeAlias = tuple[float, float, float]
+_COLUMNS: Final = (
+    *("frame_anchors", "platform_anchors", "tension_min", "tension_max"),
+    *("axial_stiffness", "pulley_radius", "swivel_axis"),
+)
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-_JOINTS: Final[dict[str, tuple[MotionPattern, tuple[float, float, float] | None]]] = {
+_JOINTS: Final[dict[str, tuple[MotionPattern, _Vector | None]]] = {
     "SPATIAL": ("3R3T", None),
     "SPATIAL_EULER_XYZ": ("3R3T", None),
     "SPATIAL_QUATERNION": ("3R3T", None),
@@ -71,38 +76,26 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
     bodies, cables_file = _files(file_path(source, "source", folder=True))
     at = bodies
     try:
-        platform = _platform(read_xml(bodies))
+        platform, lost = _platform(read_xml(bodies))
         at = cables_file
-        chosen, lost_sets = _select_set(read_xml(cables_file), cable_set)
-        legs, lost_cables = _legs(chosen, platform.center_of_mass)
-        lost = (*platform.lost, *lost_sets, *lost_cables)
-        robot = _robot(bodies.stem.removesuffix("_bodies"), platform, legs, cables)
+        chosen = _select_set(read_xml(cables_file), cable_set, lost)
+        columns = _columns(chosen, platform["center_of_mass"], lost)
+        stiffness, radii, axes = (columns.pop(name) for name in ("axial_stiffness", "pulley_radius", "swivel_axis"))
+        assumed: dict[str, str] = {}
+        if cables is None:
+            cables = cables_of_file([None] * len(stiffness), stiffness, "CASPR", assumed)
+        robot = Robot(
+            bodies.stem.removesuffix("_bodies"),
+            cables=cables,
+            winches=Winch(radii, swivel_axis=axes) if any(radii) else None,
+            source="CASPR files",
+            assumed=assumed,
+            **columns,
+            **platform,
+        )
     except InvalidValueError as error:
         raise FileError.of(at, error) from None
-    return with_losses(robot, lost)
-
-
-class _Platform(NamedTuple):
-    joint: str
-    mass: float
-    center_of_mass: Array
-    inertia: Array
-    lost: tuple[str, ...]
-
-
-class _Pulley(NamedTuple):
-    radius: float = 0.0
-    swivel_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    unlike: str = ""  # what keeps it from being one of ours
-
-
-class _Leg(NamedTuple):
-    frame_anchor: Array
-    platform_anchor: Array
-    tension_min: float
-    tension_max: float
-    axial_stiffness: float  # NaN where the file gives none
-    pulley: _Pulley
+    return with_losses(robot, tuple(lost))
 
 
 def _files(source: Path) -> tuple[Path, Path]:
@@ -135,7 +128,8 @@ def _kind(root: Element) -> str | None:
     return "bodies" if root.find(".//link_rigid") is not None else None
 
 
-def _platform(root: Element) -> _Platform:
+def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
+    """Fields of the robot in the file of bodies, and what is lost of it."""
     links = root.findall(".//link_rigid")
     if len(links) != 1:
         raise InvalidValueError("number of <link_rigid>", len(links), "1", "sagline moves a single platform.")
@@ -147,7 +141,10 @@ def _platform(root: Element) -> _Platform:
     mass = number(physical.findtext("mass"), "mass", "kg")
     center = numbers(physical.findtext("com_location"), 3, "com_location", "m")
     inertia = _inertia(only_child(physical, "inertia", "physical"), mass, center)
-    return _Platform(joint, mass, center, inertia, _lost_of_link(root, link))
+    fields: dict[str, Any] = {"mass": mass, "inertia": inertia, "center_of_mass": center}
+    return fields | dict(zip(("motion_pattern", "plane_normal"), _JOINTS[joint], strict=True)), _lost_of_link(
+        root, link
+    )
 
 
 def _inertia(element: Element, mass: float, center: Array) -> Array:
@@ -164,7 +161,7 @@ def _inertia(element: Element, mass: float, center: Array) -> Array:
     return matrix
 
 
-def _lost_of_link(root: Element, link: Element) -> tuple[str, ...]:
+def _lost_of_link(root: Element, link: Element) -> list[str]:
     lost = []
     location = link.findtext("parent/location", "0 0 0")
     if numbers(location, 3, "parent: location", "m").any():
@@ -181,20 +178,22 @@ def _lost_of_link(root: Element, link: Element) -> tuple[str, ...]:
         lost.append(f"The joint's {', '.join(limits)}.")
     if root.find(".//operational_set") is not None:
         lost.append("The operational spaces.")
-    return tuple(lost)
+    return lost
 
 
-def _select_set(root: Element, wanted: str | None) -> tuple[Element, tuple[str, ...]]:
+def _select_set(root: Element, wanted: str | None, lost: list[str]) -> Element:
     sets = {element.get("id", ""): element for element in root.findall("cable_set")}
     name = root.get("default_cable_set", "") if wanted is None else wanted
     if name not in sets:
         raise InvalidValueError("cable set", repr(name), ", ".join(map(repr, sets)) or "none", "Choose one of these.")
-    others = [other for other in sets if other != name]
-    return sets[name], (f"The other sets of cables: {', '.join(others)}.",) if others else ()
+    if others := [other for other in sets if other != name]:
+        lost.append(f"The other sets of cables: {', '.join(others)}.")
+    return sets[name]
 
 
-def _legs(chosen: Element, center: Array) -> tuple[list[_Leg], tuple[str, ...]]:
-    legs, lost = [], []
+def _columns(chosen: Element, center: Array, lost: list[str]) -> dict[str, Any]:
+    """Numbers of the cables of a set, by name."""
+    rows = []
     for k, element in enumerate(chosen):
         item = f"{element.tag} {element.get('name') or k}"
         if not element.tag.startswith("cable_") or "passive" in element.tag:
@@ -202,24 +201,23 @@ def _legs(chosen: Element, center: Array) -> tuple[list[_Leg], tuple[str, ...]]:
             continue
         if element.tag not in ("cable_ideal", "cable_linear_spring"):
             lost.append(f"{item}: its law of stiffness; only its ends and its limits are taken.")
-        legs.append(_leg(element, item, center))
-        if unlike := legs[-1].pulley.unlike:
-            lost.append(f"{item}: its pulley, {unlike}; the cable starts at the pulley's fixed point.")
-    return legs, tuple(lost)
+        rows.append(_row(element, item, center, lost))
+    return {name: [row[k] for row in rows] for k, name in enumerate(_COLUMNS)}
 
 
-def _leg(element: Element, item: str, center: Array) -> _Leg:
+def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[Any, ...]:
+    """Numbers of a cable in the order of `_COLUMNS`; the axial stiffness is None where the file gives none."""
     ends = list(only_child(element, "attachments", item))
     if len(ends) != 2:
         raise InvalidValueError(f"{item}: number of attachments", len(ends), "2", "sagline's cables are not routed.")
     points: dict[str, Array] = {}
-    pulley = _Pulley()
+    pulley = 0.0, _Z
     for end in ends:
         link = (end.findtext("link") or "0").strip()
         place = end.findtext("location") or end.findtext("fixed_location")
         points[link] = numbers(place, 3, f"{item}: location on link {link}", "m")
         if end.tag != "attachment":
-            pulley = _pulley(end, link, item)
+            pulley = _pulley(end, link, item, lost)
     if set(points) != {"0", "1"}:
         raise InvalidValueError(f"{item}: links", ", ".join(points), "0, 1", "A cable joins base and platform.")
     if element.get("attachment_reference") == "com":
@@ -229,47 +227,22 @@ def _leg(element: Element, item: str, center: Array) -> _Leg:
     )
     # CASPR divides K by the cable's length: it is an axial stiffness in N
     stiffness = element.findtext("properties/K") if element.tag == "cable_linear_spring" else None
-    known = float("nan") if stiffness is None else number(stiffness, f"{item}: K", "N")
-    return _Leg(points["0"], points["1"], low, high, known, pulley)
+    known = None if stiffness is None else number(stiffness, f"{item}: K", "N")
+    return points["0"], points["1"], low, high, known, *pulley
 
 
-def _pulley(end: Element, link: str, item: str) -> _Pulley:
-    """The pulley at an end of a cable; CASPR's turns about the direction in which the cable enters it, as ours do."""
+def _pulley(end: Element, link: str, item: str, lost: list[str]) -> tuple[float, _Vector]:
+    """Radius and swivel axis at an end of a cable: the direction in which the cable enters the pulley, as in CASPR."""
     if end.tag != "attachment_base_pulley" or link != "0":
-        return _Pulley(unlike=f"of a kind unknown here, <{end.tag}>")
-    if end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:
-        return _Pulley(unlike="without pulley_radius and cable_entry_vector")
-    radius = number(end.findtext("pulley_radius"), f"{item}: pulley_radius", "m")
-    entry = numbers(end.findtext("cable_entry_vector"), 3, f"{item}: cable_entry_vector", "")
-    if not entry[2] or np.hypot(entry[0], entry[1]) > UPRIGHT * abs(entry[2]):
-        return _Pulley(unlike="that is not entered vertically")
-    return _Pulley(radius, (0.0, 0.0, float(np.sign(entry[2]))))
-
-
-def _robot(name: str, platform: _Platform, legs: list[_Leg], cables: Cable | None) -> Robot:
-    pattern, normal = _JOINTS[platform.joint]
-    stiffness = np.array([leg.axial_stiffness for leg in legs])
-    unknown = np.isnan(stiffness)
-    assumed = {}
-    if cables is None:
-        cables = Cable(STEEL_ROPE_DENSITY, np.where(unknown, STEEL_ROPE_STIFFNESS, stiffness))
-        what = "linear density and axial stiffness" if unknown.any() else "linear density"
-        assumed["cables"] = f"{what} of a 4 mm steel rope; the CASPR file gives none"
-    radii = [leg.pulley.radius for leg in legs]
-    axes = [leg.pulley.swivel_axis for leg in legs]
-    return Robot(
-        name,
-        [leg.frame_anchor for leg in legs],
-        [leg.platform_anchor for leg in legs],
-        cables,
-        platform.mass,
-        platform.inertia,
-        winches=Winch(radii, swivel_axis=axes) if any(radii) else None,
-        center_of_mass=platform.center_of_mass,
-        motion_pattern=pattern,
-        plane_normal=normal,
-        tension_min=[leg.tension_min for leg in legs],
-        tension_max=[leg.tension_max for leg in legs],
-        source="CASPR files",
-        assumed=assumed,
-    )
+        unlike = f"of a kind unknown here, <{end.tag}>"
+    elif end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:
+        unlike = "without pulley_radius and cable_entry_vector"
+    else:
+        radius = number(end.findtext("pulley_radius"), f"{item}: pulley_radius", "m")
+        entry = numbers(end.findtext("cable_entry_vector"), 3, f"{item}: cable_entry_vector", "")
+        axis = vertical_axis(float(np.hypot(entry[0], entry[1])), float(entry[2]))
+        if axis is not None:
+            return radius, axis
+        unlike = "that is not entered vertically"
+    lost.append(f"{item}: its pulley, {unlike}; the cable starts at the pulley's fixed point.")
+    return 0.0, _Z

@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import codecs
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import Final, NoReturn, TypeAlias
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 import numpy as np
 
+from sagline.cables.cable import Cable
 from sagline.core.arrays import Array, locked
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import plain_number, within_reach
 from sagline.files.reading import error_at_line, read_bytes
 from sagline.robot.robot import Robot
+from sagline.robot.winch import UPRIGHT
 
+Column: TypeAlias = Sequence[float | None]  # a number for each cable, None where the file gives none
 _LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
 _ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
 
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)""")
 _CUT_OFF: Final = (3, 4, 5, 6, 20)  # expat: no element found, a token, character or section that does not end
 # Where a file gives no material: a 4 mm steel rope, as assumed for the preset cogiro.
-STEEL_ROPE_DENSITY: Final = 0.065  # kg/m
-STEEL_ROPE_STIFFNESS: Final = 700e3  # N
+_STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # kg/m, N
 
 
 def read_xml(path: Path) -> Element:
@@ -74,6 +77,22 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
             f"{item}: number of <{tag}>", len(found), "1", f"Check that the file is whole, then correct {item}."
         )
     return found[0]
+
+
+def cables_of_file(
+    density: Column, stiffness: Column, tool: str, assumed: dict[str, str], diameter: Sequence[float] | None = None
+) -> Cable:
+    """Cables of a file; what is None becomes that of a 4 mm steel rope, which `assumed` then says."""
+    given = dict(zip(_STEEL_ROPE, (density, stiffness), strict=True))
+    if missing := [name for name, values in given.items() if None in values]:
+        assumed["cables"] = f"{' and '.join(missing)} of a 4 mm steel rope; the {tool} file gives none"
+    columns = ([_STEEL_ROPE[name] if value is None else value for value in values] for name, values in given.items())
+    return Cable(*columns, diameter=diameter)
+
+
+def vertical_axis(sideways: float, up: float) -> tuple[float, float, float] | None:
+    """Swivel axis up or down, by the horizontal and the vertical part of a direction; None if it is not vertical."""
+    return None if not up or sideways > UPRIGHT * abs(up) else (0.0, 0.0, float(np.sign(up)))
 
 
 def _cause(error: Exception, data: bytes) -> tuple[str, str]:

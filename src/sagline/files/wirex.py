@@ -15,18 +15,18 @@ from sagline.core.arguments import file_path, optional
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.robot_xml import (
-    STEEL_ROPE_DENSITY,
-    STEEL_ROPE_STIFFNESS,
     Imported,
+    cables_of_file,
     number,
     only_child,
     read_xml,
+    vertical_axis,
     with_losses,
 )
 from sagline.robot.inertia import box_inertia
 from sagline.robot.pattern import MOTION_PATTERNS, PLANAR, ROTATING, MotionPattern
 from sagline.robot.robot import Robot
-from sagline.robot.winch import UPRIGHT, Winch
+from sagline.robot.winch import Winch
 
 _AXES: Final = ("x", "y", "z")
 _FLATTEST: Final = 0.1  # least edge of the assumed box over its largest: anchors may lie in a plane, a body does not
@@ -146,28 +146,19 @@ def _material(root: Element, chain: Element, k: int) -> Element:
 
 
 def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
-    density, stiffness, diameter = [], [], []
+    density: list[float | None] = []
+    stiffness: list[float | None] = []
+    diameter: list[float] = []
     for element in materials:
         item = f"cable {element.get('name', '')}".strip()
         modulus = _optional(element, "elasticity", item, "Pa")
         radius = _optional(element, "radius", item, "m")
         if radius is not None and radius < 0.0:
             raise InvalidValueError(f"{item}: radius", f"{radius:g} m", ">= 0 m", "Correct it in the file.")
-        density.append(_optional(element, "weight", item, "kg/m"))
-        stiffness.append(None if not modulus or not radius else modulus * np.pi * radius**2)
+        density.append(_optional(element, "weight", item, "kg/m") or None)  # zero is no material either
+        stiffness.append((modulus or 0.0) * np.pi * (radius or 0.0) ** 2 or None)
         diameter.append(2.0 * (radius or 0.0))
-    missing = [
-        word
-        for word, values in (("linear density", density), ("axial stiffness", stiffness))
-        if not all(values)  # zero is no material either
-    ]
-    if missing:
-        assumed["cables"] = f"{' and '.join(missing)} of a 4 mm steel rope; the WireX file gives none"
-    return Cable(
-        [value or STEEL_ROPE_DENSITY for value in density],
-        [value or STEEL_ROPE_STIFFNESS for value in stiffness],
-        diameter=diameter if all(diameter) else None,
-    )
+    return cables_of_file(density, stiffness, "WireX", assumed, diameter if all(diameter) else None)
 
 
 def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
@@ -203,16 +194,13 @@ def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
     upright = _required(base, "a33", item, "")
     # of a rotation: where z stays vertical, the last row is as bare as the last column, whichever of them is z
     sideways = max(abs(_optional(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
-    return None if sideways > UPRIGHT * abs(upright) or not upright else (0.0, 0.0, float(np.sign(upright)))
+    return vertical_axis(sideways, upright)
 
 
 def _drive(winch: Element) -> dict[str, float]:
     """Drum and motor; a zero is how a file says that it does not know."""
     drum, motor = winch.find("drum"), winch.find("motor")
-    width, grooves = (
-        _optional(drum, "l_drum", "winch: drum", "m"),
-        _optional(drum, "nr_groove", "winch: drum", ""),
-    )
+    width, grooves = (_optional(drum, key, "winch: drum", unit) for key, unit in (("l_drum", "m"), ("nr_groove", "")))
     fields = {
         "drum_radius": _optional(drum, "r_drum", "winch: drum", "m"),
         "drum_width": width,
@@ -224,14 +212,12 @@ def _drive(winch: Element) -> dict[str, float]:
 
 def _pattern(robot: Element, assumed: dict[str, str]) -> MotionPattern:
     given = robot.get("motionpattern") or "3R3T"
-    for pattern in get_args(MotionPattern):
-        if pattern == given:
-            if pattern in PLANAR:
-                assumed["plane_normal"] = "z: the file names no plane; taken as that of x and y"
-            return cast(MotionPattern, pattern)
-    raise InvalidValueError(
-        "motionpattern", repr(given), ", ".join(MOTION_PATTERNS), "sagline has no other; correct it in the file."
-    )
+    if given not in get_args(MotionPattern):
+        step = "sagline has no other; correct it in the file."
+        raise InvalidValueError("motionpattern", repr(given), ", ".join(MOTION_PATTERNS), step)
+    if given in PLANAR:
+        assumed["plane_normal"] = "z: the file names no plane; taken as that of x and y"
+    return cast(MotionPattern, given)
 
 
 def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) -> tuple[list[float], list[float]]:
@@ -241,13 +227,10 @@ def _limits(root: Element, materials: list[Element], assumed: dict[str, str]) ->
     winch = _optional(root.find("winch/cable"), "f_max", "winch: cable", "N") or None
     if None in low:
         assumed["tension_min"] = "0 N; the WireX file gives none"
-    if winch is None:
-        known = None not in break_at
-        assumed["tension_max"] = (
-            "the breaking load; the WireX file gives no winch"
-            if known
-            else "none; the WireX file gives neither winch nor breaking load"
-        )
+    if winch is None and None in break_at:
+        assumed["tension_max"] = "none; the WireX file gives neither winch nor breaking load"
+    elif winch is None:
+        assumed["tension_max"] = "the breaking load; the WireX file gives no winch"
     return [value or 0.0 for value in low], [winch or load or np.inf for load in break_at]
 
 

@@ -146,7 +146,13 @@ class ChainPlant(Plant):
         capacity = int(np.ceil(np.maximum(longest, nodes)).max()) + SPARE
         place = np.zeros((m, 3, capacity))
         place[:, :, : nodes + 1] = rest.place
-        self._chains = [table, place, np.zeros_like(place), np.zeros((m, capacity)), np.full(m, nodes - 1, dtype=np.int64)]
+        self._chains = [
+            table,
+            place,
+            np.zeros_like(place),
+            np.zeros((m, capacity)),
+            np.full(m, nodes - 1, dtype=np.int64),
+        ]
         self._stock = np.full(2, np.nan)
         self._travel = nodes * table[:, c.ELEMENT] * np.sqrt(table[:, c.DENSITY] / table[:, c.STIFFNESS])
         self._ends = (robot.platform_anchors - robot.center_of_mass) @ self.axes
