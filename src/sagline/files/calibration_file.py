@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -23,14 +22,14 @@ from sagline.files.format import Format
 from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.variables import (
-    NONE,
     SOMEWHERE,
     STEP,
     Quantity,
     check_indices,
     check_variables,
+    fields_of,
     record_variables,
-    values_of,
+    records_of,
     variables_of,
 )
 from sagline.kernels.calibration.kinds import KIND_ROWS
@@ -96,7 +95,7 @@ LEFT_OUT: Final = (
 )
 OUTLIERS: Final = (
     Quantity("outlier_row", ("outlier",), "", "row of the log", "row", values=int),
-    Quantity("outlier_cable", ("outlier",), "", "its cable, -1 for the whole pose", "cable", values=int),
+    Quantity("outlier_cable", ("outlier",), "", "its cable, -1 for the whole pose", "cable", SOMEWHERE, values=int),
     Quantity("outlier_quantity", ("outlier",), "", "what does not fit", "quantity", values=str),
     Quantity("outlier_size", ("outlier",), "", "by how much [m, N or rad]", "size"),
     Quantity("outlier_deviations", ("outlier",), "1", "the same in standard deviations", "deviations"),
@@ -115,17 +114,15 @@ CROSS_VALIDATION: Final = (
 )
 
 
-def directions(group: str) -> tuple[Quantity, ...]:
-    """Quantities of the directions in parameter space that are unobservable or weakly observable."""
-    return (
+DIRECTIONS: Final = {  # in parameter space that are unobservable or weakly observable
+    group: (
         Quantity(f"{group}_name", (group,), "", "what each is", "name", values=str),
         Quantity(f"{group}_vector", (group, *P), "", "combination of the numbers, in their units", "vector"),
         Quantity(f"{group}_known", (group,), "1", "share of its prior deviation that is left", "known", low=0.0),
         Quantity(f"{group}_step", (group,), "", "what to do about it", "step", values=str),
     )
-
-
-DIRECTIONS: Final = {group: directions(group) for group in ("gauge", "cannot_tell_apart")}
+    for group in ("gauge", "cannot_tell_apart")
+}
 
 
 def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
@@ -230,50 +227,30 @@ def unpack(path: Path, data: Dataset) -> Calibration:
     measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # which is always there
     sensors = [_sensor(name, data.variables[name].ndim) for name in dict.fromkeys(measured)]
     _check_calibration(data, robot, before, sensors)
-    values = partial(values_of, data)
-
-    def number(quantity: Quantity) -> Any:
-        return data[quantity.name].values.item()
-
-    whole = {one.place: values(one.name) if one.parts else number(one) for one in FOUND if "." not in one.place}
-    units = [unit if unit != "1" else "" for unit in values("parameter_unit")]
-    texts = {"names": values("parameter_name"), "labels": values("parameter_label"), "units": units}
-    numbers: dict[str, Any] = {one.place: values(one.name) for one in PARAMETERS if one.values is not str}
-    rows, reasons = values("left_out_row"), values("left_out_reason")
+    found, numbers, placed = (fields_of(data, each) for each in (FOUND, PARAMETERS, (*PLACED, *sensors)))
+    found |= {one.place: data[one.name].values.item() for one in FOUND if not one.parts}
+    texts: dict[str, Any] = {name: tuple(numbers.pop(name).tolist()) for name in ("names", "labels", "units")}
+    texts["units"] = tuple("" if unit == "1" else unit for unit in texts["units"])
     omissions = [Omission[name.upper()] for name in data.attrs["left_out"].split()]
-    checked = {one.place: number(one) for one in CROSS_VALIDATION if "folds" in data.variables}
+    rows, reasons = (data[one.name].values for one in LEFT_OUT)
+    checked = {one.place: data[one.name].values.item() for one in CROSS_VALIDATION if "folds" in data.variables}
+    directions: dict[str, Any] = {
+        name: tuple(Direction(**row) for row in records_of(data, columns)) for name, columns in DIRECTIONS.items()
+    }
     return Calibration(
         robot=robot,
         before=before,
-        sensors=Sensors(
-            **{one.name: values(one.name) for one in sensors},
-            frame=Pose._adopt(values("measuring_position"), values("measuring_quaternion")),
-            target=values("target"),
-        ),
-        parameters=Parameters(
-            **numbers | {name: tuple(map(str, text)) for name, text in texts.items()},
-            counted=READ.index(data.attrs["read"]) == 1,
-        ),
-        **{**whole, "status": CalibrationStatus(whole["status"])},
-        poses=Pose._adopt(values("position"), values("quaternion")),
+        sensors=Sensors(**placed | {"frame": Pose._adopt(**placed["frame"])}),
+        parameters=Parameters(**numbers, **texts, counted=READ.index(data.attrs["read"]) == 1),
+        **found | {"status": CalibrationStatus(found["status"]), "poses": Pose._adopt(**found["poses"])},
         left_out={reason: locked(rows[reasons == reason.value]) for reason in omissions},
-        outliers=tuple(_outlier(*row) for row in zip(*(values(one.name).tolist() for one in OUTLIERS), strict=True)),
+        outliers=tuple(Outlier(**row) for row in records_of(data, OUTLIERS)),
         cross_validation=CrossValidation(**checked) if checked else None,
-        gauge=_directions(*(values(one.name) for one in DIRECTIONS["gauge"])),
-        cannot_tell_apart=_directions(*(values(one.name) for one in DIRECTIONS["cannot_tell_apart"])),
+        **directions,
         model=choice_of(path, data.attrs, "model", MODELS),
         log=str(data.attrs["log"]),
         date=str(data.attrs["date"]),
     )
-
-
-def _outlier(row: int, cable: int, quantity: str, size: float, deviations: float) -> Outlier:
-    return Outlier(row, None if cable == NONE else cable, quantity, size, deviations)
-
-
-def _directions(names: Any, vectors: Any, known: Any, steps: Any) -> tuple[Direction, ...]:
-    rows = zip(names, vectors, known.tolist(), steps, strict=True)
-    return tuple(Direction(str(name), locked(vector.copy()), share, str(step)) for name, vector, share, step in rows)
 
 
 FORMAT: Final = Format(

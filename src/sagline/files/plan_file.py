@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import fields
-from functools import partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +15,16 @@ from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.format import Format
 from sagline.files.netcdf import choice_attributes, choice_of, index_coordinate, labeled_dataset, robot_of
 from sagline.files.robot_file import dump_robot
-from sagline.files.variables import SOLVED, SOMEWHERE, STEP, Quantity, check_variables, values_of, variables_of
+from sagline.files.variables import (
+    SOLVED,
+    SOMEWHERE,
+    STEP,
+    Quantity,
+    check_variables,
+    fields_of,
+    values_of,
+    variables_of,
+)
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
@@ -164,8 +171,6 @@ MOTION = (
 # of a path whose jerk is known
 JERK = Quantity("jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate", "path.jerk")
 RESTS = "rests"  # of a path whose rests are known
-FREE = {"unstrained_length": "free_length", "chord_tension": "free_chord_tension"}  # of cables over pulleys
-STATE_ARRAYS = ("span", "rise", "unstrained_length", "horizontal_tension", "vertical_force", "chord_tension")
 
 
 def _check_plan(data: Dataset, cables: int) -> None:
@@ -269,35 +274,32 @@ def plan_of(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     """Plan of a data set that `plan_dataset` made; file and name of the robot are for messages."""
     robot = robot_of(path, data, item)
     _check_plan(data, robot.cable_count)
-    values = partial(values_of, data)
     behind = MACHINE[0].name in data.variables
     if behind != has_routing(robot):
         said, has = ("is", "none of its") if behind else ("is not", "some of its")
         raise FileError(path, f"{said} of cables over pulleys, but {has} robot's are", FORMAT.again)
-    pose = Pose.from_quaternion(values("position"), values("quaternion"))
+    found = fields_of(data, (*QUANTITIES, *MACHINE, WINDING, TIME, *MOTION, JERK))
+    state, motion = found["state"], found.get("path")
+    pose = Pose.from_quaternion(**state["pose"])
+    spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # over a pulley that of the free span
     cables = CableState(
         model=choice_of(path, data.attrs, "model", MODELS),
         cable=robot.cables,
         gravity=robot.gravity,
-        **{name: values(FREE.get(name, name) if behind else name) for name in STATE_ARRAYS},
-        status=values("cable_status"),
+        unstrained_length=found["free_length" if behind else "unstrained_length"],
+        **spans,
     )
     contact = None
     if behind:
-        contact = Contact(**{field.name: values(field.name) for field in fields(Contact) if field.name in data})
-    motion = None
-    if TIME.name in data.variables:
-        jerk, rests = (values(name) if name in data.variables else None for name in (JERK.name, RESTS))
-        motion = Path(values("time"), pose, values("twist"), values("twist_rate"), jerk, rests)
+        contact = Contact(wrap_angle=found["wrap_angle"], chord_tension=found["chord_tension"], **state["contact"])
+    if motion is not None:
+        motion = Path(pose=pose, **motion, rests=values_of(data, RESTS) if RESTS in data.variables else None)
     return Plan(
-        state=Equilibrium(robot, pose, values("wrench"), cables, contact),
+        state=Equilibrium(robot, pose, state["wrench"], cables, contact),
         path=motion,
         tension=choice_of(path, data.attrs, "tension", METHODS),
-        status=values("pose_status"),
-        shortfall=values("shortfall"),
-        wrench_residual=values("wrench_residual"),
-        blocking=values("blocking"),
-        **{quantity.name: values(quantity.name) for quantity in PROOF if quantity.name in data.variables},
+        **{name: found[name] for name in ("status", "shortfall", "wrench_residual", "blocking")},
+        **fields_of(data, PROOF),
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from functools import partial
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
@@ -24,8 +23,9 @@ from sagline.files.variables import (
     STEP,
     Quantity,
     check_variables,
+    fields_of,
     record_variables,
-    values_of,
+    records_of,
     variables_of,
 )
 from sagline.robot.pose import Pose
@@ -58,12 +58,11 @@ NODES: Final = Quantity(
 )
 # of each event, as attributes of an `Occurrence`
 EVENT: Final = ("event",)
+WHICH: Final = "which cable or winch, counted from 0; -1 for the platform"
 EVENTS: Final = (
     Quantity("event_time", EVENT, "s", "when it happened", "time"),
     Quantity("event_kind", EVENT, "", "what happened", "kind", values=str),
-    Quantity(
-        "event_cable", EVENT, "", "which cable or winch, counted from 0; -1 for the platform", "cable", values=int
-    ),
+    Quantity("event_cable", EVENT, "", WHICH, "cable", SOMEWHERE, values=int),
     Quantity("event_tension_before", EVENT, "N", "largest tension before it", "tension_before", SOMEWHERE, 0.0),
     Quantity("event_tension_after", EVENT, "N", "largest tension after it", "tension_after", SOMEWHERE, 0.0),
 )
@@ -232,31 +231,22 @@ def unpack(path: FilePath, data: Dataset) -> Simulation:
     """Simulation of a data set; its path is for messages."""
     robot = robot_of(path, data)
     _check_simulation(data, robot.cable_count)
-    values, winches = partial(values_of, data), data.attrs["winches"]
-    found = {quantity.place: values(quantity.name) for quantity in (TIME, *SAMPLES)}
-    energy = {place.removeprefix("energy."): found.pop(place) for place in list(found) if place.startswith("energy.")}
-    events = _occurrences(data) if _has_events(data) else ()
+    attributes, found = data.attrs, fields_of(data, (TIME, *SAMPLES, NODES, LARGEST))
+    winches: Any = attributes["winches"]
+    if winches == LAGGING:
+        winches = SecondOrder(**{name: float(attributes[name]) for name in LAG})
+    settings = {name: attributes[name] for name in ("cable_mass", "integrator", "winding")}
     return Simulation(
         robot=robot,
-        pose=Pose.from_quaternion(found.pop("pose.position"), found.pop("pose.quaternion")),
+        pose=Pose.from_quaternion(**found.pop("pose")),
+        energy=EnergyBalance(**found.pop("energy")),
+        events=tuple(Occurrence(**row) for row in records_of(data, EVENTS)) if _has_events(data) else (),
+        step=float(attributes["step"]),
+        winches=winches,
+        damping=Damping(**{name: float(attributes[name]) for name in LOSSES}),
+        **settings,
         **found,
-        energy=EnergyBalance(**energy),
-        events=events,
-        cable_mass=data.attrs["cable_mass"],
-        step=float(data.attrs["step"]),
-        nodes=values(NODES.name) if NODES.name in data.variables else None,
-        integrator=data.attrs["integrator"],
-        winches=SecondOrder(**{name: float(data.attrs[name]) for name in LAG}) if winches == LAGGING else winches,
-        winding=data.attrs["winding"],
-        damping=Damping(**{name: float(data.attrs[name]) for name in LOSSES}),
-        largest_tension=values(LARGEST.name) if LARGEST.name in data.variables else None,
     )
-
-
-def _occurrences(data: Dataset) -> tuple[Occurrence, ...]:
-    columns = {quantity.place: data.variables[quantity.name].values.tolist() for quantity in EVENTS}
-    columns["cable"] = [None if cable == NONE else cable for cable in columns["cable"]]
-    return tuple(Occurrence(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True))
 
 
 FORMAT: Final = Format(

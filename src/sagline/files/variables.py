@@ -49,7 +49,7 @@ class Quantity(NamedTuple):
         unit: Unit as the file states it; "" for a plain number.
         long_name: Description, in a reader's words.
         source: Dotted attribute of the result that holds the values; "" for that of the same name.
-        known: Poses at which it has values.
+        known: Poses at which it has values; a whole number of a record that is known SOMEWHERE is `NONE` elsewhere.
         low: Lowest value.
         infinite: Whether it may be infinite.
         codes: Status type of the codes it holds, if any.
@@ -100,8 +100,7 @@ def variables_of(result: Any, quantities: Iterable[Quantity], rows: tuple[str, .
     found: dict[str, Any] = {}
     for one in quantities:
         if (values := one.of(result)) is not None:
-            array = values if isinstance(values, np.ndarray) else np.asarray(values, dtype=one.type)
-            found[one.name] = ((*rows, *one.parts), array, one.attributes)
+            found[one.name] = ((*rows, *one.parts), np.asarray(values, dtype=one.type), one.attributes)
     return found
 
 
@@ -118,6 +117,31 @@ def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], wid
 def values_of(data: Dataset, name: str) -> Any:
     """Values of a variable, in C order and write-locked."""
     return locked(np.asarray(data[name].values, order="C"))
+
+
+def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
+    """Values of the quantities that a data set has, by attribute of the result; those of its parts are nested."""
+    found: dict[str, Any] = {}
+    for one in quantities:
+        if one.name in data.variables:
+            *parts, name = one.place.split(".")
+            branch = found
+            for part in parts:
+                branch = branch.setdefault(part, {})
+            branch[name] = values_of(data, one.name)
+    return found
+
+
+def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
+    """Records that `record_variables` wrote, by attribute; whole numbers that are known SOMEWHERE may be None."""
+    columns: dict[str, list[Any]] = {}
+    for one in quantities:
+        values = data[one.name].values
+        column = values.tolist() if values.ndim == 1 else [locked(row.copy()) for row in values]
+        if one.values is int and one.known is SOMEWHERE:
+            column = [None if value == NONE else value for value in column]
+        columns[one.place] = column
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def check_variables(

@@ -18,7 +18,7 @@ from sagline.core.arrays import locked, number
 from sagline.files.format import Format
 from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import Quantity, check_indices, check_variables, values_of, variables_of
+from sagline.files.variables import Quantity, check_indices, check_variables, fields_of, variables_of
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.pose import Pose, PoseBox
@@ -75,7 +75,6 @@ QUANTITIES: Final = (
         "wrenches.accelerations",
     ),
 )
-TYPES: Final[dict[str, Any]] = {"limiting": np.int8, "vertex_component": np.int32, "component_nodes": np.int32}
 
 
 UNITS = ("m³", "m²")
@@ -182,12 +181,8 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
 
 def pack(space: Workspace) -> Dataset:
     """Data set of a workspace."""
-    variables = variables_of(space, QUANTITIES)
-    for one in QUANTITIES:
-        if one.values is int:  # indices of any size are stored in 64 bits
-            variables[one.name] = one.parts, one.of(space).astype(np.int64), one.attributes
     attributes, obstacles = _criteria_attributes(space.criteria)
-    return labeled_dataset(variables | obstacles, _attributes(space) | attributes)
+    return labeled_dataset(variables_of(space, QUANTITIES) | obstacles, _attributes(space) | attributes)
 
 
 def _attributes(space: Workspace) -> dict[str, Any]:
@@ -218,20 +213,15 @@ def unpack(path: FilePath, data: Dataset) -> Workspace:
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     _check_workspace(data, robot.cable_count)
 
-    def values(name: str) -> Any:
-        found = values_of(data, name)
-        return locked(found.astype(TYPES[name])) if name in TYPES else found
-
-    attributes = data.attrs
-    loads, components = (
-        [one.name for one in QUANTITIES if one.place.startswith(part)] for part in ("wrenches.", "components.")
-    )
-    arm = attributes.get("moment_arm")
+    found, attributes = fields_of(data, QUANTITIES), data.attrs
+    found["limiting"] = locked(found["limiting"].astype(np.int8))
+    found["components"] |= {name: locked(found["components"][name].astype(np.int32)) for name in ("vertices", "nodes")}
+    arm, open_faces = attributes.get("moment_arm"), attributes["open_faces"]
     return Workspace(
         robot=robot,
         box=PoseBox(attributes["box_low"], attributes["box_high"], float(attributes["box_tilt"])),
-        wrenches=WrenchSet(*map(values, loads)),
-        orientations=Orientations._of(values("rotation"), attributes["need"]),
+        wrenches=WrenchSet(**found.pop("wrenches")),
+        orientations=Orientations._of(found.pop("orientations")["quaternion"], attributes["need"]),
         criteria=_criteria_of(path, data),
         model=choice_of(path, data.attrs, "model", MODELS),
         tension=choice_of(path, data.attrs, "tension", METHODS),
@@ -239,17 +229,11 @@ def unpack(path: FilePath, data: Dataset) -> Workspace:
         unit=attributes["volume_units"],
         volume=float(attributes["volume"]),
         volume_error=float(attributes["volume_error"]),
-        components=Components(*map(values, components)),
-        surface=Surface(values("vertex_position"), values("face")),
-        limiting=values("limiting"),
-        limiting_cable=values("limiting_cable"),
-        margin=values("margin"),
-        open_faces=tuple(attributes["open_faces"].split(", ")) if attributes["open_faces"] else (),
-        x=values("x"),
-        y=values("y"),
-        z=values("z"),
-        level=values("level"),
+        components=Components(**found.pop("components")),
+        surface=Surface(**found.pop("surface")),
+        open_faces=tuple(open_faces.split(", ")) if open_faces else (),
         nearest=_nearest(attributes["nearest"]) if "nearest" in attributes else None,
+        **found,
     )
 
 
