@@ -52,24 +52,10 @@ class Candidates(NamedTuple):
 def candidates_of(
     robot: Robot, model: CableModel, box: PoseBox, count: int, seed: int, progress: Progress | None = None
 ) -> Candidates:
-    """Feasible poses of a box, each with several sets of tensions near to corners of what is feasible there.
+    """Feasible poses of a box, at most `count`, each with several sets of tensions near corners of the feasible ones.
 
-    Of every two poses one is drawn evenly from the box, the other nearer to its faces and its largest tilt, where most
-    is told.
-
-    Args:
-        robot: The robot.
-        model: Cable model.
-        box: Where to look.
-        count: How many are wanted.
-        seed: Of all that is drawn.
-        progress: Told after each group of poses.
-
-    Returns:
-        At most `count` of them.
-
-    Raises:
-        InvalidValueError: If none is feasible; the message says why.
+    Every other pose is drawn evenly from the box, the rest nearer to its faces and largest tilt, where readings are
+    most informative. Refused with the reason if no pose is feasible.
     """
     rng = np.random.default_rng(seed)
     sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
@@ -187,17 +173,7 @@ _ROUNDING: Final = 1e-9  # of the largest distance
 
 
 def shortest_tour(places: Array) -> Indices:
-    """An order in which all places are visited once, on a short way that need not come back.
-
-    Args:
-        places: Shape (N, d), N >= 1.
-
-    Returns:
-        Indices of the places in that order, shape (N,).
-
-    Source:
-        Croes 1958, "A method for solving traveling-salesman problems" (2-opt).
-    """
+    """Indices (N,) of an order in which places (N, d) are visited once on a short open tour (2-opt, Croes 1958)."""
     count = len(places)
     apart = np.zeros((count + 1, count + 1))  # the last is nowhere: the way begins and ends there at no cost
     apart[:count, :count] = np.linalg.norm(places[:, None] - places[None], axis=-1)
@@ -210,12 +186,7 @@ def shortest_tour(places: Array) -> Indices:
 
 
 def length_of(places: Array, order: Indices) -> float:
-    """Length of a tour, in the unit of the places.
-
-    Args:
-        places: Shape (N, d).
-        order: Indices, shape (N,).
-    """
+    """Length of a tour through places (N, d) in an order (N,), in the unit of the places."""
     return float(np.linalg.norm(np.diff(places[order], axis=0), axis=-1).sum())
 
 

@@ -29,25 +29,13 @@ _FULLY: Final = 3  # changes of those that promise most which are tried to the e
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
-    """Likely mistakes in a log, in sentences with the next step; none for a consistent one.
+    """Likely mistakes in a log, in sentences with the next step; none for a consistent log.
 
-    First the sizes of readings: lengths and positions in mm, load cells in kN. Then whether some robot, nearly this
-    one, fits some two dozen of the rows. Where none does, the readings are changed, by one mistake at a time (columns
-    of two cables exchanged, those of encoders or load cells alone, an encoder that counts backward, zeros far off, load
-    cells that come up to five rows early or late), and the mistake is told without which a robot fits. What fits with
-    no change is not suspected, and what no single change mends is not either: the calibration says how badly it fits.
-    Zeros far off, and lengths instead of counts that go backward, are told where poses were commanded.
-
-    Args:
-        robot: The robot as it is believed to be.
-        log: The log, with all its rows.
-        model: Cable model with forces.
-
-    Returns:
-        Sentences.
-
-    Raises:
-        InvalidValueError: As of `screened`.
+    First the sizes of readings: lengths and positions in mm, load cells in kN. Then some two dozen rows are fit by a
+    robot similar to the given one. If none fits, the readings are changed by one mistake at a time: columns of two
+    cables exchanged (encoders, load cells or both), an encoder that counts backward, zeros far off, load cells up to
+    five rows early or late. The first mistake without which a robot fits is reported. Zeros far off, and lengths that
+    go backward, are found only where poses were commanded.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -61,12 +49,7 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> 
 
 
 def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
-    """Sentences about readings of the size that another unit would give them.
-
-    Args:
-        robot: The robot as it is believed to be.
-        log: The log, with all its rows.
-    """
+    """Sentences about readings of the size that another unit would give them; all rows of the log."""
     size = _extent(robot)
     if log.unstrained_length is not None and log.unstrained_length.size:
         typical = float(np.nanmedian(log.unstrained_length)) if not np.isnan(log.unstrained_length).all() else 0.0
@@ -110,13 +93,7 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
 
 
 def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) -> bool:
-    """True if some robot like this one reads what lengths and load cells say, whatever was measured.
-
-    Args:
-        robot: The robot as it is believed to be.
-        log: The rows that are fit.
-        model: Cable model with forces.
-    """
+    """True if a robot similar to this one fits lengths and load cells alone."""
     if log.load_cells is None or (log.position is None and log.rotation is None):
         return False
     own = log.replace(position=None, rotation=None)
@@ -124,13 +101,7 @@ def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) 
 
 
 def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> Iterator[str]:
-    """A sentence about measured poses that fit nowhere, though everything else does.
-
-    Args:
-        log: The rows that are fit.
-        left_out: Which of them the lengths put elsewhere than they were measured.
-        asked: Names of the unknowns.
-    """
+    """Sentence about measured poses (rows `left_out`) that disagree with the lengths while everything else fits."""
     measured = np.zeros(len(log), dtype=np.bool_)
     for read in (log.position, log.rotation):
         if read is not None:

@@ -39,16 +39,7 @@ def evaluate(
     source: str,
     validation: CrossValidation | None,
 ) -> Calibration:
-    """The result of a search.
-
-    Args:
-        problem: The problem.
-        found: How the search ended.
-        rows: Of the whole log, those that the problem has, (N,).
-        left_out: Why the others are not among them.
-        source: Where the log was read.
-        validation: How well poses are predicted that were left out, where it was asked for.
-    """
+    """Result of a search; `rows` of the log are those of the problem (N,), `left_out` the reasons for the others."""
     fit, kept, parameters = found.fit, found.kept, problem.parameters
     numbers, machine, normal = fit.state.numbers, fit.state.machine, fit.normal
     residuals, triangle = final_readings(problem, fit)
@@ -106,13 +97,7 @@ def _status(found: SearchResult, chi_squared: float, freedoms: int) -> Calibrati
 
 
 def final_readings(problem: Problem, fit: Fit) -> tuple[Array, Array]:
-    """Residuals and slopes of all readings at the end of a search.
-
-    Returns:
-        Readings less predictions: lengths, load cells, position, rotation [m, N, m, rad], (N, 2 m + 6), NaN where
-        nothing was read; and the triangular factor of the whitened slopes by the internal parameters, poses weighted,
-        (at most P, P).
-    """
+    """Residuals (N, 2 m + 6) [m, N, m, rad], NaN for none, and triangular factor of the weighted whitened slopes."""
     state, residuals = fit.state, []
     triangle = np.zeros((0, len(state.numbers)))
     for part in blocks(len(state.poses), BLOCK):
@@ -124,15 +109,7 @@ def final_readings(problem: Problem, fit: Fit) -> tuple[Array, Array]:
 
 
 def covariance_of(problem: Problem, triangle: Array, slopes: Array) -> tuple[Array, int]:
-    """Covariance of the values, (P, P), and its rank.
-
-    The diagonal is infinite for values with neither observations nor a prior.
-
-    Args:
-        problem: The problem.
-        triangle: Of all readings.
-        slopes: How the values change with what is looked for, (P,).
-    """
+    """Covariance of the values (P, P) and its rank; infinite on the diagonal without observations and prior."""
     scale, deviation = problem.scale, problem.prior_deviation
     known = np.where(np.isfinite(deviation), scale / deviation, 0.0)
     _, sizes, rows = np.linalg.svd(append_rows(triangle * scale, np.diag(known)))
@@ -146,10 +123,10 @@ def covariance_of(problem: Problem, triangle: Array, slopes: Array) -> tuple[Arr
 
 
 def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bool) -> bool:
-    """True if residuals are larger or smaller than the deviations of the sensors say.
+    """True if residuals contradict the deviations of the sensors.
 
-    Where poses were taken out that fit badly, what is left fits better than chance has it: the mean of a chi squared
-    that is cut at a quantile c is r F(c; r + 2)/F(c; r).
+    Where poses that fit badly were taken out, the rest fits better than chance: the mean of a chi squared that is cut
+    at a quantile c is r F(c; r + 2)/F(c; r).
     """
     if free <= 0:
         return False
@@ -165,15 +142,7 @@ def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bo
 def provenance_of(
     parameters: Parameters, standard_error: Array, status: CalibrationStatus, log: str, date: str
 ) -> Provenance:
-    """Provenance of the numbers of a calibrated robot, each with its standard error.
-
-    Args:
-        parameters: What was looked for.
-        standard_error: Of what was found, in the units of the parameters, (P,).
-        status: How it ended; one that is not FOUND is noted.
-        log: Where the readings come from.
-        date: When it was done, ISO 8601.
-    """
+    """Provenance of the values of a calibrated robot, each with its standard error (P,); date in ISO 8601."""
     errors: dict[str, Array] = {}
     for name in dict.fromkeys(parameters.names):
         if name not in UNCERTAIN or (name == "length_zero" and not parameters.counted):

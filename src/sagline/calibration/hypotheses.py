@@ -90,11 +90,7 @@ class Trial:
     found: dict[tuple[Change, int], Pose] = field(default_factory=dict)
 
     def result(self, change: Change) -> TrialResult:
-        """Fit of any robot like this one to the readings.
-
-        Args:
-            change: How they are taken.
-        """
+        """Fit of any robot similar to this one to the changed readings."""
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
@@ -107,12 +103,7 @@ class Trial:
         return TrialResult(quality, departure, moved + off[zeros])
 
     def promise(self, change: Change, steps: int) -> float:
-        """Predicted sum of squares for each row after some steps of the least squares; infinite without a fit.
-
-        Args:
-            change: How the readings are taken.
-            steps: How many steps are taken before the one that is only promised.
-        """
+        """Predicted sum of squares a row, one step after some steps of the least squares; infinite without a fit."""
         most = FEWEST_ROWS if self.log.commanded is None else MOST_ROWS
         problem, poses, _ = self._problem(change, most)
         kept, step = np.ones(len(problem.log.cells), dtype=np.bool_), None
@@ -128,23 +119,13 @@ class Trial:
         return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
 
     def most_promising(self, changes: Iterable[Change], steps: int, most: int) -> list[Change]:
-        """The changes that promise more than none does, the best first.
-
-        Args:
-            changes: What is tried.
-            steps: As of `promise`.
-            most: How many of them are wanted.
-        """
+        """Changes with a better prediction than no change, the best first, at most `most`."""
         promises = {change: self.promise(change, steps) for change in changes}
         limit = self.promise(Change(), steps)
         return sorted((change for change in promises if promises[change] < limit), key=promises.__getitem__)[:most]
 
     def offsets(self) -> tuple[Array, Array]:
-        """Distance of lengths from those that hold the platform at the commanded poses.
-
-        Returns:
-            Median of what is read less what holds it, and the median distance from that [m], both of shape (m,).
-        """
+        """Median offset of lengths from those of the commanded poses, and its median deviation [m], both (m,)."""
         problem, poses, _ = self._problem(Change(), MOST_ROWS)
         return _offsets(problem, poses)
 

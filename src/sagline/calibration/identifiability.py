@@ -39,16 +39,9 @@ class PriorUnits(NamedTuple):
 
 
 def append_rows(triangle: Array, matrix: Array) -> Array:
-    """Triangular factor of all rows so far and some more: by reflections, so that nothing is squared.
+    """Triangular factor (at most P, P) of all rows so far and some more (..., P); rows with NaN are left out.
 
-    Singular values down to rounding are told apart, which sums of products cannot below the root of that.
-
-    Args:
-        triangle: Of the rows before, (at most P, P); of none (0, P).
-        matrix: Whitened slopes, (..., P); rows with NaN are left out.
-
-    Returns:
-        Upper triangle, (at most P, P).
+    By reflections, so that singular values down to rounding are distinguished; products would lose half of the digits.
     """
     rows = matrix.reshape(-1, matrix.shape[-1])
     rows = rows[~np.isnan(rows).any(axis=1) & rows.any(axis=1)]
@@ -56,9 +49,9 @@ def append_rows(triangle: Array, matrix: Array) -> Array:
 
 
 def prior_units(parameters: Parameters) -> PriorUnits:
-    """The priors as a measure of directions; where nothing is known, what is usual of a number nobody gives.
+    """Priors as the unit of directions; without a prior the usual deviation of an unknown value.
 
-    Beside a prior as wide as nothing the others would be rounding: it counts as `_WIDE`.
+    A much wider prior counts as `_WIDE`: beside it the others would be rounding.
     """
     usual = np.array([KINDS[name].assumed for name in parameters.names])
     usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
@@ -100,18 +93,7 @@ def told(values: Array) -> int:
 def gauge_of(
     triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
 ) -> tuple[Direction, ...]:
-    """Directions in the unknowns that the readings leave open, where the priors have them, each by its name.
-
-    Args:
-        triangle: Triangular factor of the whitened slopes of all readings, by `folded`, (at most P, P).
-        parameters: The unknowns.
-        values: Theirs where the slopes were taken, (P,).
-        robot: The robot at which the slopes were taken.
-        sensors: What reads.
-
-    Returns:
-        As many directions as the readings leave open; none where all is told.
-    """
+    """Unobservable directions of the unknowns, each with its name; the priors decide along them."""
     frame = prior_units(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
@@ -159,10 +141,10 @@ def _symmetric_part(
 
 
 def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries) -> tuple[Array, Array]:
-    """Combinations of symmetries that move unknowns alone: as vectors (P, k), and shares of the symmetries (g, k).
+    """Combinations of symmetries that change unknowns alone: vectors (P, k), and shares of the symmetries (g, k).
 
-    Both count in standard deviations. What is known stays, what is shared moves alike, and the drums pay out as much as
-    the symmetries ask for.
+    Both in standard deviations. Known values stay, shared ones change alike, and the drums pay out the lengths that the
+    symmetries need.
     """
     free = np.isin(where, frame.free)
     conditions = [known.table[known.matters & ~free], known.lengths]
@@ -255,9 +237,5 @@ def measurement_rank(name: str) -> int:
 
 
 def easiest_measurement(names: Iterable[str]) -> str:
-    """Measurement that separates numbers of some kinds with the least work.
-
-    Args:
-        names: Of `unknowns.KINDS`.
-    """
+    """Measurement that separates parameters of some kinds with the least work."""
     return STEPS[min(names, key=measurement_rank)]

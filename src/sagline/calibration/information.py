@@ -25,12 +25,7 @@ class Information:
     """
 
     def __init__(self, rows: Array, known: Array) -> None:
-        """Nothing taken yet.
-
-        Args:
-            rows: As the attributes.
-            known: What is known beforehand: the inverse of a covariance, shape (P, P).
-        """
+        """Begin without candidates; known: inverse of the prior covariance (P, P)."""
         self.rows = rows
         self.chosen: list[int] = []
         self._known = known
@@ -72,14 +67,7 @@ class Information:
 
 
 def prior_information(rows: Array) -> Array:
-    """Prior information in units of the priors: 1, but no less than rounding of what is observed.
-
-    Args:
-        rows: Slopes of the readings of all candidates, shape (N, k, P).
-
-    Returns:
-        Shape (P, P).
-    """
+    """Prior information (P, P) in units of the priors: 1, but no less than rounding of the observations."""
     return np.eye(rows.shape[-1]) * max(1.0, CONDITION * float((rows**2).sum()))
 
 
@@ -98,20 +86,10 @@ class Choice(NamedTuple):
 
 
 def choose_informative(rows: Array, known: Array, count: int) -> Choice:
-    """Candidates that tell most together: the best beside those before it; if few, each exchanged for a better one.
+    """D-optimal choice of `count` candidates: greedy; if few, each exchanged for a better one.
 
-    The greedy choice alone is within 1 - 1/e of the best: a log det is submodular.
-
-    Args:
-        rows: Slopes of the readings of N candidates, one standard deviation each, shape (N, k, P).
-        known: What is known beforehand: the inverse of a covariance, shape (P, P).
-        count: How many are wanted, at most N.
-
-    Returns:
-        The choice.
-
-    Source:
-        Nemhauser, Wolsey & Fisher 1978; Fedorov 1972 (exchanges).
+    The greedy choice alone is within 1 - 1/e of the best, as log det is submodular (Nemhauser, Wolsey & Fisher 1978);
+    exchanges after Fedorov 1972.
     """
     found = Information(rows, known)
     for _ in range(count):
@@ -138,15 +116,7 @@ def _exchange(found: Information) -> None:
 
 
 def deviations_of(rows: Array, held: Array) -> Array:
-    """Standard deviations of numbers, by readings and by what is known beforehand.
-
-    Args:
-        rows: Slopes of the readings, one standard deviation each, shape (..., P).
-        held: Inverse of the standard deviation of each number beforehand, 0 where nothing is known, shape (P,).
-
-    Returns:
-        Shape (P,); infinite for what stays open.
-    """
+    """Standard deviations (P,) from whitened slopes (..., P) and inverse prior deviations (P,); infinite if open."""
     whole = np.concatenate((rows.reshape(-1, len(held)), np.diag(held)))
     _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # what is known is not squared
     there = size > OPEN * size[0]
@@ -158,14 +128,7 @@ def deviations_of(rows: Array, held: Array) -> Array:
 
 
 def information_of(rows: Array) -> Array:
-    """Information of readings: the sum of J^T J.
-
-    Args:
-        rows: Slopes of readings of one standard deviation each, shape (..., P).
-
-    Returns:
-        Shape (P, P).
-    """
+    """Information J^T J (P, P) of whitened slopes (..., P)."""
     flat = rows.reshape(-1, rows.shape[-1])
     told: Array = flat.T @ flat
     return told

@@ -45,16 +45,10 @@ def whitened_at(
     *,
     free_of_noise: bool = False,
 ) -> Observed:
-    """Whitened readings of some poses at a state, with their slopes.
+    """Whitened readings of some poses at a state, with their slopes; reported lengths [m], (n, m).
 
-    Args:
-        problem: The problem.
-        state: The state.
-        reported: The lengths that the winches say there [m], (n, m).
-        part: Which poses.
-        direction: Of a step of the numbers (P,), if slopes along it alone are wanted.
-        free_of_noise: Whether slopes are taken at true instead of reported lengths: else the scale of all lengths would
-            seem to be observed, by the noise that it scales too.
+    With a direction (P,) only the slopes along it. `free_of_noise` takes slopes at true instead of reported lengths:
+    else the scale of all lengths would seem to be observed, by the noise that it scales too.
     """
     log, parameters, machine = problem.log, problem.parameters, state.machine
     counts, along = (None if log.counts is None else log.counts[part]), reported
@@ -112,16 +106,9 @@ def misfit(normal: Normal) -> float:
 def predict_state(
     problem: Problem, before: State, known: Observed | None, step: Array, machine: Machine, reported: Array, part: slice
 ) -> tuple[Array, Array]:
-    """First-order prediction of true lengths [m] and pose rows of some poses after a step of the numbers.
+    """First-order prediction of true lengths [m] and pose rows of some poses after a step of the parameters (P,).
 
-    Args:
-        problem: The problem.
-        before: The state to step from.
-        known: Whitened readings there, where they were kept.
-        step: Of the numbers, internal (P,).
-        machine: With the numbers after it.
-        reported: What the winches say after it [m], (n, m).
-        part: Which poses.
+    known: whitened readings before the step, if kept. machine, reported (n, m) [m]: after the step.
     """
     if known is not None:
         off = np.einsum("nij,nj->ni", known.back, known.misfit - known.matrix @ step)
@@ -143,19 +130,10 @@ def evaluate_step(
     known: Observed | None = None,
     progress: Progress | None = None,
 ) -> Evaluated:
-    """One pass over the log: solve every pose after a step of the numbers, and sum up the normal equations.
+    """One pass over the log: solve every pose after a step of the parameters, and sum up the normal equations.
 
-    Args:
-        problem: The problem.
-        before: The state to step from.
-        step: Of the numbers, internal (P,); None for the state itself.
-        kept: Which poses count, (N,).
-        scale: Times what chance has it, beyond which a pose counts less; infinite where all count alike.
-        known: Whitened readings at the state, where they were kept.
-        progress: Told how many poses are done, of how many.
-
-    Raises:
-        InvalidValueError: If the robot cannot have these numbers.
+    Without a step, the state itself. Poses of more than `scale` times the expected squares have less weight. Refused if
+    the robot cannot have the parameters.
     """
     numbers = before.numbers if step is None else np.maximum(before.numbers + step, problem.least)
     machine = before.machine if step is None else machine_at(problem, numbers)
@@ -212,19 +190,8 @@ def solve(
 ) -> Fit:
     """Gauss-Newton from a state, steps halved until the sum of squares falls.
 
-    Poses that fit worse than the others have less weight; the scale of the misfit is updated after each step.
-
-    Args:
-        problem: The problem.
-        current: Initial state, with its normal equations.
-        kept: Which poses count, (N,).
-        robust: Whether poses count less that do not fit.
-        steps: How many are taken at most.
-        tolerance: Predicted decrease of the sum of squares below which it has converged.
-        progress: Told of every pass.
-
-    Returns:
-        How it ended.
+    Converged if the predicted decrease is below the tolerance. With `robust`, poses that fit worse than the others have
+    less weight; the scale of the misfit is updated after each step.
     """
     scale = np.inf
     if robust:
@@ -256,9 +223,9 @@ def solve(
 
 
 def best_step(problem: Problem, state: State, normal: Normal) -> tuple[Array, float]:
-    """The Gauss-Newton step of the internal parameters (P,), and the predicted decrease of the sum of squares.
+    """Gauss-Newton step of the internal parameters (P,) within their lower bounds, and the predicted decrease.
 
-    It is zero along directions with neither observations nor a prior, and keeps the lower bounds of the parameters.
+    Zero along directions with neither observations nor a prior.
     """
     scale, deviation = problem.scale, problem.prior_deviation
     known = np.where(np.isfinite(deviation), scale / deviation, 0.0) ** 2
@@ -307,10 +274,7 @@ def exceeded_with(probability: Any, freedoms: Any) -> Array:
 
 
 def move_poses(before: Robot, after: Robot, poses: Array, motion: Array) -> Array:
-    """Pose rows after small motions of the center of mass (N, 6) [m, rad], within the freedom of the robot.
-
-    The center of mass may have another place in the platform afterwards.
-    """
+    """Pose rows after small motions of the center of mass (N, 6) [m, rad]; it may differ in the platform afterwards."""
     turned = Rotation.from_quat(poses[:, 3:])
     turning = Rotation.from_rotvec(motion[:, 3:]) * turned
     first, last = (np.array(robot.center_of_mass) for robot in (before, after))  # scipy takes no locked array

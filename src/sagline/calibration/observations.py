@@ -47,14 +47,7 @@ def has_drum_data(robot: Robot) -> bool:
 
 
 def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, lengths: Array) -> Array:
-    """Slopes of reported lengths by length_zero, drum_radius and axial_stiffness [m/N], (3, N, m).
-
-    Args:
-        robot: The robot.
-        parameters: The unknowns; slopes by drum_radius are zero where it is known.
-        counts: Encoder counts (N, m); None where lengths are read.
-        lengths: The reported lengths [m], (N, m).
-    """
+    """Slopes of reported lengths (N, m) [m] by length_zero, drum_radius and axial_stiffness [m/N], (3, N, m)."""
     slopes = np.zeros((SLOPES, *lengths.shape))
     if counts is None or robot.winches is None:
         slopes[0] = 1.0
@@ -160,11 +153,7 @@ class Machine(NamedTuple):
 
 
 def machine_of(robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array) -> Machine:
-    """A robot and its sensors as the kernel takes them.
-
-    Raises:
-        InvalidValueError: If counts are read, and data of the drums are missing.
-    """
+    """A robot and its sensors as the kernel takes them; refused if counts are read and drum data are missing."""
     # pulleys and dead cable that are unknown have slopes, even where the robot has none yet
     routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     return Machine(
@@ -191,14 +180,7 @@ def whitened_rows(
 ) -> Observed:
     """Readings near equilibria to first order; NaN where the platform is not stable.
 
-    Args:
-        machine: The robot and its sensors.
-        parameters: The unknowns.
-        readings: What was read.
-        slopes: Of the reported lengths, (3, N, m), by `winch_slopes`.
-        poses: Pose rows (N, POSE_COLUMNS), equilibria.
-        lengths: Unstrained lengths there [m], (N, m).
-        direction: A step of the internal parameters (P,), for the slopes along it alone; P = 1 in the result then.
+    slopes: of the reported lengths (3, N, m), by `winch_slopes`. With a direction (P,) only the slopes along it, P = 1.
     """
     count, m = lengths.shape
     factor, width = machine.slopes, len(parameters.names)
@@ -236,16 +218,7 @@ def whitened_rows(
 def predicted_rows(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
 ) -> Observed:
-    """Slopes of readings by these sensors at equilibria; `misfit` is zero.
-
-    Args:
-        robot: The robot, with the values of the parameters.
-        model: Cable model, exact or weightless.
-        parameters: The unknowns.
-        sensors: What reads; a deviation that is None reads nothing.
-        poses: Pose rows (N, POSE_COLUMNS), equilibria.
-        lengths: Unstrained lengths there [m], (N, m).
-    """
+    """Slopes of readings by these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; no misfit."""
     machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
     counts = None if machine.drums is None else counts_of(machine.drums, lengths)
     slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)
@@ -266,11 +239,7 @@ def _unit_sensors(sensors: Sensors) -> Sensors:
 def unwhitened_slopes(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
 ) -> tuple[Array, Array]:
-    """Slopes of load cells, position and rotation in SI units, NaN where the platform is not stable.
-
-    By the values of the parameters (N, m + 6, P), and by the unstrained lengths (N, m + 6, m); arguments as of
-    `predicted_rows`.
-    """
+    """Slopes of load cells, position and rotation in SI units by values (N, m + 6, P) and lengths (N, m + 6, m)."""
     count, m = lengths.shape
     by_values, by_length = np.empty((count, m + 6, len(parameters.names))), np.empty((count, m + 6, m))
     for part in blocks(count, BLOCK):

@@ -86,10 +86,7 @@ class Case(NamedTuple):
 
 
 def fit_suspects(case: Case, taken: Sequence[Suspect], iterations: int) -> SuspectFit:
-    """The best fit of a pose where suspects are off by any amount.
-
-    With one iteration it is that of the slopes, with more that of the nonlinear model.
-    """
+    """Best fit of a pose with any error of the suspects: linear with one iteration, else nonlinear."""
     which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
     counts = np.concatenate((np.ones(case.lengths.shape[1], dtype=np.bool_), case.read))
     counts[which] = False
@@ -153,30 +150,18 @@ def _improved(case: Case, counts: Flags, wanted: Array, squares: float) -> Case 
 
 
 def misfitting(squares: Array, readings: Indices) -> Indices:
-    """Indices, rising, of poses that fit worse than chance lets any of so many; at most `EXAMINED`, the worst.
-
-    Args:
-        squares: Sum of squares of each pose in standard deviations, (N,); NaN or infinite for one that does not count.
-        readings: How many readings each pose has, (N,).
-    """
+    """Rising indices of poses that chance does not explain, at most `EXAMINED`; squares (N,), NaN if unused."""
     known = np.where(np.isfinite(squares), squares, 0.0)
     bad = np.flatnonzero(known > exceeded_with(CHANCE / max(len(squares), 1), readings))
     return np.sort(bad[np.argsort(-known[bad], kind="stable")][:EXAMINED])
 
 
 def outliers_in(problem: Problem, state: State, which: Indices, rows: Indices, *, count: int) -> tuple[Outlier, ...]:
-    """Causes of misfit at some poses of a search, in order of the rows.
+    """Causes of misfit at some poses of a search, in the order of their rows of the log.
 
-    For every length, load cell and measured position or rotation of a pose: by how much must it be off to explain the
-    readings best, the lengths being known as far as their deviation says. What explains most is taken, and then what
-    explains most of the rest. Where cables do alike, or nothing explains it, it is the pose as a whole.
-
-    Args:
-        problem: The problem.
-        state: Final state of the search.
-        which: Indices of the poses, (n,).
-        rows: Their rows of the log, (n,).
-        count: Number of poses of the whole log.
+    For every length, load cell and measured position or rotation of a pose: the error that explains the readings best.
+    The one that explains most is taken, then the one that explains most of the rest. Where several cables explain it
+    equally, or none does, the pose as a whole is the outlier.
     """
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = reported_lengths(problem, machine, slice(None))

@@ -140,20 +140,9 @@ _OF_ROBOT: Final = ("frame_anchors", "platform_anchors", "mass", "center_of_mass
 
 
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
-    """The single numbers of some kinds of unknowns.
+    """Parameters of some kinds of unknowns in their order, of a kind by cable and axis.
 
-    Args:
-        robot: The robot as it is believed to be.
-        unknowns: Kinds of unknowns, each once, by name or with what is known of it beforehand.
-        sensors: What reads.
-        counted: Whether encoders count turns of drums; otherwise lengths are read.
-
-    Returns:
-        Parameters; those of the kinds in order, of a kind by cable and axis.
-
-    Raises:
-        InvalidValueError: If an unknown comes twice, the robot has no such number, or no reading and no stated prior
-            tells of it; the message says what to add.
+    Refused if an unknown comes twice, the robot has no such value, or neither a reading nor a stated prior observes it.
     """
     asked = chosen(unknowns)
     m = robot.cable_count
@@ -200,14 +189,7 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
 
 
 def chosen(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
-    """Kinds of unknowns, each once.
-
-    Args:
-        unknowns: By name, or with what is known of them beforehand.
-
-    Raises:
-        InvalidValueError: If there is none, one comes twice, or one is no unknown.
-    """
+    """Unknowns as a list, each once, checked."""
     given = [unknowns] if isinstance(unknowns, str | Unknown) else _listed(unknowns)
     if not given:
         raise InvalidValueError("unknowns", "none", "one at least", f"Name some of {', '.join(KINDS)}.")
@@ -330,16 +312,7 @@ def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
 
 
 def robot_with(robot: Robot, parameters: Parameters, values: Array) -> Robot:
-    """A robot with other numbers.
-
-    Args:
-        robot: The robot.
-        parameters: Which numbers.
-        values: Theirs, (P,).
-
-    Raises:
-        InvalidValueError: If the robot cannot have them.
-    """
+    """The robot with other parameter values (P,); refused if it cannot have them."""
     changes: dict[str, Any] = {}
     cables: dict[str, Array] = {}
     winches: dict[str, Array] = {}
@@ -363,13 +336,7 @@ def robot_with(robot: Robot, parameters: Parameters, values: Array) -> Robot:
 
 
 def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sensors:
-    """Sensors with other numbers of the measuring system.
-
-    Args:
-        sensors: The sensors; rotations of the system count from their frame.
-        parameters: Which numbers.
-        values: Theirs, (P,).
-    """
+    """The sensors with other values (P,) of frame and target; rotations count from the frame."""
     changes: dict[str, Any] = {}
     if "target" in parameters.names:
         changes["target"] = values[parameters.where[kinds.TARGET : kinds.TARGET + 3, 0]]

@@ -83,22 +83,12 @@ class CalibrationPoses(Result, Saved):
 
 
 def in_words(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Expected errors of calibration poses, beside random ones, in lines of at most 80 columns.
-
-    Args:
-        plan: The poses.
-        width: Columns of a line; numbers are not broken.
-    """
+    """Expected errors of calibration poses, beside random ones, in lines of at most `width` columns."""
     return "\n".join((*_head(plan, width), *_errors(plan, width), *_advice(plan, width))).replace(SPACE, " ")
 
 
 def table(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Poses and tensions in the order to drive, one a line; more cables than fit go on in the next.
-
-    Args:
-        plan: The poses.
-        width: Columns of a line.
-    """
+    """Poses and tensions in the order to drive, one a line; more cables than fit continue in the next."""
     position, tension = plan.poses.position, plan.frame_end_tension
     angles = np.degrees(plan.poses.rotation.as_euler("ZYX"))
     decimals = 1 if np.abs(position).max() >= FAR else 2

@@ -149,11 +149,7 @@ Evaluated = tuple[State, Normal]
 
 
 def machine_at(problem: Problem, numbers: Array) -> Machine:
-    """The robot and its sensors with internal parameters (P,).
-
-    Raises:
-        InvalidValueError: If the robot cannot have them.
-    """
+    """The robot and its sensors with internal parameters (P,); refused if the robot cannot have them."""
     values, parameters = external(problem.parameters, numbers), problem.parameters
     robot = robot_with(problem.robot, parameters, values)
     sensors = sensors_with(problem.sensors, parameters, values)
@@ -235,10 +231,9 @@ def _poses(problem: Problem, machine: Machine, reported: Array, commanded: Pose 
 
 
 def _aligned(problem: Problem, numbers: Array, poses: Array) -> Array:
-    """The parameters with the measuring system aligned to the poses, if it is unknown.
+    """The parameters with the measuring system aligned to the poses, if it is unknown and there are enough readings.
 
-    Its rotation is the mean of those between the platform's and the measured ones, or that between measured points;
-    without enough of them it stays as it is.
+    Its rotation is the mean of those between the platform's and the measured ones, or that between measured points.
     """
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:

@@ -101,14 +101,7 @@ class Recommendation(NamedTuple):
 
 
 def most_helpful(situation: Situation) -> str:
-    """Recommended measurement: the one that lowers the errors most, on average of their logarithms.
-
-    Args:
-        situation: What will be known without it.
-
-    Returns:
-        One sentence.
-    """
+    """Sentence on the recommended measurement: the one that lowers the mean logarithm of the errors most."""
     before = _deviations(situation.told)
     best: Recommendation | None = None
     most = -np.log(WORTH)
@@ -170,14 +163,9 @@ def _positions(situation: Situation) -> Iterator[Recommendation]:
 def _best_subset(
     situation: Situation, rows: Array, beside: Array, words: dict[int, str], instead: Array | None = None
 ) -> Iterator[Recommendation]:
-    """So many of some rows as there are words for, chosen by what they tell.
+    """Numbers of rows for which there are words, each the most informative subset.
 
-    Args:
-        situation: What will be known without them.
-        rows: What each tells alone.
-        beside: What each tells with what it comes with.
-        words: For a number of them.
-        instead: What the others told of those that are chosen, if it is told again.
+    rows: information of each alone; beside: with what it comes with; instead: readings that are replaced.
     """
     found = Information(rows, situation.told)
     for _ in range(min(max(words), len(rows))):
@@ -207,19 +195,10 @@ def _largest_reduction(situation: Situation, before: Array, after: Array) -> str
 
 
 def error_text(value: float, unit: str) -> str:
-    """An error to two digits; lengths in millimeters.
-
-    Args:
-        value: The error.
-        unit: Its unit.
-    """
+    """An error to two digits; lengths in millimeters."""
     return n(1e3 * value, ".2g", "mm") if unit == "m" else n(value, ".2g", unit)
 
 
 def typical_load_cell_deviation(tensions: Array) -> float:
-    """Standard deviation of load cells as one would buy them for these tensions [N].
-
-    Args:
-        tensions: Shape (N, m).
-    """
+    """Standard deviation of load cells as sold for tensions (N, m) [N]."""
     return float(f"{CELL_SHARE * float(np.median(tensions)):.1g}")

@@ -98,10 +98,7 @@ def _common_motions(poses: Array) -> Array:
 
 
 def transformed_covariance(slopes: Array, covariance: Array, negligible: Array | float = 0.0) -> Array:
-    """A covariance (..., P, P) after a linear map (..., k, P).
-
-    Infinite along the diagonal of rows with a slope above `negligible` by a number of infinite variance.
-    """
+    """Covariance (..., P, P) after a linear map (..., k, P); infinite along rows with an infinite term."""
     infinite = np.isinf(np.diagonal(covariance, axis1=-2, axis2=-1))
     finite = np.where(infinite[..., :, None] | infinite[..., None, :], 0.0, covariance)
     found = np.asarray(slopes @ finite @ np.swapaxes(slopes, -1, -2))

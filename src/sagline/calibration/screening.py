@@ -45,23 +45,11 @@ def screen(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> Scr
     - without a count or length of a cable, or without a reading of a load cell that more than half of the rows have
       (measured positions and rotations may be missing anywhere);
     - whose readings are all those of an earlier row;
-    - at which a length changes faster than the limit, against the nearest row that is a tenth of a second away or more,
-      before it or behind it in time; rows further apart than a second do not tell a speed, and without times nothing
-      does;
-    - where a load cell, less the bias that the robot's winches have, reads no more than three of its standard
-      deviations: the cable may as well be slack.
+    - at which a length changes faster than the limit [m/s], against the nearest row in time that is at least a tenth of
+      a second and at most a second away; without times no row is left out for this;
+    - where a load cell, less its bias, reads no more than three of its standard deviations: the cable may be slack.
 
-    Args:
-        robot: The robot.
-        log: The log.
-        speed_limit: Largest change of a length of a platform that stands [m/s], > 0.
-
-    Returns:
-        The log of the rows that are left, which may be none.
-
-    Raises:
-        InvalidValueError: If the log is of another number of cables, the robot's winches cannot tell lengths from
-            counts, or a count is on no drum; the message names row and cable.
+    Refused if the log has another number of cables, or counts do not give lengths.
     """
     limit = number(speed_limit, "speed_limit", "m/s", above=0.0)
     lengths = lengths_of(robot, log)
@@ -80,18 +68,7 @@ def screen(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> Scr
 
 
 def lengths_of(robot: Robot, log: WinchLog) -> Array:
-    """Lengths off the drums that the readings of a log stand for.
-
-    Args:
-        robot: The robot.
-        log: The log.
-
-    Returns:
-        L [m], shape (N, m), NaN where nothing was read.
-
-    Raises:
-        InvalidValueError: As of `screened`.
-    """
+    """Lengths off the drums (N, m) [m] of the readings of a log, NaN for none."""
     m = instance(robot, Robot, "robot").cable_count
     cables = instance(log, WinchLog, "log").readings.shape[1]
     if cables != m:
@@ -109,14 +86,7 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
 
 
 def reading_count(log: WinchLog) -> int:
-    """Number of informative readings: lengths are none, every row has as many unknown lengths as read ones.
-
-    Args:
-        log: The log.
-
-    Returns:
-        Readings of load cells, measured coordinates, and three for a rotation.
-    """
+    """Number of informative readings; lengths are not, as every row has as many unknown lengths as read ones."""
     cells, positions, rotations = (
         0 if values is None else int(np.count_nonzero(~np.isnan(values)))
         for values in (log.load_cells, log.position, None if log.rotation is None else log.rotation[:, :3])

@@ -53,18 +53,7 @@ class SearchResult(NamedTuple):
 def search_from_priors(
     problem: Problem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
 ) -> SearchResult:
-    """Search from the priors; poses that end elsewhere get a second chance, and are left out if they do not take it.
-
-    Args:
-        problem: The problem.
-        commanded: Poses that were commanded, one a row, or None.
-        robust: Whether poses count less that do not fit.
-        progress: Told of every pass.
-
-    Raises:
-        InvalidValueError: If the robot rests nowhere at the lengths of the log, or at none of its poses as it was read,
-            or needs data that it lacks.
-    """
+    """Search from the priors; poses that end in another equilibrium are restarted once, then left out."""
     state = start_of(problem, commanded)
     kept = np.ones(len(state.poses), dtype=np.bool_)
     current = evaluate_step(problem, state, None, kept)
@@ -142,21 +131,10 @@ def _other_equilibrium(problem: Problem, state: State, which: Flags) -> Flags:
 def cross_validate(
     problem: Problem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
-    """Calibrate without each part of the poses, and predict what was read there by the lengths that were read.
+    """Calibrate without each part of the poses, and predict their readings from the reported lengths.
 
-    The parts are runs of poses that follow each other, so that rows of one pose with several tensions stay together,
-    but for those where a part ends.
-    Each calibration begins where that of all poses ended, and so it ends where it would from anywhere near.
-
-    Args:
-        problem: The problem.
-        found: How the calibration by all poses ended.
-        folds: How many parts, >= 2.
-        robust: Whether poses count less that do not fit.
-        progress: Told of every pass.
-
-    Returns:
-        Errors, of poses that fit and those that do not; None where there are fewer than two poses to part.
+    Parts are runs of consecutive poses, so that rows of one pose with several tensions stay together. None where there
+    are fewer than two poses.
     """
     places = np.flatnonzero(found.kept)
     folds = min(folds, len(places))
@@ -188,17 +166,7 @@ def _root_mean_squares(sums: Array) -> tuple[float, float]:
 
 
 def prediction_errors(problem: Problem, machine: Machine, starts: Array, which: Flags, whole: slice) -> Array:
-    """Squares of the errors of predictions from reported lengths: sum and count of load cells, and of positions, (4,).
-
-    Poses without an equilibrium are not among them.
-
-    Args:
-        problem: What was read.
-        machine: The robot and its sensors.
-        starts: Pose rows near the equilibria, (N, POSE_COLUMNS).
-        which: The poses, (N,).
-        whole: Where they are among all.
-    """
+    """Squared errors of predictions from reported lengths: sum and count of load cells, and of positions, (4,)."""
     sums = np.zeros(4)
     for own in blocks(whole.stop - whole.start, BLOCK):
         part = slice(whole.start + own.start, whole.start + own.stop)

@@ -21,12 +21,7 @@ ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
 
 def in_words(found: Findings, width: int = WIDTH) -> str:
-    """A calibration in some lines, the verdict first.
-
-    Args:
-        found: The calibration.
-        width: Columns of a line; numbers are not broken.
-    """
+    """A calibration in lines of at most `width` columns, the verdict first."""
     parts = (
         _verdict(found, width),
         _rows(found, width),
@@ -40,11 +35,7 @@ def in_words(found: Findings, width: int = WIDTH) -> str:
 
 
 def table(found: Findings) -> str:
-    """Every number with its standard error and what was there before, one a line.
-
-    Args:
-        found: The calibration.
-    """
+    """Every value with its standard error and its prior, one a line."""
     numbers = found.parameters
     head = ("number", "found", "before", "moved by, of the error before")
     rows = [head]
@@ -60,11 +51,7 @@ def table(found: Findings) -> str:
 
 
 def outlier_text(outlier: Outlier) -> str:
-    """Text of an outlier: row of the log, cable and size.
-
-    Args:
-        outlier: One of a calibration.
-    """
+    """Text of an outlier: row of the log, cable and size."""
     where = "" if outlier.cable is None else f", cable {outlier.cable}"
     size = n(outlier.size, ".3g", UNITS.get(outlier.quantity, ""))
     times = n(outlier.deviations, ".2g")
@@ -72,11 +59,7 @@ def outlier_text(outlier: Outlier) -> str:
 
 
 def row_ranges(rows: Sequence[int] | Indices) -> str:
-    """Numbers of rows, those that follow each other as a span: "rows 3, 17 to 19 and 5 more".
-
-    Args:
-        rows: Rising numbers.
-    """
+    """Rising numbers of rows as ranges: "rows 3, 17 to 19 and 5 more"."""
     spans: list[list[int]] = []
     for row in map(int, rows):
         if spans and row == spans[-1][1] + 1:
@@ -90,11 +73,7 @@ def row_ranges(rows: Sequence[int] | Indices) -> str:
 
 
 def chi_squared_text(found: Findings) -> str:
-    """The sum of squares beside what it should be.
-
-    Args:
-        found: The calibration.
-    """
+    """Chi squared beside its expected value."""
     freedom = found.degrees_of_freedom
     if freedom <= 0:
         return f"chi squared {n(found.chi_squared, '.4g')}, of no degree of freedom: nothing proves the numbers"
@@ -277,16 +256,7 @@ _TURNS: Final = {"frame_anchors": (2,), "platform_anchors": (0, 1, 2)}  # axes a
 
 
 def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors) -> Array | None:
-    """Covariance of the coordinates of all anchors of the frame or of the platform.
-
-    Args:
-        parameters: What was found.
-        covariance: Of its values, (P, P).
-        which: Anchors of what.
-
-    Returns:
-        [m^2], shape (m, 3, m, 3), zero of coordinates that nobody asked for; None where none was asked for.
-    """
+    """Covariance of all frame or platform anchors [m^2], (m, 3, m, 3), zero where known; None if all are known."""
     first = KINDS[which].first
     numbers = parameters.where[first : first + 3].T.reshape(-1).astype(np.int64)
     if (numbers < 0).all():
@@ -299,20 +269,10 @@ def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors)
 
 
 def without_motion(points: Array, which: Anchors) -> Array:
-    """Projection of small moves of anchors without their common rigid motion (S-transformation).
+    """Projection (3 m, 3 m) of small changes of anchors (m, 3) without their common rigid motion.
 
-    Shifts are taken out, and turns of which no reading could tell: of the frame those about the vertical, of the
-    platform all three, since its own axes are where its anchors say.
-
-    Args:
-        points: The anchors [m], shape (m, 3).
-        which: Anchors of what.
-
-    Returns:
-        A projection of their coordinates, shape (3 m, 3 m).
-
-    Source:
-        Baarda 1973, "S-transformations and criterion matrices", with the anchors all alike.
+    Removed are shifts and rotations that no reading observes: of the frame about the vertical, of the platform about
+    all axes, as its anchors define its own (S-transformation with all anchors alike, Baarda 1973).
     """
     m = len(points)
     ways = [np.tile(axis, m) for axis in np.eye(3)]
@@ -323,16 +283,7 @@ def without_motion(points: Array, which: Anchors) -> Array:
 
 
 def relative_covariance(points: Array, covariance: Array, which: Anchors) -> Array:
-    """Covariance of anchors relative to one another, without their common rigid motion.
-
-    Args:
-        points: The anchors [m], shape (m, 3).
-        covariance: Of their coordinates [m^2], shape (m, 3, m, 3).
-        which: Anchors of what.
-
-    Returns:
-        The same shape [m^2]; NaN where an infinite one makes it unknown.
-    """
+    """Covariance (m, 3, m, 3) of anchors without their common rigid motion [m^2]; NaN if one is infinite."""
     if not np.isfinite(covariance).all():
         return np.full(covariance.shape, np.nan)
     kept, size = without_motion(points, which), points.size

@@ -63,14 +63,7 @@ class Symmetries(NamedTuple):
 
 
 def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) -> Symmetries:
-    """The symmetries of a robot and its sensors; those that move most come first.
-
-    Args:
-        robot: The robot.
-        sensors: What measures it.
-        turn: Rotation vector by which its frame is looked for [rad], (3,).
-        counted: Whether encoders count turns of drums.
-    """
+    """Symmetries of a robot and its sensors, the most general first; turn: rotation vector of the frame [rad], (3,)."""
     m, turning = robot.cable_count, bool(robot.freedom[:, 3:].any())
     each = [_scale(robot, sensors), _force(robot), _yaw(robot, sensors, turn)]
     each += [_turned(robot, sensors, axis) for axis in range(3)]
@@ -96,15 +89,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
 
 
 def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
-    """Coefficients a [m] and b of the length off each drum, a + b L, by the data of the winch.
-
-    Args:
-        robot: The robot.
-        counted: Whether encoders count turns of drums.
-
-    Returns:
-        a [m] and b, by every number of `kinds`, (KIND_ROWS, m): zero, drum radius and axial stiffness have some.
-    """
+    """Coefficients a [m] and b of the length off each drum, a + b L, by every row of `kinds`, (KIND_ROWS, m)."""
     shift, share = np.zeros((2, kinds.KIND_ROWS, robot.cable_count))
     if not counted:
         shift[kinds.ZERO] = 1.0

@@ -34,16 +34,10 @@ class Group(NamedTuple):
 
 
 def cannot_tell_apart(triangle: Array, parameters: Parameters, gauge: tuple[Direction, ...]) -> tuple[Direction, ...]:
-    """Weakly identifiable directions, beside the unobservable ones.
+    """Weakly identifiable directions, without the unobservable ones.
 
-    Args:
-        triangle: Triangular factor of the whitened slopes of all readings, by `folded`, (at most P, P).
-        parameters: The unknowns.
-        gauge: Directions left open, by `gauge_of`; they are taken out.
-
-    Returns:
-        Directions of which more than `LITTLE` of the prior's deviation is left, the least known first; then numbers
-        whose correlation is beyond `ALIKE`, and single numbers that those of all cables imitate as well.
+    Directions with more than `LITTLE` of the prior deviation left, the least known first; then parameters with a
+    correlation beyond `ALIKE`, and single parameters that those of all cables substitute.
     """
     frame = prior_units(parameters)
     complement = _complement(frame, gauge)
@@ -106,14 +100,9 @@ def _weak_directions(
 def _words(
     vector: Array, parameters: Parameters, groups: list[Group], kinds: Indices, member: Array
 ) -> tuple[str, ...]:
-    """Names of a direction: kinds of numbers, or the axis or single number that has nearly all of it.
+    """Names of a direction (P,): kinds of parameters, or the axis or single parameter that has nearly all of it.
 
-    Args:
-        vector: The direction, (P,).
-        parameters: The unknowns.
-        groups: Of these, g.
-        kinds: Place of each one's kind, (P,).
-        member: One where a group has a number, else zero, (g, P).
+    kinds: rank of each parameter's kind (P,); member: 1 where a group has a parameter, else 0, (g, P).
     """
     square = vector**2
     shares = np.bincount(kinds, square, minlength=kinds.max() + 1)

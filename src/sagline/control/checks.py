@@ -109,10 +109,7 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
 
 
 def check_lead(what: str, lead: Array) -> None:
-    """Refuse a way that begins with other lengths, where the tensions differ too much from its plan.
-
-    Lead: difference of the lengths at rest from the first ones of the plan [m], (m,).
-    """
+    """Refuse lengths at rest that differ too much from the first ones of a plan; lead: their difference [m], (m,)."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
         reason = (

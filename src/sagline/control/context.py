@@ -155,10 +155,7 @@ class Context:
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:
-        """Estimate the pose; a line for the operator where it has just been lost, "" otherwise.
-
-        The correction of the tension loop counts as an error of the encoders.
-        """
+        """Estimate the pose, the tension loop's correction as an error of the encoders; a line where it is lost."""
         length = sample.length + self.zero
         length -= self.correction
         lost = self.estimator.locate(length, wrench)

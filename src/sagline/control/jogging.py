@@ -38,10 +38,7 @@ def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
 
 
 def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
-    """Lengths and rates of a jog of one winch, (N, m), one row for each cycle from rest.
-
-    Length at rest [m], (m,); by [m], positive where cable is let out; period [s].
-    """
+    """Lengths and rates of a jog of one winch by a length [m] from rest, (N, m), one row a cycle; period [s]."""
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
     lengths, rates = np.repeat(length[None], count + 1, axis=0), np.zeros((count + 1, len(length)))
@@ -53,10 +50,7 @@ def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[
 def winch_jog(
     robot: Robot, length: Array, here: Pose, winch: int, by: float, period: float, model: CableModel
 ) -> Motion:
-    """Plan and check a jog of one winch, in which the platform moves too.
-
-    Length at rest [m], (m,); by [m], positive where cable is let out; period [s].
-    """
+    """Plan and check a jog of one winch by a length [m] from lengths at rest (m,), in which the platform moves too."""
     lengths, rates = winch_lengths(length, winch, by, period)
     found = forward(robot, lengths, here, model)
     what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or another one."

@@ -156,10 +156,7 @@ class Garbage:
 
 @contextmanager
 def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
-    """Context in which the first Ctrl-C calls a function; KeyboardInterrupt is raised at the end.
-
-    It does so in the main thread alone, and not where Ctrl-C is ignored.
-    """
+    """Context of the main thread in which the first Ctrl-C calls a function; KeyboardInterrupt is raised at the end."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):
         yield
@@ -186,10 +183,7 @@ HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # below the frame's anchors, in widths of the 
 
 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
-    """Run homing, a path and jogs once, near the middle of a robot, to load their kernels; refusals do not matter.
-
-    A refused part does not keep the others from being loaded. Period [s].
-    """
+    """Run homing, a path and jogs once near the middle of a robot to load their kernels; refusals do not matter."""
     middle, homing = _first_feasible(robot, model, method)
     beside = Pose.from_euler(middle.position + np.array([MOVE, 0.0, 0.0]), 0.0, 0.0, 0.0)
     path, by = septic_path([middle, beside], speed=0.1), np.full(6, 1e-3)

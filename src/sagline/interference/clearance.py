@@ -75,15 +75,7 @@ class ClearanceRows:
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> Distances:
-        """Least distance of every pair at every pose.
-
-        Args:
-            state: The equilibrium, a batch of N poses; a single one has N = 1.
-            together: True if the least distance of all pairs is enough; the others are then only known to be larger.
-
-        Returns:
-            Distances.
-        """
+        """Least distance of every pair at every pose; with `together` only the least of all pairs is exact."""
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
@@ -105,15 +97,7 @@ class ClearanceRows:
         return out
 
     def least(self, state: Equilibrium) -> tuple[Array, Indices]:
-        """Least distance of all pairs at every pose, in a third of the time of `distances`.
-
-        Args:
-            state: The equilibrium, a batch of N poses.
-
-        Returns:
-            Distances [m], shape (N,): NaN where a cable has no tension, infinite where nothing is measured; and the
-            pair's number, -1 where there is none.
-        """
+        """Least distance (N,) [m] of all pairs, NaN without tensions, and the pair's index, in a third of the time."""
         lost = np.asarray(np.isnan(np.atleast_2d(state.free_length)).any(axis=1))
         found = np.nan_to_num(self.distances(state, together=True).value, nan=np.inf)
         if not found.shape[1]:
@@ -139,11 +123,7 @@ def _box_row(one: Box | Mesh) -> Array:
 
 
 def platform_of(robot: Robots) -> Box | None:
-    """Platform as a box of its size around its anchors; None where no size is given.
-
-    Raises:
-        InvalidValueError: If several robots have platforms of several forms.
-    """
+    """Platform as a box of its size around its anchors; None without a size, refused if robots differ."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
         if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
@@ -313,11 +293,7 @@ def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
 
 
 def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
-    """One obstacle or several, checked, as a tuple.
-
-    Raises:
-        InvalidValueError: If there is something else.
-    """
+    """One obstacle or several, checked, as a tuple."""
     some = (given,) if isinstance(given, Obstacle) else given
     several = isinstance(some, Sequence) and not isinstance(some, str)
     wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]

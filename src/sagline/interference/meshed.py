@@ -73,15 +73,7 @@ class Meshed:
         self._known: dict[tuple[int, bytes], bool] = {}
 
     def measure(self, pose: Pose, moving: Array, least: Array | None, out: tuple[Array, Array, Array]) -> None:
-        """Distances of all pairs at every pose.
-
-        Args:
-            pose: One pose or N of them.
-            moving: Rows of the parts of cables, shape (N, K, COLUMNS).
-            least: Least distances that are known already [m], shape (N,): what is farther need not be measured; None:
-                everything is.
-            out: Distances and lower bounds, shape (N, Q), and nearest points, (N, Q, 2, 3).
-        """
+        """Distances of all pairs at every pose into `out`; pairs farther than `least` (N,) [m] need not be measured."""
         turns, places = pose.matrix.reshape(-1, 3, 3), np.atleast_2d(pose.position)
         value, low, nearest = out
         for n in range(len(moving)):

@@ -70,11 +70,7 @@ class Candidates:
             first = last
 
     def costs(self, values: Array) -> Array | None:
-        """Cost of a meter of cable, shape (N,); None without a catalogue.
-
-        Raises:
-            InvalidValueError: If a cable of the catalogue has no cost.
-        """
+        """Cost of a meter of cable, shape (N,); None without a catalogue, refused if an entry has no cost."""
         for k, one in enumerate(self.free):
             if isinstance(one, FreeCable):
                 missing = [entry.name for entry in one.catalogue if entry.cost is None]

@@ -48,11 +48,7 @@ class DesignFolder:
         self.add_lines([repr(float(x)) for x in row] for row in rows)
 
     def add_lines(self, lines: Iterable[list[str]]) -> None:
-        """Append lines of cells and flush them to the disk.
-
-        Raises:
-            FileError: If the disk takes no more.
-        """
+        """Append lines of cells and flush them to the disk."""
         data = "".join(map(_line, lines)).encode()
         try:
             while data:
@@ -65,18 +61,7 @@ class DesignFolder:
 
 @contextmanager
 def open_record(folder: Path | str, request: Request) -> Iterator[DesignFolder]:
-    """Open the record of a search in a folder, new or continued.
-
-    Args:
-        folder: The folder; created if missing.
-        request: The request.
-
-    Yields:
-        The record.
-
-    Raises:
-        FileError: If the folder holds another search, is in use by another process, or cannot be written.
-    """
+    """Open the record of a search in a folder, new or continued; refused for another search or process."""
     place = file_path(folder, "folder", folder=True)
     check_files(place, [REQUEST, EVALUATIONS])
     create_folder(place)
@@ -123,11 +108,7 @@ def _canonical(value: Any) -> str:
 
 
 def _check_request(place: Path, digest: str, request: Request) -> None:
-    """Refuse the folder of another search.
-
-    Raises:
-        FileError: If it is one.
-    """
+    """Refuse the folder of another search."""
     file = place / REQUEST
     if not exists(file):
         if exists(place / EVALUATIONS):
@@ -145,11 +126,7 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
 
 
 def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
-    """Rows of complete lines, and their size in bytes; an incomplete last line is ignored.
-
-    Raises:
-        FileError: If another line is damaged.
-    """
+    """Rows of complete lines, and their size in bytes; an incomplete last line is ignored, another one refused."""
     none = np.zeros((0, len(heads)))
     lines = read_text(check_file(file), LIMIT).splitlines(keepends=True)
     if not lines:

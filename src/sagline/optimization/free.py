@@ -56,15 +56,7 @@ class Free(ByFields):
     __slots__ = ()
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot.
-
-        Args:
-            robot: The robot that the search begins with.
-            item: Name in messages.
-
-        Raises:
-            InvalidValueError: If the robot does not have it, or not within the bounds.
-        """
+        """Design variables of the robot that the search begins with; refused outside the bounds."""
         raise NotImplementedError
 
 

@@ -32,20 +32,9 @@ def symmetry_of(given: Any) -> Symmetry | None:
 def symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
-    """Shifts of all anchors per meter of shift of the leading one, along each direction.
+    """Shifts (K, c, 3) of anchors (c, 3) per meter of shift of a leading one along K directions, and its index.
 
-    Args:
-        symmetry: One of `NAMES`, or None for anchors that move by themselves.
-        anchors: Positions of the anchors [m], shape (c, 3); the first one leads.
-        along: Directions, shape (K, 3).
-        bounds: Least and largest shifts [m], shape (K,) each.
-        item: Name in messages.
-
-    Returns:
-        For each that leads its place among the anchors (None for all of them), and shifts of shape (K, c, 3).
-
-    Raises:
-        InvalidValueError: If an anchor could pass the plane it is mirrored in, or turns about no axis.
+    The index is None where one leads all. Refused if an anchor could pass its mirror plane, or turns about no axis.
     """
     count = len(anchors)
     if symmetry is None:

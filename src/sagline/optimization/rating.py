@@ -37,18 +37,10 @@ BLOCK = 1 << 12  # poses at once: a tenth of a second, after which an interrupt 
 def distribute(
     robot: Robot, model: CableModel, cables: Array, poses: Array, wrench: Array, *, stiffness: bool
 ) -> tuple[Array, Array, Array | None]:
-    """Largest tension [N], largest sag [m] and, if asked for, least stiffness [N/m], by the minimum norm.
+    """Largest tension [N], largest sag [m] and, if asked for, least stiffness [N/m], by the minimum norm, each (N,).
 
-    Each of shape (N,), NaN where there are no tensions; the stiffness is that of the softest direction of a force on
-    the center of mass.
-
-    Args:
-        robot: Robot whose other data all candidates share.
-        model: Cable model.
-        cables: Tables, one a pose, shape (N, m, CABLE_COLUMNS).
-        poses: Pose rows (N, POSE_COLUMNS).
-        wrench: On the platform, shape (6,).
-        stiffness: True to compute the stiffness.
+    NaN where there are no tensions. Tables (N, m, CABLE_COLUMNS), one a pose row; the stiffness is that of the softest
+    direction of a force on the center of mass.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
@@ -113,19 +105,9 @@ ITERATIONS: Final = 14  # each halves the step
 
 
 def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Array) -> tuple[Array, Array]:
-    """Move the anchors of each robot at its pose to the largest margin.
+    """Best anchor coordinates (R, q) of cable tables (R, m, CABLE_COLUMNS) at their pose rows, and margins (R,) [N].
 
-    A sample, the same for all, then steps along one number after another, halved from round to round: from the best of
-    the sample it climbs to a maximum of its own surroundings.
-
-    Args:
-        inner: Moving anchors.
-        margins: Gives margins [N], shape (R,).
-        cables: Tables of cables, one a pose, (R, m, CABLE_COLUMNS); they stay as they are.
-        poses: Pose rows (R, POSE_COLUMNS).
-
-    Returns:
-        The numbers that are best, shape (R, q), and their margins, shape (R,).
+    The best of a sample, then coordinate search with steps that are halved: a local maximum.
     """
     count, q = len(poses), len(inner.parts)
 
@@ -173,21 +155,7 @@ class Rating:
         robust: AnchorErrors | None,
         inner: Candidates | None,
     ) -> None:
-        """Prepare the ratings.
-
-        Args:
-            candidates: The robots.
-            goals: Goals of the ratings.
-            wrenches: Set of loads; None for the weight alone.
-            poses: A batch of G.
-            model: Cable model.
-            robust: Errors of the anchors, or None.
-            inner: Anchors that move at each pose, or None.
-
-        Raises:
-            InvalidValueError: If the load cannot be shared, a cost is missing, or the first robot holds no pose where
-                a goal needs tensions.
-        """
+        """Prepare; refused if a cost is missing, or the first robot holds no pose where a goal needs tensions."""
         self._candidates, self._goals, self._robust, self._inner = candidates, tuple(goals), robust, inner
         self._model, self._poses, self.rows = model, poses, pose_rows(poses)
         self._wrench = np.zeros(6) if wrenches is None else middle_of(wrenches)
@@ -201,14 +169,10 @@ class Rating:
             self._held = self._held_at(candidates.cables(candidates.start[None]))
 
     def __call__(self, values: Array) -> Array:
-        """Values of the goals, each in its unit.
+        """Values (N, g) of the goals for design variables (N, d).
 
-        Args:
-            values: Numbers of the candidates, shape (N, d).
-
-        Returns:
-            Shape (N, g); NaN where a candidate is no robot: two of its cables are one, limits are crossed, a frame
-            anchor is inside the platform, or it loses a pose that the first robot holds and a goal needs.
+        NaN for an impossible candidate: coincident cables, crossed limits, a frame anchor inside the platform, or
+        without tensions at a pose that the first robot holds and a goal needs.
         """
         size = max(1, ROWS // (len(self.rows) * (1 if self._robust is None else self._robust.samples)))
         parts = [self._rated(values[first : first + size]) for first in range(0, len(values), size)]

@@ -114,11 +114,7 @@ def checked_request(
     robot: Any, free: Any, goals: Any, wrenches: Any, poses: Pose, model: Any, inner: Any, robust: Any,
     optimizer: Any, seed: Any,
 ) -> Request:  # fmt: skip
-    """Request from the arguments of `design`, checked.
-
-    Raises:
-        InvalidValueError: If one is of the wrong kind; the message names it.
-    """
+    """Request from the arguments of `design`, checked."""
     optional(wrenches, WrenchSet, "wrenches")
     request = Request(
         instance(robot, Robot, "robot"),

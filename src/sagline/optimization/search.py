@@ -47,19 +47,7 @@ class Task(NamedTuple):
 
 
 def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
-    """Latin hypercube sample: each coordinate has one point in each of `count` equal intervals.
-
-    Args:
-        count: Number of points.
-        dimensions: Of the cube.
-        seed: Of the generator.
-
-    Returns:
-        Points from 0 to 1, shape (count, dimensions).
-
-    Source:
-        McKay, Beckman & Conover 1979.
-    """
+    """Latin hypercube sample (count, dimensions) from 0 to 1 (McKay, Beckman & Conover 1979)."""
     random = np.random.default_rng(seed)
     intervals = np.stack([random.permutation(count) for _ in range(dimensions)], axis=-1)
     return np.asarray((intervals + random.random((count, dimensions))) / count)
@@ -71,14 +59,7 @@ LEAST_DIMENSIONS: Final = 2  # numbers: with a single one the package fails; a s
 
 
 def search_cma(task: Task) -> None:
-    """Rate generation after generation until the evaluations are used up.
-
-    Args:
-        task: The problem, with one goal.
-
-    Source:
-        Hansen & Ostermeier 2001; restarts with a growing population: Auger & Hansen 2005.
-    """
+    """CMA-ES (Hansen & Ostermeier 2001), restarted with a growing population (Auger & Hansen 2005)."""
     cma = extra("cma")
     first = task.first
     costs = task.rate(first)[:, 0]
@@ -111,14 +92,7 @@ def _strategy(cma: Any, start: Array, random: np.random.Generator, population: i
 
 
 def search_differential_evolution(task: Task) -> None:
-    """Rate generation after generation until the evaluations are used up.
-
-    Args:
-        task: The problem, with one goal.
-
-    Source:
-        Storn & Price 1997.
-    """
+    """Differential evolution (Storn & Price 1997)."""
     from scipy.optimize import differential_evolution
 
     generations = task.evaluations // len(task.first) - 1
@@ -141,14 +115,7 @@ def search_differential_evolution(task: Task) -> None:
 
 
 def search_nsga2(task: Task) -> None:
-    """Rate generation after generation until the evaluations are used up.
-
-    Args:
-        task: The problem.
-
-    Source:
-        Deb, Pratap, Agarwal & Meyarivan 2002.
-    """
+    """NSGA-II (Deb, Pratap, Agarwal & Meyarivan 2002)."""
     evaluator, problems = extra("pymoo.core.evaluator"), extra("pymoo.core.problem")
     static, termination = extra("pymoo.problems.static"), extra("pymoo.core.termination")
     dimensions = task.first.shape[1]

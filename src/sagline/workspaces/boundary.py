@@ -69,29 +69,12 @@ def boundary(
     cells: int | tuple[int, int, int] = 32,
     refine: bool | int = True,
 ) -> Boundary:
-    """The boundary of the set where a function of positions is not negative, within a box.
+    """Boundary of the set where a function of positions (N, 3) [m] is not negative, within a box [m].
 
-    The function is evaluated at the nodes of a grid, then at those of half its step in cells that the boundary passes
-    through. Marching cubes on the signs gives a closed net of triangles, of which each vertex is found on its edge of
-    the grid, where the function changes its sign. How far the triangles' middles are from the boundary gives the
-    volume between, and with it the error bar.
-
-    Args:
-        level: The function, >= 0 inside, of positions [m], shape (N, 3); values of shape (N,), which may be infinite
-            but not NaN, and may jump.
-        low: Lower corner of the box [m], shape (3,).
-        high: Upper corner of the box [m], shape (3,).
-        cells: Number of cells along the longest side of the box, 2 to 128; the others have as many as keep cells near
-            cubes. Or how many along each axis.
-        refine: Number of times to halve the step in cells that the boundary passes through, as long as no more than 256
-            cells stand along an axis; True for once.
-
-    Returns:
-        Boundary.
-
-    Raises:
-        InvalidValueError: If the box is empty, an argument is out of range, or the function gives NaN.
-        FileError: If scikit-image is not installed.
+    The function may jump and be infinite, but not NaN. It is evaluated at the nodes of a grid with `cells` along the
+    longest side, or along each axis; then at half the step in cells that the boundary crosses, as often as `refine`
+    says. Marching cubes on the signs gives a closed net of triangles whose vertices are found on the edges of the
+    grid. The distances of the triangles' middles from the boundary give the volume between, and its error bar.
     """
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):

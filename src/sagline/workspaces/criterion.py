@@ -119,11 +119,7 @@ class Criterion:
     sense: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
-        """Refuse the interface itself, which is no criterion.
-
-        Raises:
-            InvalidValueError: If there is no condition.
-        """
+        """Refuse the interface itself."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
             raise InvalidValueError("Criterion()", "the interface alone", "a criterion", step)
@@ -191,11 +187,7 @@ class Criterion:
 
 
 def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> None:
-    """Refuse criteria on tensions that jump from pose to pose, or that depend on the pose before.
-
-    Raises:
-        InvalidValueError: If there are such criteria; the message names the continuous methods.
-    """
+    """Refuse criteria on tensions that jump from pose to pose, or that depend on the pose before."""
     jumps = not method.continuous or (isinstance(method, PolygonWalk) and method.optimum == "1-norm")
     first = next((one for one in criteria if one.needs_tensions), None)
     if first is None or not (jumps or isinstance(method, Closest)):

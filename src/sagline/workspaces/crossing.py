@@ -41,20 +41,7 @@ class Brackets(NamedTuple):
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Search from points outward where they are inside, inward where not, in steps that triple.
-
-    Args:
-        level: The function.
-        points: Start of each search [m], shape (N, 3).
-        outward: Direction of length 1, shape (N, 3).
-        at_points: The function there, shape (N,).
-        step: First step [m], > 0, shape (N,).
-        outer_limit: Largest distance outward [m], shape (N,).
-        inner_limit: Largest distance inward [m], shape (N,).
-
-    Returns:
-        Brackets.
-    """
+    """Search from points (N, 3) [m] outward where they are inside, else inward, in steps that triple up to a limit."""
     is_inside = at_points >= 0.0
     limit = np.where(is_inside, outer_limit, inner_limit)
     away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
@@ -102,26 +89,11 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Share of each of V lines that is inside, by regula falsi with reduced weight of an end that stays.
+    """Share of each of V lines that is inside, (V,), by regula falsi with reduced weight of an end that stays.
 
-    All lines that are not done are evaluated together, once a round. The bracket of a line is halved where an end is
-    infinite, and some times where regula falsi has not kept up with halving, as at jumps.
-
-    Args:
-        values: The functions of lines, by their indices, at as many positions.
-        inner: One end of each line, inside [m], shape (V, 3).
-        outer: The other end, outside [m], shape (V, 3).
-        at_inner: The function there, >= 0, shape (V,).
-        at_outer: The same at the other ends, < 0.
-        precision: Largest value that is taken for zero, of that at the end where it is smaller.
-        narrow: Share of a line to which a jump is found.
-
-    Returns:
-        Share of each line that is inside, from 0 to 1, shape (V,): at a jump, the last that is known to be.
-
-    Source:
-        Anderson & Björck 1973, "A new high order method of regula falsi type" (the weights; the Illinois method's are
-        1/2).
+    `values` gives the functions of lines, by their indices, at as many positions. A bracket is bisected where an end is
+    infinite, and several times where regula falsi is slower than bisection, as at jumps. `precision` is relative to the
+    smaller end value, `narrow` to the line. Weights: Anderson & Björck 1973 (the Illinois method's are 1/2).
     """
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()

@@ -67,18 +67,7 @@ class Grid(Result):
 
 
 def evaluate(level: Level, positions: Array) -> Array:
-    """Values of a level function, checked.
-
-    Args:
-        level: The function.
-        positions: Positions [m], shape (N, 3).
-
-    Returns:
-        Its values, shape (N,).
-
-    Raises:
-        InvalidValueError: If they are of another shape, or one is NaN.
-    """
+    """Values (N,) of a level function at positions (N, 3) [m]; refused if NaN or of another shape."""
     if not len(positions):
         return np.zeros(0)
     values = np.asarray(level(locked(np.ascontiguousarray(positions))), dtype=np.float64)
@@ -102,17 +91,7 @@ def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, in
 
 
 def refine_grid(grid: Grid, level: Level) -> Grid:
-    """Grid of half the step, evaluated only in cells that the boundary crosses.
-
-    A cell that turns out to be passed through because a finer neighbor is, is evaluated too.
-
-    Args:
-        grid: The coarser grid.
-        level: The function.
-
-    Returns:
-        Grid.
-    """
+    """Grid of half the step, evaluated only in cells that the boundary crosses on either grid."""
     axes = [np.interp(np.arange(2 * len(a) - 1) / 2.0, np.arange(len(a)), a) for a in grid.axes]
     nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
     fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
@@ -170,17 +149,7 @@ class Net:
 
 
 def triangulate(inside: Mask) -> Net:
-    """The triangles between inside and outside, closed along the border of the grid.
-
-    Args:
-        inside: Mask of the nodes inside, shape (nx, ny, nz).
-
-    Returns:
-        Net; without triangles where no node is inside.
-
-    Raises:
-        FileError: If scikit-image is not installed.
-    """
+    """Triangles between inside and outside nodes (nx, ny, nz), closed along the border of the grid."""
     none = np.zeros((0, 3), dtype=np.int64)
     if not inside.any():
         return Net(none, none, none, none[:, 0])

@@ -64,19 +64,9 @@ class MarginRows:
         moment_arm: float | None = None,
         cables: Array | None = None,
     ) -> None:
-        """Prepare.
+        """Prepare one robot or R of them; moment_arm [m] as of `margin`.
 
-        Args:
-            robot: A robot, or R of them.
-            wrenches: Set of loads.
-            model: Cable model.
-            moment_arm: Lever arm of the norm [m], >= 0; None for each robot's mean lever arm.
-            cables: Instead of the one robot's cables those of R robots that differ from it in nothing else, without R
-                objects: shape (R, m, CABLE_COLUMNS), columns as in `sagline.kernels.tables`; `cable_table(robot)` of
-                `sagline.statics.tables` is the robot's own, shape (1, m, CABLE_COLUMNS).
-
-        Raises:
-            InvalidValueError: If there are fewer cables than degrees of freedom, or an argument is out of range.
+        With `cables`, the tables (R, m, CABLE_COLUMNS) of R robots that differ from the one in nothing else.
         """
         robots = together(robot)
         shared = first_of(robots)
@@ -109,20 +99,7 @@ class MarginRows:
         return moved
 
     def rows(self, poses: NDArray[np.float64], progress: Progress | None = None) -> Bracket:
-        """Margins at poses.
-
-        Args:
-            poses: Rows of position [m] and unit quaternion, scalar last, shape (N, 7), unchecked; a row with NaN is no
-                pose and has status NO_CHORD. With R robots N is a multiple of R: the first N/R poses are the first
-                robot's, the next N/R the second's, and so on.
-            progress: Called after every few thousand poses: how many are done, of how many.
-
-        Returns:
-            Bracket.
-
-        Raises:
-            InvalidValueError: If N is no multiple of R.
-        """
+        """Margins at pose rows (N, 7), unchecked; NaN has status NO_CHORD. The first N/R rows are the first robot's."""
         rows = np.ascontiguousarray(poses, dtype=np.float64).view()
         count = len(rows)
         if count % self.robot_count:

@@ -87,16 +87,10 @@ class Prover:
         self._statuses = np.zeros(robot.cable_count, dtype=np.int8)
 
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
-        """Verdicts of boxes of poses, block by block; OPEN after the deadline.
+        """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline.
 
-        Args:
-            middle: Middles of the boxes [m], shape (N, 3).
-            half: Their half edges [m], shape (3,).
-            rotations: Rotation vectors at their middles [rad], shape (N, 3); None for level.
-            turns: Largest turn away from there [rad], shape () or (N,).
-
-        Returns:
-            Codes of `ProofVerdict`, shape (N,).
+        Boxes: middles (N, 3) and half edges (3,) [m], rotation vectors (N, 3), None for level, and largest turns away
+        from there [rad], () or (N,).
         """
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle

@@ -46,20 +46,7 @@ class Region(NamedTuple):
 
 
 def region_of(robot: Robot, box: PoseBox | None, cells: int) -> Region:
-    """Region of a robot, from a box or by default from the robot's frame.
-
-    Args:
-        robot: The robot.
-        box: Box of positions; None: where the robot stands, with its test box if that reaches further, and of a
-            planar robot the plane of its cables.
-        cells: Number of cells along the longest edge.
-
-    Returns:
-        The region.
-
-    Raises:
-        InvalidValueError: If the box is none, of no extent along two axes, or not in the plane of a planar robot.
-    """
+    """Region of a box, or by default of the robot's frame and test box; of a planar robot in its cables' plane."""
     plane = _plane_axis(robot)
     optional(box, PoseBox, "box")
     if box is None:
