@@ -11,10 +11,10 @@ from scipy.optimize import least_squares
 
 import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
-from sagline.calibration.calibrate import active_sensors, readings_table
+from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import best_step, evaluate_step
 from sagline.calibration.parameters import external, parameters_of, robot_with
-from sagline.calibration.problem import Log, Problem, State, start_of
+from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, readings_table, start_of
 from sagline.core.arrays import Array
 from sagline.robot.drum import drums_of
 from tests.calibration.synthetic import Truth, true_robot, usual_sensors, with_drums
@@ -29,10 +29,10 @@ TILED = 100_000  # rows of which a pass is timed
 MILLION = 1_000_000
 
 
-def problem_of(log: sl.WinchLog) -> Problem:
+def problem_of(log: sl.WinchLog) -> FitProblem:
     """What a calibration of the CoGiRo by a log is to find."""
     sensors = active_sensors(log)
-    return Problem(
+    return FitProblem(
         COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), readings_table(log)
     )
 
@@ -108,14 +108,14 @@ def large() -> Iterator[Row]:
         times = -(-rows // 60)
         assert small.log.counts is not None
         silent = small.log.positions[:1], small.log.rotations[:1]
-        tiled = Log(
+        tiled = ReadingsTable(
             np.tile(small.log.counts, (times, 1))[:rows],
             None,
             np.tile(small.log.cells, (times, 1))[:rows],
             *(np.broadcast_to(one, (rows, one.shape[1])) for one in silent),
         )
         problem = small._replace(log=tiled)
-        begin = State(
+        begin = SearchState(
             state.numbers,
             state.machine,
             np.tile(state.lengths, (times, 1))[:rows],

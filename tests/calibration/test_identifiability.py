@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import Direction
-from sagline.calibration.identifiability import append_rows, gauge_of, prior_units, told
+from sagline.calibration.identifiability import append_rows, gauge_of, numerical_rank, prior_units
 from sagline.calibration.observations import predicted_rows
 from sagline.calibration.parameters import KINDS, Parameters
 from sagline.core.arrays import Array
@@ -253,4 +253,4 @@ def test_rows_in_parts_fold_into_the_same_triangle() -> None:
     ],
 )
 def test_the_gap_between_told_and_open(values: list[float], count: int) -> None:
-    assert told(np.array(values)) == count
+    assert numerical_rank(np.array(values)) == count

@@ -5,11 +5,20 @@ import pytest
 from scipy.optimize import least_squares
 
 import sagline as sl
-from sagline.calibration.calibrate import active_sensors, readings_table
+from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import evaluate_step, predict_state, solve
 from sagline.calibration.log import load_cells_of
 from sagline.calibration.parameters import external, parameters_of, robot_with
-from sagline.calibration.problem import Fit, Log, Problem, State, machine_at, reported_lengths, start_of
+from sagline.calibration.problem import (
+    Fit,
+    FitProblem,
+    ReadingsTable,
+    SearchState,
+    machine_at,
+    readings_table,
+    reported_lengths,
+    start_of,
+)
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import robots, standing
@@ -21,25 +30,25 @@ ERRORS = {"frame_anchors": 0.02, "axial_stiffness": 0.05, "mass": 0.02}
 UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 
 
-def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot) -> Problem:
+def problem_of(made: Synthetic, unknowns: list[sl.Unknown], nominal: sl.Robot) -> FitProblem:
     sensors = active_sensors(made.log)
     parameters = parameters_of(nominal, unknowns, sensors, counted=made.log.counts is not None)
-    return Problem(nominal, sl.Catenary(), sensors, parameters, readings_table(made.log))
+    return FitProblem(nominal, sl.Catenary(), sensors, parameters, readings_table(made.log))
 
 
-def fitted(problem: Problem, made: Synthetic, *, robust: bool = False) -> Fit:
+def fitted(problem: FitProblem, made: Synthetic, *, robust: bool = False) -> Fit:
     kept = np.ones(len(made.log), dtype=np.bool_)
     begun = evaluate_step(problem, start_of(problem, made.log.commanded), None, kept)
     return solve(problem, begun, kept, robust=robust)
 
 
-def errors_of(problem: Problem, fit: Fit) -> Array:
+def errors_of(problem: FitProblem, fit: Fit) -> Array:
     """Standard errors of the internal numbers, (P,)."""
     information = fit.normal.matrix + np.diag(problem.prior_deviation**-2.0)
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
 
-def plainly(problem: Problem, made: Synthetic, fit: Fit) -> Array:
+def plainly(problem: FitProblem, made: Synthetic, fit: Fit) -> Array:
     """The numbers and lengths that a library's least squares finds from the same sum of squares, by the public API."""
     log, sensors, poses = made.log, problem.sensors, made.pose
     assert log.counts is not None
@@ -144,14 +153,14 @@ def missed_after(name: str, share: float) -> tuple[float, float]:
     gain, bias = load_cells_of(robot)
     cells = gain * sl.forward(robot, lengths, pose).state.cables.frame_end_tension + bias  # what is not off stays so
     silent = np.full((len(lengths), 3), np.nan), np.full((len(lengths), 4), np.nan)
-    problem = Problem(
+    problem = FitProblem(
         robot,
         model,
         given,
         parameters_of(robot, ALL, given, counted=False),
-        Log(None, lengths, cells, *silent),
+        ReadingsTable(None, lengths, cells, *silent),
     )
-    before = State(problem.prior, machine_at(problem, problem.prior), lengths, reference.pose_rows(pose))
+    before = SearchState(problem.prior, machine_at(problem, problem.prior), lengths, reference.pose_rows(pose))
     step = share * 0.02 * problem.scale * np.cos(np.arange(len(problem.prior)))
     after, part = machine_at(problem, problem.prior + step), slice(0, len(lengths))
     found, starts = predict_state(problem, before, None, step, after, reported_lengths(problem, after, part), part)

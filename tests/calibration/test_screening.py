@@ -30,17 +30,17 @@ def changed(values: Array | None, index: Any, value: float) -> Array:
 
 
 def left_out(log: sl.WinchLog, **options: float) -> dict[str, list[int]]:
-    found = screen(ROBOT, log, **options)
-    assert len(found.log) == len(found.rows)
-    np.testing.assert_array_equal(found.log.readings, log.readings[found.rows])
-    omitted = np.concatenate([found.rows, *found.left_out.values()])
+    fit, fit_rows, others = screen(ROBOT, log, **options)
+    assert len(fit) == len(fit_rows)
+    np.testing.assert_array_equal(fit.readings, log.readings[fit_rows])
+    omitted = np.concatenate([fit_rows, *others.values()])
     np.testing.assert_array_equal(np.sort(omitted), np.arange(len(log)))  # none is counted twice, none in silence
-    return {reason.name: rows.tolist() for reason, rows in found.left_out.items()}
+    return {reason.name: rows.tolist() for reason, rows in others.items()}
 
 
 def test_every_row_of_an_honest_log_is_kept(honest: Synthetic) -> None:
     assert left_out(honest.log) == {}
-    assert screen(ROBOT, honest.log).log is honest.log
+    assert screen(ROBOT, honest.log)[0] is honest.log
 
 
 def test_lengths_are_those_of_the_counts(honest: Synthetic) -> None:
@@ -110,8 +110,8 @@ def test_slack_rows_are_left_out(honest: Synthetic) -> None:
     assert left_out(log.replace(load_cells=changed(log.load_cells, (4, 6), 15.0))) == {"SLACK": [4]}
     assert left_out(log.replace(load_cells=changed(log.load_cells, (4, 6), 15.01))) == {}
     biased = with_drums(load_cell_bias=20.0)
-    found = screen(biased, log.replace(load_cells=changed(log.load_cells, (4, 6), 35.0)))
-    assert found.left_out[sl.Omission.SLACK].tolist() == [4]
+    _, _, others = screen(biased, log.replace(load_cells=changed(log.load_cells, (4, 6), 35.0)))
+    assert others[sl.Omission.SLACK].tolist() == [4]
 
 
 def test_a_row_is_counted_for_its_first_reason(honest: Synthetic) -> None:

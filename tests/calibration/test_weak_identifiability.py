@@ -11,7 +11,7 @@ from sagline.calibration.findings import Direction
 from sagline.calibration.identifiability import append_rows, gauge_of, prior_units
 from sagline.calibration.observations import predicted_rows
 from sagline.calibration.parameters import Parameters
-from sagline.calibration.weak_identifiability import cannot_tell_apart
+from sagline.calibration.weak_identifiability import weak_directions
 from sagline.core.arrays import Array
 from tests.calibration import reference
 from tests.calibration.machines import standing
@@ -41,7 +41,7 @@ def told(robot: str, unknowns: tuple[str, ...], *, positions: bool = False) -> T
     basis = np.linalg.qr(left.T)[0]
     outside = np.eye(rows.shape[1]) - basis @ basis.T
     scatter: Array = outside @ np.linalg.inv(rows.T @ rows + np.eye(rows.shape[1])) @ outside
-    return Told(parameters, scatter, cannot_tell_apart(triangle, parameters, gauge))
+    return Told(parameters, scatter, weak_directions(triangle, parameters, gauge))
 
 
 @extended

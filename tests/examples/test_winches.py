@@ -57,7 +57,7 @@ def test_the_log_is_what_the_true_robot_reads(tmp_path: Path) -> None:
 @extended
 def test_every_row_is_fit_and_nothing_is_suspected() -> None:
     robot, log = sl.load_robot(DRAWN), sl.load_log(LOG)
-    assert len(screen(robot, log).log) == len(log) == 60
+    assert len(screen(robot, log)[0]) == len(log) == 60
     assert diagnose_log(robot, log) == ()
 
 

@@ -14,13 +14,13 @@ from sagline.calibration.evaluation import evaluate
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
 from sagline.calibration.log import Sensors, WinchLog
-from sagline.calibration.parameters import Parameters, Unknown, chosen, parameters_of
-from sagline.calibration.problem import Log, Problem
+from sagline.calibration.parameters import Parameters, Unknown, checked_unknowns, parameters_of
+from sagline.calibration.problem import FitProblem, readings_table
 from sagline.calibration.result import Calibration
 from sagline.calibration.screening import reading_count, screen
 from sagline.calibration.search import cross_validate, search_from_priors
 from sagline.core.arguments import callback, instance, whole_number
-from sagline.core.arrays import Array, Indices
+from sagline.core.arrays import Indices
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 from sagline.core.progress import Progress
@@ -92,26 +92,24 @@ def calibrate(
     callback(progress, "progress")
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
-    asked = chosen(unknowns)  # before any work
+    checked = checked_unknowns(unknowns)  # before any work
     _refuse(wrong_units(robot, log))
-    fit_for = screen(robot, log)
-    sensors = active_sensors(fit_for.log)
-    parameters = parameters_of(robot, asked, sensors, counted=log.counts is not None)
-    _check_count(fit_for.log, parameters, fit_for.left_out)
-    problem = Problem(robot, model, sensors, parameters, readings_table(fit_for.log))
+    fit_log, rows, left_out = screen(robot, log)
+    sensors = active_sensors(fit_log)
+    parameters = parameters_of(robot, checked, sensors, counted=log.counts is not None)
+    _check_count(fit_log, parameters, left_out)
+    problem = FitProblem(robot, model, sensors, parameters, readings_table(fit_log))
     try:
-        found = search_from_priors(problem, fit_for.log.commanded, robust=robust, progress=progress)
+        found = search_from_priors(problem, fit_log.commanded, robust=robust, progress=progress)
     except InvalidValueError:
-        _refuse(diagnose_log(robot, _in_known_axes(log, parameters), model))
-        _refuse_unlike(robot, fit_for.log, parameters, model)
+        _refuse_mistakes(robot, log, fit_log, parameters, model)
         raise
     if not found.fit.converged or misfit(found.fit.normal) > GOOD:
-        _refuse(diagnose_log(robot, _in_known_axes(log, parameters), model))
-        _refuse_unlike(robot, fit_for.log, parameters, model)
+        _refuse_mistakes(robot, log, fit_log, parameters, model)
     elif Omission.OTHER_EQUILIBRIUM in found.left_out:
-        _refuse(frame_mismatch(fit_for.log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
+        _refuse(frame_mismatch(fit_log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
     validation = cross_validate(problem, found, folds, robust=robust, progress=progress) if folds else None
-    return evaluate(problem, found, fit_for.rows, fit_for.left_out, log.source, validation)
+    return evaluate(problem, found, rows, left_out, log.source, validation)
 
 
 def active_sensors(log: WinchLog) -> Sensors:
@@ -128,22 +126,6 @@ def active_sensors(log: WinchLog) -> Sensors:
     return log.sensors.replace(**silent)
 
 
-def readings_table(log: WinchLog) -> Log:
-    """The readings of a log as the least squares take them."""
-    count, m = log.readings.shape
-
-    def table(read: Array | None, width: int) -> Array:
-        return np.full((count, width), np.nan) if read is None else read
-
-    return Log(
-        log.counts,
-        log.unstrained_length,
-        table(log.load_cells, m),
-        table(log.position, 3),
-        table(log.rotation, 4),
-    )
-
-
 def _check_model(robot: Robot, model: CableModel) -> None:
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Use Catenary()."
@@ -153,17 +135,13 @@ def _check_model(robot: Robot, model: CableModel) -> None:
         raise InvalidValueError("winches: guides", "given", "None for calibrate", step)
 
 
-def _in_known_axes(log: WinchLog, parameters: Parameters) -> WinchLog:
-    """A log without what a measuring system read of which nobody knows yet where it stands, or what it sees."""
-    if {"measuring_frame", "target"}.isdisjoint(parameters.names):
-        return log
-    return log.replace(position=None, rotation=None)
-
-
-def _refuse_unlike(robot: Robot, log: WinchLog, parameters: Parameters, model: CableModel) -> None:
-    """Refuse measured poses where everything fits but them."""
-    if fits_without_measured_poses(robot, log, model):
-        _refuse(frame_mismatch(log, np.arange(len(log)), parameters.names))
+def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters: Parameters, model: CableModel) -> None:
+    """Refuse a log with a likely mistake, or measured poses where everything else fits."""
+    if not {"measuring_frame", "target"}.isdisjoint(parameters.names):
+        log = log.replace(position=None, rotation=None)  # in axes that are not known yet
+    _refuse(diagnose_log(robot, log, model))
+    if fits_without_measured_poses(robot, fit_log, model):
+        _refuse(frame_mismatch(fit_log, np.arange(len(fit_log)), parameters.names))
 
 
 def _refuse(sentences: Iterable[str]) -> None:

@@ -1,4 +1,4 @@
-"""Candidates of calibration poses: feasible poses of a box, each with several sets of tensions; short tours."""
+"""CandidatePoses of calibration poses: feasible poses of a box, each with several sets of tensions; short tours."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ UNLIMITED: Final = 3.0  # times the largest tension of least norm: what stands i
 SAME: Final = 1e-6  # of the largest tension: sets nearer than this are one
 
 
-class Candidates(NamedTuple):
+class CandidatePoses(NamedTuple):
     """Equilibria, N of them.
 
     Attributes:
@@ -44,14 +44,14 @@ class Candidates(NamedTuple):
     place: Indices
     usual: Flags
 
-    def part(self, which: Flags | Indices | slice) -> Candidates:
+    def part(self, which: Flags | Indices | slice) -> CandidatePoses:
         """Some of them."""
-        return Candidates(*(locked(np.ascontiguousarray(each[which])) for each in self))
+        return CandidatePoses(*(locked(np.ascontiguousarray(each[which])) for each in self))
 
 
 def candidates_of(
     robot: Robot, model: CableModel, box: PoseBox, count: int, seed: int, progress: Progress | None = None
-) -> Candidates:
+) -> CandidatePoses:
     """Feasible poses of a box, at most `count`, each with several sets of tensions near corners of the feasible ones.
 
     Every other pose is drawn evenly from the box, the rest nearer to its faces and largest tilt, where readings are
@@ -60,7 +60,7 @@ def candidates_of(
     rng = np.random.default_rng(seed)
     sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
     for kept in (KEPT, 0.0):
-        found: list[Candidates] = []
+        found: list[CandidatePoses] = []
         statuses: list[Codes] = []
         first, missing = 0, count
         for _ in range(ROUNDS):
@@ -77,8 +77,8 @@ def candidates_of(
     raise _none_feasible(robot, np.concatenate(statuses))
 
 
-def _concatenated(parts: list[Candidates]) -> Candidates:
-    return Candidates(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+def _concatenated(parts: list[CandidatePoses]) -> CandidatePoses:
+    return CandidatePoses(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def _random_poses(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> Pose:
@@ -110,7 +110,7 @@ def _with_margins(robot: Robot, model: CableModel, poses: Pose, kept: float) -> 
 
 def _feasible(
     robot: Robot, model: CableModel, poses: Pose, sets: int, rng: np.random.Generator, progress: Progress | None
-) -> tuple[Candidates, Codes]:
+) -> tuple[CandidatePoses, Codes]:
     """The feasible ones among poses with sets of tensions, and how each was solved."""
     found, statuses = [], []
     for part in blocks(len(poses), GROUP, progress):
@@ -123,7 +123,9 @@ def _feasible(
         which, number = np.nonzero(usable & _different(tensions))
         place = part.start + which
         found.append(
-            Candidates(pose_rows(group)[which], lengths[which, number], tensions[which, number], place, place % 2 == 0)
+            CandidatePoses(
+                pose_rows(group)[which], lengths[which, number], tensions[which, number], place, place % 2 == 0
+            )
         )
     return _concatenated(found), np.concatenate(statuses)
 

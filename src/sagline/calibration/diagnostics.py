@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
-from sagline.calibration.hypotheses import Change, Trial
+from sagline.calibration.hypotheses import Hypothesis, Trial
 from sagline.calibration.log import WinchLog, load_cells_of
 from sagline.calibration.screening import screen
 from sagline.core.arguments import instance
@@ -42,7 +42,7 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> 
     instance(model, CableModel, "model")
     if found := tuple(wrong_units(robot, log)):
         return found  # what else there is shows when they are right
-    rows = screen(robot, log).rows
+    _, rows, _ = screen(robot, log)
     if not len(rows) or (log.load_cells is None and log.position is None):
         return ()
     return tuple(_single_mistake(Trial(robot, model, log, rows)))
@@ -97,7 +97,7 @@ def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) 
     if log.load_cells is None or (log.position is None and log.rotation is None):
         return False
     own = log.replace(position=None, rotation=None)
-    return Trial(robot, model, own, np.arange(len(log))).result(Change()).quality <= GOOD
+    return Trial(robot, model, own, np.arange(len(log))).result(Hypothesis()).quality <= GOOD
 
 
 def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> Iterator[str]:
@@ -134,7 +134,7 @@ def _spread(position: Array) -> float:
 
 def _single_mistake(trial: Trial) -> Iterator[str]:
     """The one mistake without which a robot fits the readings."""
-    whole = trial.result(Change())
+    whole = trial.result(Hypothesis())
     far = _far(trial, whole.zeros)
     if whole.quality <= GOOD:
         if far.any():
@@ -154,33 +154,33 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
             return
 
 
-def _length_changes(trial: Trial) -> Iterator[Change]:
+def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
     """Possible mistakes in lengths or counts, alone or with the load cells of the same cables."""
     m = trial.robot.cable_count
     for two in combinations(range(m), 2):
-        yield Change(lengths=two)
+        yield Hypothesis(lengths=two)
         if trial.log.load_cells is not None:
-            yield Change(lengths=two, cells=two)
+            yield Hypothesis(lengths=two, cells=two)
     for cable in range(m):
         if trial.log.counts is not None or trial.log.commanded is not None:
-            yield Change(flipped=cable)
+            yield Hypothesis(flipped=cable)
     if trial.log.commanded is not None:
         off, scatter = trial.offsets()
         far = (np.abs(off) > FAR * _usual(trial)) & (scatter < 0.5 * np.abs(off))
         if far.any():
-            yield Change(moved=tuple(np.flatnonzero(far).tolist()))
+            yield Hypothesis(moved=tuple(np.flatnonzero(far).tolist()))
 
 
-def _load_cell_changes(trial: Trial) -> Iterator[Change]:
+def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
     """Possible mistakes in the load cells alone."""
     if trial.log.load_cells is None:
         return
     for two in combinations(range(trial.robot.cable_count), 2):
-        yield Change(cells=two)
+        yield Hypothesis(cells=two)
     for late in range(1, SHIFTS + 1):
         if len(trial.log) > 2 * late:
-            yield Change(late=late)
-            yield Change(late=-late)
+            yield Hypothesis(late=late)
+            yield Hypothesis(late=-late)
 
 
 def _usual(trial: Trial) -> Array:
@@ -206,7 +206,7 @@ def _zero_text(zeros: Array, far: Flags) -> str:
     return f"lengths have a zero far off: {listed}; correct length_zero of the winches there, or home the robot again"
 
 
-def _change_text(change: Change, log: WinchLog) -> str:
+def _change_text(change: Hypothesis, log: WinchLog) -> str:
     kind = "count" if log.counts is not None else "length"
     if change.lengths is not None:
         i, j = change.lengths

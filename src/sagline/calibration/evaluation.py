@@ -15,10 +15,10 @@ from sagline.calibration.least_squares import QUANTILE, exceeded_with, whitened_
 from sagline.calibration.observations import BLOCK
 from sagline.calibration.outliers import misfitting, outliers_in
 from sagline.calibration.parameters import KINDS, Parameters, external
-from sagline.calibration.problem import Fit, Problem, reported_lengths
+from sagline.calibration.problem import Fit, FitProblem, reported_lengths
 from sagline.calibration.result import Calibration
 from sagline.calibration.search import SearchResult
-from sagline.calibration.weak_identifiability import cannot_tell_apart
+from sagline.calibration.weak_identifiability import weak_directions
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
@@ -32,7 +32,7 @@ LITTLE: Final = 1e-6  # of a direction: a number that has so little of it is tol
 
 
 def evaluate(
-    problem: Problem,
+    problem: FitProblem,
     found: SearchResult,
     rows: Indices,
     left_out: Mapping[Omission, Indices],
@@ -42,7 +42,7 @@ def evaluate(
     """Result of a search; `rows` of the log are those of the problem (N,), `left_out` the reasons for the others."""
     fit, kept, parameters = found.fit, found.kept, problem.parameters
     numbers, machine, normal = fit.state.numbers, fit.state.machine, fit.normal
-    residuals, triangle = final_readings(problem, fit)
+    residuals, triangle = _final_readings(problem, fit)
     values = external(parameters, numbers)
     gauge = gauge_of(triangle, parameters, values, machine.robot, machine.sensors)
     covariance, rank = covariance_of(problem, triangle, machine.slopes)
@@ -74,7 +74,7 @@ def evaluate(
         weights=locked(normal.weights[kept]),
         outliers=outliers_in(problem, fit.state, bad, rows[bad], count=int(kept.sum())),
         gauge=gauge,
-        cannot_tell_apart=cannot_tell_apart(triangle, parameters, gauge),
+        cannot_tell_apart=weak_directions(triangle, parameters, gauge),
         cross_validation=validation,
         iterations=fit.iterations,
         model=problem.model,
@@ -96,7 +96,7 @@ def _status(found: SearchResult, chi_squared: float, freedoms: int) -> Calibrati
     return CalibrationStatus.DOUBTFUL if doubt else CalibrationStatus.FOUND
 
 
-def final_readings(problem: Problem, fit: Fit) -> tuple[Array, Array]:
+def _final_readings(problem: FitProblem, fit: Fit) -> tuple[Array, Array]:
     """Residuals (N, 2 m + 6) [m, N, m, rad], NaN for none, and triangular factor of the weighted whitened slopes."""
     state, residuals = fit.state, []
     triangle = np.zeros((0, len(state.numbers)))
@@ -108,7 +108,7 @@ def final_readings(problem: Problem, fit: Fit) -> tuple[Array, Array]:
     return np.concatenate(residuals), triangle
 
 
-def covariance_of(problem: Problem, triangle: Array, slopes: Array) -> tuple[Array, int]:
+def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[Array, int]:
     """Covariance of the values (P, P) and its rank; infinite on the diagonal without observations and prior."""
     scale, deviation = problem.scale, problem.prior_deviation
     known = np.where(np.isfinite(deviation), scale / deviation, 0.0)

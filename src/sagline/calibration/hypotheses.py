@@ -12,7 +12,15 @@ from sagline.cables.model import CableModel
 from sagline.calibration.least_squares import best_step, evaluate_step, solve
 from sagline.calibration.log import WinchLog
 from sagline.calibration.parameters import Unknown, parameters_of
-from sagline.calibration.problem import Evaluated, Log, Problem, State, machine_at, reported_lengths, start_of
+from sagline.calibration.problem import (
+    Evaluated,
+    FitProblem,
+    SearchState,
+    machine_at,
+    readings_table,
+    reported_lengths,
+    start_of,
+)
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError
 from sagline.robot.drum import drums_of
@@ -37,7 +45,7 @@ _WIDE: Final = {
 }
 
 
-class Change(NamedTuple):
+class Hypothesis(NamedTuple):
     """A change of the readings.
 
     Attributes:
@@ -55,7 +63,7 @@ class Change(NamedTuple):
     late: int = 0
 
 
-class TrialResult(NamedTuple):
+class _TrialResult(NamedTuple):
     """Fit of the readings after a change.
 
     Attributes:
@@ -87,22 +95,22 @@ class Trial:
     model: CableModel
     log: WinchLog
     rows: Indices
-    found: dict[tuple[Change, int], Pose] = field(default_factory=dict)
+    found: dict[tuple[Hypothesis, int], Pose] = field(default_factory=dict)
 
-    def result(self, change: Change) -> TrialResult:
+    def result(self, change: Hypothesis) -> _TrialResult:
         """Fit of any robot similar to this one to the changed readings."""
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
         except (InvalidValueError, np.linalg.LinAlgError):  # with such readings it goes astray
-            return TrialResult(np.inf, np.inf, moved)
+            return _TrialResult(np.inf, np.inf, moved)
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
         zeros = np.array([name == "length_zero" for name in problem.parameters.names])
         departure = float(np.mean((off / problem.prior_deviation) ** 2))
-        return TrialResult(quality, departure, moved + off[zeros])
+        return _TrialResult(quality, departure, moved + off[zeros])
 
-    def promise(self, change: Change, steps: int) -> float:
+    def promise(self, change: Hypothesis, steps: int) -> float:
         """Predicted sum of squares a row, one step after some steps of the least squares; infinite without a fit."""
         most = FEWEST_ROWS if self.log.commanded is None else MOST_ROWS
         problem, poses, _ = self._problem(change, most)
@@ -118,40 +126,34 @@ class Trial:
         there = int(np.count_nonzero(kept))
         return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
 
-    def most_promising(self, changes: Iterable[Change], steps: int, most: int) -> list[Change]:
+    def most_promising(self, changes: Iterable[Hypothesis], steps: int, most: int) -> list[Hypothesis]:
         """Changes with a better prediction than no change, the best first, at most `most`."""
         promises = {change: self.promise(change, steps) for change in changes}
-        limit = self.promise(Change(), steps)
+        limit = self.promise(Hypothesis(), steps)
         return sorted((change for change in promises if promises[change] < limit), key=promises.__getitem__)[:most]
 
     def offsets(self) -> tuple[Array, Array]:
         """Median offset of lengths from those of the commanded poses, and its median deviation [m], both (m,)."""
-        problem, poses, _ = self._problem(Change(), MOST_ROWS)
+        problem, poses, _ = self._problem(Hypothesis(), MOST_ROWS)
         return _offsets(problem, poses)
 
-    def _problem(self, change: Change, most: int) -> tuple[Problem, Pose | None, Array]:
+    def _problem(self, change: Hypothesis, most: int) -> tuple[FitProblem, Pose | None, Array]:
         """The least squares of some of the rows, their commanded poses, and by how much zeros were moved."""
         log, late, m = self.log, change.late, self.robot.cable_count
         rows = self.rows[(self.rows + late >= 0) & (self.rows + late < len(log))]
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]
-        none = np.full((len(rows), max(m, 4)), np.nan)
+        given = readings_table(log.rows(rows))
         read = _swap_columns(log.readings[rows], change.lengths)
-        cells = none[:, :m] if log.load_cells is None else _swap_columns(log.load_cells[rows + late], change.cells)
+        if log.load_cells is not None:
+            given = given._replace(cells=_swap_columns(log.load_cells[rows + late], change.cells))
         counted, winches = log.counts is not None, self.robot.winches
         if (cable := change.flipped) is not None:
             zero = winches.count_zero[cable] if counted and winches is not None else read[:, cable].max()
             read[:, cable] = 2.0 * zero - read[:, cable]
-        given = Log(
-            read if counted else None,
-            None if counted else read,
-            cells,
-            none[:, :3] if log.position is None else log.position[rows],
-            none[:, :4] if log.rotation is None else log.rotation[rows],
-        )
-        names = [name for name in _WIDE if self._has(name, counted)]
-        wide = [Unknown(name, deviation=_WIDE[name]) for name in names]
+        given = given._replace(**{"counts" if counted else "lengths": read})
+        wide = [Unknown(name, deviation=width) for name, width in _WIDE.items() if self._has(name, counted)]
         parameters = parameters_of(self.robot, wide, log.sensors, counted=counted)
-        problem = Problem(self.robot, self.model, log.sensors, parameters, given)
+        problem = FitProblem(self.robot, self.model, log.sensors, parameters, given)
         poses = self._poses(problem, change, most) if log.commanded is None else log.commanded[rows]
         moved = np.zeros(m)
         shifted = list(change.moved)
@@ -162,7 +164,7 @@ class Trial:
             read += moved * (self._counts_of_length() if counted else 1.0)
         return problem, poses, moved
 
-    def _poses(self, problem: Problem, change: Change, most: int) -> Pose | None:
+    def _poses(self, problem: FitProblem, change: Hypothesis, most: int) -> Pose | None:
         """Poses by forward kinematics of the lengths; None where there is an unsolved one."""
         key = change._replace(cells=None), most
         if key not in self.found:
@@ -187,14 +189,14 @@ class Trial:
         return found
 
 
-def _fitted(problem: Problem, state: State) -> Evaluated:
+def _fitted(problem: FitProblem, state: SearchState) -> Evaluated:
     """A few steps of the least squares: a robot that fits is found in half of them, of others only that it does not."""
     begun = evaluate_step(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
     fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, tolerance=TOLERANCE)
     return fit.state, fit.normal
 
 
-def _offsets(problem: Problem, poses: Pose | None) -> tuple[Array, Array]:
+def _offsets(problem: FitProblem, poses: Pose | None) -> tuple[Array, Array]:
     state = start_of(problem, poses)
     off = reported_lengths(problem, machine_at(problem, problem.prior), slice(None)) - state.lengths
     middle = np.median(off, axis=0)

@@ -16,7 +16,7 @@ from sagline.kernels.calibration import kinds
 from sagline.robot.robot import Robot
 
 OPEN: Final = 1e-12  # of the largest singular value: rounding of slopes that cancel
-_SPREAD: Final = 1e-9  # of the largest: no lower does a gap between told and open begin
+_SPREAD: Final = 1e-9  # of the largest: no lower does a gap between observable and open directions begin
 _FIXED: Final = 5e-2  # of the usual deviation: a number that a user states so well is known
 _WIDE: Final = 1e3  # of what is usual of a number that nobody gives: to look for it further away is no use
 _SAME: Final = 1e-6  # sine of an angle between directions that are one
@@ -63,7 +63,7 @@ def prior_units(parameters: Parameters) -> PriorUnits:
     return PriorUnits(scale, units, np.flatnonzero(~fixed).astype(np.int64))
 
 
-def open_directions(triangle: Array, frame: PriorUnits) -> Array:
+def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
     """Unit vectors, in standard deviations of the priors, that change nothing that is read: columns, (P, d)."""
     vectors = np.zeros((len(frame.scale), 0))
     if not frame.free.size:
@@ -71,12 +71,12 @@ def open_directions(triangle: Array, frame: PriorUnits) -> Array:
     scaled = triangle[:, frame.free] * frame.scale[frame.free]
     _, values, rows = np.linalg.svd(scaled, full_matrices=True)
     values = np.concatenate((values, np.zeros(len(rows) - len(values))))
-    vectors = np.zeros((len(frame.scale), len(rows) - told(values)))
-    vectors[frame.free] = rows[told(values) :].T
+    vectors = np.zeros((len(frame.scale), len(rows) - numerical_rank(values)))
+    vectors[frame.free] = rows[numerical_rank(values) :].T
     return vectors
 
 
-def told(values: Array) -> int:
+def numerical_rank(values: Array) -> int:
     """Number of singular values, falling, above rounding: those above the widest gap near `OPEN`."""
     largest = values[0] if values.size else 0.0
     if largest == 0.0:
@@ -100,8 +100,8 @@ def gauge_of(
     unit = np.eye(len(size))
     found = [_direction(*_largest(unit[index], parameters), frame) for index in alone]
     frame = frame._replace(free=np.setdiff1d(frame.free, alone))
-    left = open_directions(triangle, frame)
-    known = symmetries(robot, sensors, rotation_of_frame(parameters, values), counted=parameters.counted)
+    left = _open_directions(triangle, frame)
+    known = symmetries(robot, sensors, _rotation_of_frame(parameters, values), counted=parameters.counted)
     known = known._replace(matters=known.matters & ~np.isin(parameters.where, alone))
     vectors, named = _symmetric_part(left, frame, parameters.where, known)
     found += [_direction(name, vector, step, frame) for vector, (name, step) in zip(vectors.T, named, strict=True)]
@@ -113,7 +113,7 @@ def gauge_of(
     return tuple(found)
 
 
-def rotation_of_frame(parameters: Parameters, values: Array) -> Array:
+def _rotation_of_frame(parameters: Parameters, values: Array) -> Array:
     """Rotation vector of the measuring system, by which it is looked for [rad], (3,); zero where it is known."""
     where = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     return np.where(where >= 0, values[where], 0.0)

@@ -21,7 +21,7 @@ class Information:
     Attributes:
         rows: Slopes of the readings by the numbers, shape (N, k, P).
         covariance: Of the numbers, by what is known and what was taken, shape (P, P).
-        chosen: Candidates that were taken, in this order.
+        chosen: CandidatePoses that were taken, in this order.
     """
 
     def __init__(self, rows: Array, known: Array) -> None:

@@ -14,9 +14,25 @@ from scipy.spatial.transform import Rotation
 from scipy.special import chdtri
 
 from sagline.calibration.log import Sensors, reading_deviations
-from sagline.calibration.observations import BLOCK, NO_LOAD, Machine, Observed, counts_of, whitened_rows, winch_slopes
+from sagline.calibration.observations import (
+    BLOCK,
+    NO_LOAD,
+    MachineTerms,
+    WhitenedRows,
+    counts_of,
+    whitened_rows,
+    winch_slopes,
+)
 from sagline.calibration.parameters import left_jacobian
-from sagline.calibration.problem import Evaluated, Fit, Normal, Problem, State, machine_at, reported_lengths
+from sagline.calibration.problem import (
+    Evaluated,
+    Fit,
+    FitProblem,
+    Normal,
+    SearchState,
+    machine_at,
+    reported_lengths,
+)
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
@@ -37,14 +53,14 @@ LESS: Final = 0.9  # of the scale of misfits, where it is worth another look
 
 
 def whitened_at(
-    problem: Problem,
-    state: State,
+    problem: FitProblem,
+    state: SearchState,
     reported: Array,
     part: slice,
     direction: Array | None = None,
     *,
     free_of_noise: bool = False,
-) -> Observed:
+) -> WhitenedRows:
     """Whitened readings of some poses at a state, with their slopes; reported lengths [m], (n, m).
 
     With a direction (P,) only the slopes along it. `free_of_noise` takes slopes at true instead of reported lengths:
@@ -68,7 +84,7 @@ def whitened_at(
     return rows
 
 
-def squares_of(sensors: Sensors, rows: Observed, reported: Array, lengths: Array) -> tuple[Array, Indices]:
+def _squares_of(sensors: Sensors, rows: WhitenedRows, reported: Array, lengths: Array) -> tuple[Array, Indices]:
     """Sum of squares of each pose in standard deviations, and how many readings it has."""
     m = reported.shape[1]
     deviation = reading_deviations(sensors, m)
@@ -79,18 +95,18 @@ def squares_of(sensors: Sensors, rows: Observed, reported: Array, lengths: Array
     return squares, np.count_nonzero(there, axis=1)
 
 
-def limits_of(readings: Indices, scale: float) -> Array:
+def _limits_of(readings: Indices, scale: float) -> Array:
     """Sums of squares beyond which poses have less weight, (N,): a quantile of chi squared times a scale."""
     limits: Array = scale * exceeded_with(1.0 - QUANTILE, readings)
     return limits
 
 
-def pose_weights(squares: Array, readings: Indices, scale: float) -> Array:
+def _pose_weights(squares: Array, readings: Indices, scale: float) -> Array:
     """Weights of poses: less than 1 beyond the 99 % quantile of chi squared, times a scale."""
     if not np.isfinite(scale):
         return np.ones(len(squares))
     with np.errstate(divide="ignore", invalid="ignore"):
-        weights: Array = np.minimum(1.0, limits_of(readings, scale) / squares)
+        weights: Array = np.minimum(1.0, _limits_of(readings, scale) / squares)
     return np.where(np.isfinite(squares), weights, 0.0)
 
 
@@ -104,7 +120,13 @@ def misfit(normal: Normal) -> float:
 
 
 def predict_state(
-    problem: Problem, before: State, known: Observed | None, step: Array, machine: Machine, reported: Array, part: slice
+    problem: FitProblem,
+    before: SearchState,
+    known: WhitenedRows | None,
+    step: Array,
+    machine: MachineTerms,
+    reported: Array,
+    part: slice,
 ) -> tuple[Array, Array]:
     """First-order prediction of true lengths [m] and pose rows of some poses after a step of the parameters (P,).
 
@@ -118,16 +140,16 @@ def predict_state(
     off = np.einsum("nij,nj->ni", rows.back, rows.misfit - rows.matrix[..., 0])
     more = off - (before.lengths[part] - was)
     motion = rows.motion[:, -1] + np.einsum("ni,nik->nk", more, rows.motion[:, :-1])
-    return reported + off, move_poses(before.machine.robot, machine.robot, before.poses[part], motion)
+    return reported + off, _move_poses(before.machine.robot, machine.robot, before.poses[part], motion)
 
 
 def evaluate_step(
-    problem: Problem,
-    before: State,
+    problem: FitProblem,
+    before: SearchState,
     step: Array | None,
     kept: Flags,
     scale: float = np.inf,
-    known: Observed | None = None,
+    known: WhitenedRows | None = None,
     progress: Progress | None = None,
 ) -> Evaluated:
     """One pass over the log: solve every pose after a step of the parameters, and sum up the normal equations.
@@ -139,7 +161,7 @@ def evaluate_step(
     machine = before.machine if step is None else machine_at(problem, numbers)
     count, width = len(before.poses), len(numbers)
     lengths = before.lengths if step is None else np.empty(before.lengths.shape)
-    after = State(numbers, machine, lengths, before.poses.copy())
+    after = SearchState(numbers, machine, lengths, before.poses.copy())
     matrix, gradient = np.zeros((width, width)), np.zeros(width)
     squares, readings, weights = np.full(count, np.inf), np.zeros(count, dtype=np.int64), np.zeros(count)
     for part in blocks(count, BLOCK, progress):
@@ -154,9 +176,9 @@ def evaluate_step(
         after.poses[part][there] = solved.poses[there]
         rows = whitened_at(problem, after, reported, part)
         there &= ~np.isnan(rows.misfit).any(axis=1)
-        found, number = squares_of(machine.sensors, rows, reported, lengths)
+        found, number = _squares_of(machine.sensors, rows, reported, lengths)
         squares[part], readings[part] = np.where(there, found, np.inf), number
-        weights[part] = np.where(there, pose_weights(squares[part], number, scale), 0.0)
+        weights[part] = np.where(there, _pose_weights(squares[part], number, scale), 0.0)
         share, flat, misses = np.sqrt(weights[part]), rows.matrix, rows.misfit
         if not (share == 1.0).all():
             flat, misses = flat[there] * share[there, None, None], misses[there] * share[there, None]
@@ -166,12 +188,12 @@ def evaluate_step(
     return after, Normal(matrix, gradient, squares, readings, weights, rows if count <= BLOCK else None)
 
 
-def cost_of(problem: Problem, current: Evaluated, kept: Flags, scale: float) -> float:
+def _cost_of(problem: FitProblem, current: Evaluated, kept: Flags, scale: float) -> float:
     """Objective function; infinite where a pose that counts finds no equilibrium."""
     state, normal = current
     squares = normal.squares[kept]
     if np.isfinite(scale):
-        limit = limits_of(normal.readings[kept], scale)
+        limit = _limits_of(normal.readings[kept], scale)
         with np.errstate(divide="ignore", invalid="ignore"):
             squares = np.where(squares <= limit, squares, limit * (1.0 + np.log(squares / limit)))
     missed = problem.missed(state.numbers)
@@ -179,7 +201,7 @@ def cost_of(problem: Problem, current: Evaluated, kept: Flags, scale: float) -> 
 
 
 def solve(
-    problem: Problem,
+    problem: FitProblem,
     current: Evaluated,
     kept: Flags,
     *,
@@ -196,7 +218,7 @@ def solve(
     scale = np.inf
     if robust:
         first = max(misfit(current[1]), 1.0)
-        if pose_weights(current[1].squares, current[1].readings, first)[kept].min() < GROSS:
+        if _pose_weights(current[1].squares, current[1].readings, first)[kept].min() < GROSS:
             scale = first
             current = evaluate_step(problem, current[0], None, kept, scale, progress=progress)
     for iteration in range(steps):
@@ -206,14 +228,14 @@ def solve(
         step, promised = best_step(problem, *current)
         if promised <= tolerance and scale == before:
             return Fit(*current, True, iteration)
-        cost = cost_of(problem, current, kept, scale)
+        cost = _cost_of(problem, current, kept, scale)
         better = None
         for halving in range(HALVINGS):
             try:
                 trial = evaluate_step(problem, current[0], step * 0.5**halving, kept, scale, current[1].rows, progress)
             except InvalidValueError:  # a negative radius, say
                 continue
-            if cost_of(problem, trial, kept, scale) <= cost + ROUNDING * abs(cost):
+            if _cost_of(problem, trial, kept, scale) <= cost + ROUNDING * abs(cost):
                 better = trial
                 break
         if better is None:
@@ -222,7 +244,7 @@ def solve(
     return Fit(*current, False, steps)
 
 
-def best_step(problem: Problem, state: State, normal: Normal) -> tuple[Array, float]:
+def best_step(problem: FitProblem, state: SearchState, normal: Normal) -> tuple[Array, float]:
     """Gauss-Newton step of the internal parameters (P,) within their lower bounds, and the predicted decrease.
 
     Zero along directions with neither observations nor a prior.
@@ -273,7 +295,7 @@ def exceeded_with(probability: Any, freedoms: Any) -> Array:
     return np.asarray(chdtri(np.maximum(freedoms, 1), probability))
 
 
-def move_poses(before: Robot, after: Robot, poses: Array, motion: Array) -> Array:
+def _move_poses(before: Robot, after: Robot, poses: Array, motion: Array) -> Array:
     """Pose rows after small motions of the center of mass (N, 6) [m, rad]; it may differ in the platform afterwards."""
     turned = Rotation.from_quat(poses[:, 3:])
     turning = Rotation.from_rotvec(motion[:, 3:]) * turned

@@ -59,14 +59,14 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
     if winches.drum_distance is None and (winches.layers == 1.0).all():  # all turns have the same length
         slopes[0] = 1.0 / (1.0 + strain)
         if with_radius:
-            radius, pitch = _given(winches, "drum_radius"), _given(winches, "groove_pitch")
-            circle = 2.0 * np.pi * (radius + 0.5 * _given(robot.cables, "diameter"))
+            radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
+            circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
             turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # of a helix, by the radius
-            turns = (counts - winches.count_zero) / (winches.gear * _given(winches, "counts_per_turn"))
+            turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
             slopes[1] = turns * turn_slope / (1.0 + strain)
         return slopes
     for row, name in ((0, "length_zero"), (1, "drum_radius"))[: 1 + with_radius]:
-        value = _given(winches, name)
+        value = _known_field(winches, name)
         step = STEP * value
         ends = (robot.replace(winches=winches.replace(**{name: value + sign * step})) for sign in (-1.0, 1.0))
         low, high = (lengths_at_counts(drums_of(end), counts) for end in ends)
@@ -74,13 +74,13 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
     return slopes
 
 
-def _given(of: Winch | Cable, name: str) -> Array:
+def _known_field(of: Winch | Cable, name: str) -> Array:
     """A field whose presence `drums_of` has checked."""
     value: Array = getattr(of, name)
     return value
 
 
-class Observed(NamedTuple):
+class WhitenedRows(NamedTuple):
     """Whitened observations at N equilibria: independent rows of one standard deviation each.
 
     R is m + 6, or m where no system measures positions or rotations.
@@ -102,12 +102,12 @@ class Observed(NamedTuple):
     motion: Array
 
 
-def locked_view(array: Array) -> Array:
+def _locked_view(array: Array) -> Array:
     """The same numbers, write-locked and contiguous, as kernels are compiled for."""
     return locked(np.ascontiguousarray(array).view())
 
 
-def sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
+def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
     """Sensors as the kernel takes them; the deviation of a missing sensor is infinite."""
     m, (gain, bias) = robot.cable_count, load_cells_of(robot)
 
@@ -126,7 +126,7 @@ def sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
     )
 
 
-class Machine(NamedTuple):
+class MachineTerms(NamedTuple):
     """A robot with some numbers and its sensors, as the kernel takes them.
 
     Attributes:
@@ -152,11 +152,13 @@ class Machine(NamedTuple):
     slopes: Array
 
 
-def machine_of(robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array) -> Machine:
+def machine_of(
+    robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
+) -> MachineTerms:
     """A robot and its sensors as the kernel takes them; refused if counts are read and drum data are missing."""
     # pulleys and dead cable that are unknown have slopes, even where the robot has none yet
     routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
-    return Machine(
+    return MachineTerms(
         robot,
         sensors,
         offset,
@@ -164,20 +166,20 @@ def machine_of(robot: Robot, model: CableModel, parameters: Parameters, sensors:
         (model.code, *model.parameters, routed or None),
         body_table(robot),
         cable_table(robot),
-        sensor_arrays(robot, sensors),
+        _sensor_arrays(robot, sensors),
         slopes_of_values(robot, parameters),
     )
 
 
 def whitened_rows(
-    machine: Machine,
+    machine: MachineTerms,
     parameters: Parameters,
     readings: Readings,
     slopes: Array,
     poses: Array,
     lengths: Array,
     direction: Array | None = None,
-) -> Observed:
+) -> WhitenedRows:
     """Readings near equilibria to first order; NaN where the platform is not stable.
 
     slopes: of the reported lengths (3, N, m), by `winch_slopes`. With a direction (P,) only the slopes along it, P = 1.
@@ -191,7 +193,7 @@ def whitened_rows(
     given = machine.sensors
     measured = given.position_deviation is not None or given.rotation_deviation is not None
     rows = m + BESIDE if measured else m
-    found = Observed(
+    found = WhitenedRows(
         np.empty((count, rows, width)),
         np.empty((count, rows)),
         np.empty((count, m + BESIDE)),
@@ -200,15 +202,15 @@ def whitened_rows(
     )
     observe(
         machine.terms,
-        (machine.robot.freedom, machine.body, machine.cables, locked_view(lengths), locked_view(poses), NO_LOAD),
+        (machine.robot.freedom, machine.body, machine.cables, _locked_view(lengths), _locked_view(poses), NO_LOAD),
         machine.sensing,
         (
-            locked_view(readings.lengths),
-            locked_view(readings.cells),
-            locked_view(readings.positions),
-            locked_view(readings.rotations),
+            _locked_view(readings.lengths),
+            _locked_view(readings.cells),
+            _locked_view(readings.positions),
+            _locked_view(readings.rotations),
         ),
-        (where, locked(np.where(parameters.where >= 0, factor[parameters.where], 0.0)), locked_view(slopes)),
+        (where, locked(np.where(parameters.where >= 0, factor[parameters.where], 0.0)), _locked_view(slopes)),
         memory_for(m),
         (*found, np.empty((rows + 6, width))),
     )
@@ -217,7 +219,7 @@ def whitened_rows(
 
 def predicted_rows(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
-) -> Observed:
+) -> WhitenedRows:
     """Slopes of readings by these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; no misfit."""
     machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
     counts = None if machine.drums is None else counts_of(machine.drums, lengths)
@@ -259,7 +261,7 @@ class Reference(NamedTuple):
     """
 
     model: CableModel
-    machine: Machine
+    machine: MachineTerms
     parameters: Parameters
 
 

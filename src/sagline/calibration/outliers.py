@@ -13,7 +13,7 @@ from sagline.calibration.findings import Outlier
 from sagline.calibration.least_squares import exceeded_with
 from sagline.calibration.log import reading_deviations
 from sagline.calibration.observations import NO_LOAD, Reference, misfit_at, reference_of
-from sagline.calibration.problem import Problem, State, reported_lengths
+from sagline.calibration.problem import FitProblem, SearchState, reported_lengths
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import Readings
 from sagline.kinematics.forward_rows import solve_forward_rows
@@ -32,7 +32,7 @@ _TOLERANCE: Final = 1e-3  # of a sum of squares
 _HALVINGS: Final = 6
 
 
-class Suspect(NamedTuple):
+class _Suspect(NamedTuple):
     """A possible error at a pose.
 
     Attributes:
@@ -46,7 +46,7 @@ class Suspect(NamedTuple):
     which: Indices
 
 
-class SuspectFit(NamedTuple):
+class _SuspectFit(NamedTuple):
     """The fit of a pose with the suspects off by what fits best.
 
     Attributes:
@@ -60,7 +60,7 @@ class SuspectFit(NamedTuple):
     deviations: list[float]
 
 
-class Case(NamedTuple):
+class _Case(NamedTuple):
     """One pose of the log.
 
     Attributes:
@@ -85,7 +85,7 @@ class Case(NamedTuple):
         return np.concatenate((self.readings.lengths[0] - self.lengths[0], residual)), by_length
 
 
-def fit_suspects(case: Case, taken: Sequence[Suspect], iterations: int) -> SuspectFit:
+def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _SuspectFit:
     """Best fit of a pose with any error of the suspects: linear with one iteration, else nonlinear."""
     which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
     counts = np.concatenate((np.ones(case.lengths.shape[1], dtype=np.bool_), case.read))
@@ -102,12 +102,14 @@ def fit_suspects(case: Case, taken: Sequence[Suspect], iterations: int) -> Suspe
     return fit if iterations == 1 else fit._replace(squares=squares)
 
 
-def _squares(case: Case, counts: Flags) -> float:
+def _squares(case: _Case, counts: Flags) -> float:
     """Sum of squares of what counts."""
     return float(np.sum((case.misses()[0] / case.deviation)[counts] ** 2))
 
 
-def _linear_fit(case: Case, taken: Sequence[Suspect], which: Indices, counts: Flags) -> tuple[SuspectFit, Array, float]:
+def _linear_fit(
+    case: _Case, taken: Sequence[_Suspect], which: Indices, counts: Flags
+) -> tuple[_SuspectFit, Array, float]:
     """The best fit by the slopes, the true lengths that it asks for (m,), and the sum of squares before it."""
     misses, by_length = case.misses()
     m, read = case.lengths.shape[1], case.read
@@ -129,10 +131,10 @@ def _linear_fit(case: Case, taken: Sequence[Suspect], which: Indices, counts: Fl
         deviations.append(float(np.sqrt(max(own @ spread @ own, 0.0))))
         first = part.stop
     squares = float(np.sum((misses / case.deviation)[counts] ** 2))
-    return SuspectFit(float(rest @ cho_solve(factor, rest)), sizes, deviations), wanted, squares
+    return _SuspectFit(float(rest @ cho_solve(factor, rest)), sizes, deviations), wanted, squares
 
 
-def _improved(case: Case, counts: Flags, wanted: Array, squares: float) -> Case | None:
+def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Case | None:
     """The case at lengths on the way to those wanted, with a smaller sum of squares; None if there is none."""
     reference = case.reference
     for halving in range(_HALVINGS):
@@ -156,7 +158,9 @@ def misfitting(squares: Array, readings: Indices) -> Indices:
     return np.sort(bad[np.argsort(-known[bad], kind="stable")][:EXAMINED])
 
 
-def outliers_in(problem: Problem, state: State, which: Indices, rows: Indices, *, count: int) -> tuple[Outlier, ...]:
+def outliers_in(
+    problem: FitProblem, state: SearchState, which: Indices, rows: Indices, *, count: int
+) -> tuple[Outlier, ...]:
     """Causes of misfit at some poses of a search, in the order of their rows of the log.
 
     For every length, load cell and measured position or rotation of a pose: the error that explains the readings best.
@@ -172,29 +176,29 @@ def outliers_in(problem: Problem, state: State, which: Indices, rows: Indices, *
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)
         readings = Readings(reported[one], log.cells[one], log.positions[one], log.rotations[one])
-        case = Case(reference, deviation, readings, state.poses[one], state.lengths[one], read[k])
+        case = _Case(reference, deviation, readings, state.poses[one], state.lengths[one], read[k])
         found += _outliers_at(case, row, count)
     return tuple(found)
 
 
-def _outliers_at(case: Case, row: int, count: int) -> list[Outlier]:
+def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
     m = case.lengths.shape[1]
-    whole = fit_suspects(case, (), 1)
+    whole = _fit_suspects(case, (), 1)
     suspects = _suspects(m, case.read)
-    taken: list[Suspect] = []
+    taken: list[_Suspect] = []
     before = whole.squares
     for _ in range(_MOST):
-        first = [fit_suspects(case, (*taken, one), 1) for one in suspects]
+        first = [_fit_suspects(case, (*taken, one), 1) for one in suspects]
         rough = [_rarity(before, fit, one) for fit, one in zip(first, suspects, strict=True)]
         near_best = np.array(rough) < min(rough) + _WORTH
         close = [suspects[k] for k in np.flatnonzero(near_best)]
-        fits = [fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
+        fits = [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
         if min(fit.squares for fit in fits) > _limit(
             case.read, (*taken, close[0]), count
         ):  # none is right, or far from it
             likely = ~near_best & (np.array([fit.squares for fit in first]) < _NONLINEAR * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
-            fits += [fit_suspects(case, (*taken, one), _ITERATIONS) for one in more]
+            fits += [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in more]
             close += more
         rare = [_rarity(before, fit, one) for fit, one in zip(fits, close, strict=True)]
         best = int(np.argmin(rare))
@@ -215,13 +219,13 @@ def _outliers_at(case: Case, row: int, count: int) -> list[Outlier]:
     return [_whole(case, row, whole.squares)]
 
 
-def _limit(there: Flags, taken: Sequence[Suspect], count: int) -> float:
+def _limit(there: Flags, taken: Sequence[_Suspect], count: int) -> float:
     """Sum of squares that chance lets the worst of so many poses have, with some suspects taken out."""
     used = sum(len(one.which) for one in taken)
     return float(exceeded_with(CHANCE / count, int(there.sum()) - used))
 
 
-def _rarity(before: float, after: SuspectFit, suspect: Suspect) -> float:
+def _rarity(before: float, after: _SuspectFit, suspect: _Suspect) -> float:
     """Logarithm of the probability that chance alone improves the fit so much."""
     half, drop = 0.5 * len(suspect.which), max(before - after.squares, 0.0)
     if drop < _DROP:
@@ -229,17 +233,17 @@ def _rarity(before: float, after: SuspectFit, suspect: Suspect) -> float:
     return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # of its tail, which underflows
 
 
-def _suspects(m: int, there: Flags) -> list[Suspect]:
+def _suspects(m: int, there: Flags) -> list[_Suspect]:
     """All lengths and readings of a pose, as suspects."""
-    found = [Suspect("length", cable, np.array([cable])) for cable in range(m)]
-    found += [Suspect("load cell", cable, np.array([m + cable])) for cable in range(m) if there[cable]]
+    found = [_Suspect("length", cable, np.array([cable])) for cable in range(m)]
+    found += [_Suspect("load cell", cable, np.array([m + cable])) for cable in range(m) if there[cable]]
     for quantity, first in (("position", m), ("rotation", m + 3)):
         if (own := np.flatnonzero(there[first : first + 3])).size:
-            found.append(Suspect(quantity, None, m + first + own))
+            found.append(_Suspect(quantity, None, m + first + own))
     return found
 
 
-def _whole(case: Case, row: int, squares: float) -> Outlier:
+def _whole(case: _Case, row: int, squares: float) -> Outlier:
     """The pose as a whole, by the kind of reading that is the farthest off."""
     m = case.lengths.shape[1]
     off, _ = case.misses()

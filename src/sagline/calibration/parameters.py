@@ -18,21 +18,23 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 
-class Kind(NamedTuple):
+class _Kind(NamedTuple):
     """A kind of unknown.
 
     Attributes:
+        owner: Part of the robot that has it as a field, "robot", "cables" or "winches"; "system" for what measures.
         unit: Its unit in SI.
         first: Its first row of `kernels.calibration.kinds`.
         axes: Names of its components, ("",) for a single number.
-        each: Whether every cable has its own.
-        shared: Whether those of all cables are one number unless told otherwise.
-        logarithmic: Whether the logarithm is what is found: a positive number known to a share of itself.
-        deviation: Standard deviation of what a drawing or a data sheet says, a share of the value where logarithmic.
+        each: True if every cable has its own.
+        shared: True if all cables share one number by default.
+        logarithmic: True if the logarithm is estimated: a positive number known to a share of itself.
+        deviation: Standard deviation of a drawing or data sheet, a share of the value where logarithmic.
         assumed: The same of a value that the robot's source does not give.
-        needs: The readings without which nothing tells of it: "counts", "load cells", "positions"; "" for any.
+        needs: The readings that observe it: "counts", "load cells", "positions"; "" for any.
     """
 
+    owner: str
     unit: str
     first: int
     axes: tuple[str, ...]
@@ -45,23 +47,23 @@ class Kind(NamedTuple):
 
 
 _XYZ: Final = ("x", "y", "z")
-KINDS: Final[dict[str, Kind]] = {
-    "frame_anchors": Kind("m", kinds.FRAME, _XYZ, True, False, False, 0.05, 0.5),
-    "platform_anchors": Kind("m", kinds.PLATFORM, _XYZ, True, False, False, 0.02, 0.2),
-    "length_zero": Kind("m", kinds.ZERO, ("",), True, False, False, 0.1, 1.0),
-    "drum_radius": Kind("m", kinds.DRUM, ("",), True, True, True, 0.02, 0.1, "counts"),
-    "linear_density": Kind("kg/m", kinds.DENSITY, ("",), True, True, True, 0.1, 0.5),
-    "axial_stiffness": Kind("N", kinds.STIFFNESS, ("",), True, True, True, 0.3, 1.0),
-    "pulley_radius": Kind("m", kinds.RADIUS, ("",), True, True, False, 0.002, 0.02),
-    "dead_cable": Kind("m", kinds.DEAD, ("",), True, False, False, 0.1, 1.0),
-    "load_cell_gain": Kind("", kinds.GAIN, ("",), True, False, False, 0.05, 0.2, "load cells"),
-    "load_cell_bias": Kind("N", kinds.BIAS, ("",), True, False, False, 20.0, 100.0, "load cells"),
-    "mass": Kind("kg", kinds.MASS, ("",), False, False, True, 0.05, 0.2),
-    "center_of_mass": Kind("m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
-    "measuring_frame": Kind(
-        "m", kinds.SHIFT, (*_XYZ, "about x", "about y", "about z"), False, False, False, 10.0, 10.0, "positions"
-    ),
-    "target": Kind("m", kinds.TARGET, _XYZ, False, False, False, 0.1, 1.0, "positions"),
+_SIX: Final = (*_XYZ, "about x", "about y", "about z")
+_ONE: Final = ("",)
+KINDS: Final[dict[str, _Kind]] = {
+    "frame_anchors": _Kind("robot", "m", kinds.FRAME, _XYZ, True, False, False, 0.05, 0.5),
+    "platform_anchors": _Kind("robot", "m", kinds.PLATFORM, _XYZ, True, False, False, 0.02, 0.2),
+    "length_zero": _Kind("winches", "m", kinds.ZERO, _ONE, True, False, False, 0.1, 1.0),
+    "drum_radius": _Kind("winches", "m", kinds.DRUM, _ONE, True, True, True, 0.02, 0.1, "counts"),
+    "linear_density": _Kind("cables", "kg/m", kinds.DENSITY, _ONE, True, True, True, 0.1, 0.5),
+    "axial_stiffness": _Kind("cables", "N", kinds.STIFFNESS, _ONE, True, True, True, 0.3, 1.0),
+    "pulley_radius": _Kind("winches", "m", kinds.RADIUS, _ONE, True, True, False, 0.002, 0.02),
+    "dead_cable": _Kind("winches", "m", kinds.DEAD, _ONE, True, False, False, 0.1, 1.0),
+    "load_cell_gain": _Kind("winches", "", kinds.GAIN, _ONE, True, False, False, 0.05, 0.2, "load cells"),
+    "load_cell_bias": _Kind("winches", "N", kinds.BIAS, _ONE, True, False, False, 20.0, 100.0, "load cells"),
+    "mass": _Kind("robot", "kg", kinds.MASS, _ONE, False, False, True, 0.05, 0.2),
+    "center_of_mass": _Kind("robot", "m", kinds.CENTER, _XYZ, False, False, False, 0.05, 0.2),
+    "measuring_frame": _Kind("system", "m", kinds.SHIFT, _SIX, False, False, False, 10.0, 10.0, "positions"),
+    "target": _Kind("system", "m", kinds.TARGET, _XYZ, False, False, False, 0.1, 1.0, "positions"),
 }
 
 
@@ -126,17 +128,7 @@ class Parameters(Result):
     counted: bool
 
 
-_CABLE_FIELDS: Final = ("linear_density", "axial_stiffness")
 _NOTHING: Final = {"load_cell_gain": "1", "load_cell_bias": "0 N", "dead_cable": "0 m", "pulley_radius": "0 m"}
-_WINCH_FIELDS: Final = (
-    "length_zero",
-    "drum_radius",
-    "pulley_radius",
-    "dead_cable",
-    "load_cell_gain",
-    "load_cell_bias",
-)
-_OF_ROBOT: Final = ("frame_anchors", "platform_anchors", "mass", "center_of_mass")
 
 
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
@@ -144,64 +136,41 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
 
     Refused if an unknown comes twice, the robot has no such value, or neither a reading nor a stated prior observes it.
     """
-    asked = chosen(unknowns)
     m = robot.cable_count
     where = np.full((kinds.KIND_ROWS, m), -1, dtype=np.int64)
-    names: list[str] = []
-    labels: list[str] = []
-    units: list[str] = []
-    cables: list[int] = []
-    prior: list[float] = []
-    deviation: list[float] = []
-    stated: list[bool] = []
-    logarithmic: list[bool] = []
-    for unknown in asked:
+    rows: list[tuple[str, str, str, int, float, float, bool, bool]] = []
+    for unknown in checked_unknowns(unknowns):
         kind = KINDS[unknown.name]
-        _refuse_unseen(robot, sensors, unknown, kind, counted)
+        _refuse_unobserved(robot, sensors, unknown, kind, counted)
         own = _value(robot, sensors, unknown.name, counted)
-        width, said = _deviation(robot, unknown, kind, own)
-        shared = _shared(unknown, kind, own, width)
-        for cable in range(m if kind.each and not shared else 1):
+        width, stated = _prior_deviation(robot, unknown, kind, own)
+        one_each = kind.each and not _is_shared(unknown, kind, own, width)
+        for cable in range(m if one_each else 1):
             for axis, component in enumerate(kind.axes):
-                rows = where[kind.first + axis]
-                rows[slice(None) if kind.each and shared else cable] = len(names)
-                names.append(unknown.name)
-                place = f"[{cable}]" if kind.each and not shared else ""
-                labels.append(f"{unknown.name}{place}{'.' * bool(component)}{component}")
-                units.append("rad" if component.startswith("about") else kind.unit)
-                cables.append(cable if kind.each and not shared else -1)
-                prior.append(own[cable, axis])
-                deviation.append(width[cable, axis])
-                stated.append(said)
-                logarithmic.append(kind.logarithmic)
-    return Parameters(
-        tuple(names),
-        tuple(labels),
-        tuple(units),
-        locked(np.array(cables, dtype=np.int64)),
-        locked(where),
-        locked(np.array(prior)),
-        locked(np.array(deviation)),
-        locked(np.array(stated, dtype=np.bool_)),
-        locked(np.array(logarithmic, dtype=np.bool_)),
-        counted,
-    )
+                where[kind.first + axis, slice(None) if kind.each and not one_each else cable] = len(rows)
+                label = f"{unknown.name}{f'[{cable}]' * one_each}{'.' * bool(component)}{component}"
+                unit = "rad" if component.startswith("about") else kind.unit
+                number = cable if one_each else -1
+                prior, deviation = own[cable, axis], width[cable, axis]
+                rows.append((unknown.name, label, unit, number, prior, deviation, stated, kind.logarithmic))
+    names, labels, units, *columns = zip(*rows, strict=True)
+    cables, priors, deviations, flags, logarithmic = (locked(np.array(column)) for column in columns)
+    return Parameters(names, labels, units, cables, locked(where), priors, deviations, flags, logarithmic, counted)
 
 
-def chosen(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
+def checked_unknowns(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
     """Unknowns as a list, each once, checked."""
-    given = [unknowns] if isinstance(unknowns, str | Unknown) else _listed(unknowns)
-    if not given:
+    items = [unknowns] if isinstance(unknowns, str | Unknown) else _as_list(unknowns)
+    if not items:
         raise InvalidValueError("unknowns", "none", "one at least", f"Name some of {', '.join(KINDS)}.")
-    asked = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in given]
-    names = [one.name for one in asked]
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
+    found = [Unknown(one) if isinstance(one, str) else instance(one, Unknown, "unknown") for one in items]
+    names = [one.name for one in found]
+    if twice := [name for name in names if names.count(name) > 1]:
         raise InvalidValueError("unknowns", f"{twice[0]} twice", "each once", "Leave one out.")
-    return asked
+    return found
 
 
-def _listed(unknowns: Any) -> list[Any]:
+def _as_list(unknowns: Any) -> list[Any]:
     try:
         if not isinstance(unknowns, Mapping):  # its values would be lost
             return list(unknowns)
@@ -213,7 +182,7 @@ def _listed(unknowns: Any) -> list[Any]:
 
 def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
     """Values of a kind, shape (m or 1, axes)."""
-    m = robot.cable_count
+    m, kind = robot.cable_count, KINDS[name]
     if name == "measuring_frame":
         return np.concatenate((sensors.frame.position, np.zeros(3)))[None]
     if name == "target":
@@ -222,24 +191,24 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
         return np.zeros((m, 1))
     value = _field(robot, name)
     if value is None:
-        owner = "winches" if name in _WINCH_FIELDS else "cables"
         begin = _NOTHING.get(name, "..., as drawn")
-        step = f"Begin with {owner}: {{{name}: {begin}}} in the robot file, or leave it out."
+        step = f"Begin with {kind.owner}: {{{name}: {begin}}} in the robot file, or leave it out."
         raise InvalidValueError(f"unknown: {name}", f"no number of {robot.name}", "a number that the robot has", step)
-    if name in _OF_ROBOT:
-        return np.asarray(value, dtype=np.float64).reshape(-1, len(KINDS[name].axes))
+    if kind.owner == "robot":
+        return np.asarray(value, dtype=np.float64).reshape(-1, len(kind.axes))
     return np.broadcast_to(value, (m,))[:, None]
 
 
 def _field(robot: Robot, name: str) -> Array | None:
     """Values of a kind in a robot; None where it has none."""
-    owner = robot if name in _OF_ROBOT else robot.cables if name in _CABLE_FIELDS else robot.winches
-    value: Array | None = None if owner is None else getattr(owner, name)
+    owner = KINDS[name].owner
+    part = robot if owner == "robot" else getattr(robot, owner)
+    value: Array | None = None if part is None else getattr(part, name)
     return value
 
 
-def _refuse_unseen(robot: Robot, sensors: Sensors, unknown: Unknown, kind: Kind, counted: bool) -> None:
-    """Refuse what no reading tells of, and nobody knows beforehand."""
+def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: _Kind, counted: bool) -> None:
+    """Reject unknowns with neither observations nor a prior."""
     there = {
         "": True,
         "counts": counted,
@@ -256,31 +225,28 @@ def _refuse_unseen(robot: Robot, sensors: Sensors, unknown: Unknown, kind: Kind,
     raise InvalidValueError(f"unknown: {unknown.name}", "seen by no reading", f"{kind.needs} in the log", add)
 
 
-def _shared(unknown: Unknown, kind: Kind, own: Array, width: Array) -> bool:
+def _is_shared(unknown: Unknown, kind: _Kind, own: Array, width: Array) -> bool:
     """True if the cables share one number: it must be the same for all, and as well known."""
     alike = bool((own == own[0]).all() and (width == width[0]).all())
     if unknown.shared is None:
         return kind.shared and alike
-    if unknown.shared and not kind.each:
-        return False
-    if unknown.shared and not alike:
-        step = "Leave shared out, so that each has its own."
-        raise InvalidValueError(
-            f"unknown: {unknown.name}", "shared", "equal and as well known for all cables where shared", step
-        )
+    if unknown.shared and kind.each and not alike:
+        allowed, step = "equal and as well known for all cables", "Leave shared out, so that each has its own."
+        raise InvalidValueError(f"unknown: {unknown.name}", "shared", f"{allowed} where shared", step)
     return unknown.shared
 
 
-def _deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> tuple[Array, bool]:
+def _prior_deviation(robot: Robot, unknown: Unknown, kind: _Kind, own: Array) -> tuple[Array, bool]:
     """Prior deviation in the unit of the kind, shape of own, and whether it was stated."""
     if unknown.deviation is not None:
         width = np.full(own.shape, unknown.deviation)
         return (width * np.abs(own) if kind.logarithmic else width), True
     if unknown.name in robot.tolerances:
-        told = np.asarray(robot.tolerances[unknown.name])
-        spread = told[:, None] if told.ndim == 1 and kind.each and len(kind.axes) == 1 else told
-        return np.broadcast_to(spread, own.shape).astype(np.float64), True
-    field = "cables" if unknown.name in _CABLE_FIELDS else "winches" if unknown.name in _WINCH_FIELDS else unknown.name
+        tolerance = np.asarray(robot.tolerances[unknown.name])
+        if tolerance.ndim == 1 and kind.each and len(kind.axes) == 1:
+            tolerance = tolerance[:, None]
+        return np.broadcast_to(tolerance, own.shape).astype(np.float64), True
+    field = kind.owner if kind.owner in ("cables", "winches") else unknown.name
     width = np.full(own.shape, kind.assumed if field in robot.assumed else kind.deviation)
     if unknown.name == "measuring_frame":
         width[:, 3:] = np.pi
@@ -288,15 +254,15 @@ def _deviation(robot: Robot, unknown: Unknown, kind: Kind, own: Array) -> tuple[
 
 
 def internal(parameters: Parameters, values: Array) -> Array:
-    """Values as they are looked for: the logarithms of some, shape (P,)."""
+    """Internal parameters (P,) of values: the logarithms of some."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(parameters.logarithmic, np.log(values), values)
 
 
-def external(parameters: Parameters, found: Array) -> Array:
-    """The values of what is looked for, in units, shape (P,)."""
+def external(parameters: Parameters, numbers: Array) -> Array:
+    """Values in their units (P,) of internal parameters."""
     with np.errstate(over="ignore"):
-        return np.where(parameters.logarithmic, np.exp(found), found)
+        return np.where(parameters.logarithmic, np.exp(numbers), numbers)
 
 
 def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
@@ -313,26 +279,18 @@ def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
 
 def robot_with(robot: Robot, parameters: Parameters, values: Array) -> Robot:
     """The robot with other parameter values (P,); refused if it cannot have them."""
-    changes: dict[str, Any] = {}
-    cables: dict[str, Array] = {}
-    winches: dict[str, Array] = {}
+    changes: dict[str, dict[str, Any]] = {"cables": {}, "winches": {}, "robot": {}}
     for name in dict.fromkeys(parameters.names):
-        if name in ("measuring_frame", "target") or (name == "length_zero" and not parameters.counted):
-            continue
         kind = KINDS[name]
+        if kind.owner == "system" or (name == "length_zero" and not parameters.counted):
+            continue
         value = np.stack([values[parameters.where[kind.first + axis]] for axis in range(len(kind.axes))], axis=-1)
-        if name in _CABLE_FIELDS:
-            cables[name] = value[:, 0]
-        elif name in _WINCH_FIELDS:
-            winches[name] = value[:, 0]
-        else:
-            changes[name] = value if kind.each else value[0] if len(kind.axes) > 1 else float(value[0, 0])
-    if cables:
-        changes["cables"] = robot.cables.replace(**cables)
-    if winches:
-        assert robot.winches is not None
-        changes["winches"] = robot.winches.replace(**winches)
-    return robot.replace(**changes)
+        value = value if len(kind.axes) > 1 else value[:, 0]
+        changes[kind.owner][name] = value if kind.each else value[0]
+    parts = {
+        owner: getattr(robot, owner).replace(**changes[owner]) for owner in ("cables", "winches") if changes[owner]
+    }
+    return robot.replace(**parts, **changes["robot"])
 
 
 def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sensors:

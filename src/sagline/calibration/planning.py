@@ -11,7 +11,7 @@ import numpy as np
 
 from sagline.cables.models import Catenary
 from sagline.calibration.calibrate import UNKNOWNS
-from sagline.calibration.candidates import Candidates, candidates_of, length_of, shortest_tour
+from sagline.calibration.candidates import CandidatePoses, candidates_of, length_of, shortest_tour
 from sagline.calibration.information import Choice, choose_informative, deviations_of, information_of, prior_information
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import has_drum_data, predicted_rows
@@ -321,7 +321,7 @@ def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: 
             raise InvalidValueError(f"unknown: {name}", "seen by no reading", "what readings tell of", step)
 
 
-def _driving_order(chosen: Candidates) -> Indices:
+def _driving_order(chosen: CandidatePoses) -> Indices:
     """An order that is short to drive: through the positions, at each from the least sum of tensions to the largest."""
     _, first, place = np.unique(chosen.place, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from sagline.cables.model import CableModel
-from sagline.calibration.log import Sensors, load_cells_of
-from sagline.calibration.observations import NO_LOAD, Machine, Observed, lengths_at_counts, machine_of
+from sagline.calibration.log import Sensors, WinchLog, load_cells_of
+from sagline.calibration.observations import NO_LOAD, MachineTerms, WhitenedRows, lengths_at_counts, machine_of
 from sagline.calibration.parameters import KINDS, Parameters, external, internal, offset_with, robot_with, sensors_with
 from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
@@ -25,7 +25,7 @@ _LINE: Final = 1e-3  # of its length: points nearer than that lie on a line
 _NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds for which zero is usual
 
 
-class Log(NamedTuple):
+class ReadingsTable(NamedTuple):
     """Readings at N poses, NaN where there is none.
 
     Attributes:
@@ -43,7 +43,15 @@ class Log(NamedTuple):
     rotations: Array
 
 
-class Problem(NamedTuple):
+def readings_table(log: WinchLog) -> ReadingsTable:
+    """The readings of a log with NaN in place of missing columns."""
+    count, m = log.readings.shape
+    columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
+    tables = (np.full((count, width), np.nan) if read is None else read for read, width in columns)
+    return ReadingsTable(log.counts, log.unstrained_length, *tables)
+
+
+class FitProblem(NamedTuple):
     """The estimation problem.
 
     Attributes:
@@ -58,7 +66,7 @@ class Problem(NamedTuple):
     model: CableModel
     sensors: Sensors
     parameters: Parameters
-    log: Log
+    log: ReadingsTable
 
     @property
     def prior(self) -> Array:
@@ -93,7 +101,7 @@ class Problem(NamedTuple):
         return np.array([0.0 if name in _NONNEGATIVE else -np.inf for name in self.parameters.names])
 
 
-class State(NamedTuple):
+class SearchState(NamedTuple):
     """A state of the search.
 
     Attributes:
@@ -104,7 +112,7 @@ class State(NamedTuple):
     """
 
     numbers: Array
-    machine: Machine
+    machine: MachineTerms
     lengths: Array
     poses: Array
 
@@ -126,7 +134,7 @@ class Normal(NamedTuple):
     squares: Array
     readings: Indices
     weights: Array
-    rows: Observed | None
+    rows: WhitenedRows | None
 
 
 class Fit(NamedTuple):
@@ -139,16 +147,16 @@ class Fit(NamedTuple):
         iterations: How many steps were taken.
     """
 
-    state: State
+    state: SearchState
     normal: Normal
     converged: bool
     iterations: int
 
 
-Evaluated = tuple[State, Normal]
+Evaluated = tuple[SearchState, Normal]
 
 
-def machine_at(problem: Problem, numbers: Array) -> Machine:
+def machine_at(problem: FitProblem, numbers: Array) -> MachineTerms:
     """The robot and its sensors with internal parameters (P,); refused if the robot cannot have them."""
     values, parameters = external(problem.parameters, numbers), problem.parameters
     robot = robot_with(problem.robot, parameters, values)
@@ -157,7 +165,7 @@ def machine_at(problem: Problem, numbers: Array) -> Machine:
     return machine_of(robot, problem.model, parameters, sensors, offset)
 
 
-def reported_lengths(problem: Problem, machine: Machine, part: slice) -> Array:
+def reported_lengths(problem: FitProblem, machine: MachineTerms, part: slice) -> Array:
     """Lengths reported by the winches [m], (n, m), of some of the poses."""
     log = problem.log
     if log.counts is not None and machine.drums is not None:
@@ -167,7 +175,7 @@ def reported_lengths(problem: Problem, machine: Machine, part: slice) -> Array:
     return reported
 
 
-def start_of(problem: Problem, commanded: Pose | None) -> State:
+def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     """Initial state: the priors, and the platform at commanded poses, or where the reported lengths put it.
 
     True lengths are those that hold it there with the measured tensions: a millimeter of a steel cable is 90 N, so that
@@ -179,10 +187,10 @@ def start_of(problem: Problem, commanded: Pose | None) -> State:
     poses = _poses(problem, machine, reported, commanded)
     lengths = held_lengths(problem, machine, poses, reported)
     aligned = _aligned(problem, numbers, poses)
-    return State(aligned, machine if aligned is numbers else machine_at(problem, aligned), lengths, poses)
+    return SearchState(aligned, machine if aligned is numbers else machine_at(problem, aligned), lengths, poses)
 
 
-def held_lengths(problem: Problem, machine: Machine, poses: Array, reported: Array) -> Array:
+def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array) -> Array:
     """Unstrained lengths [m] of cables with the measured tensions at poses; the reported ones without load cells."""
     if problem.sensors.tension_deviation is None:
         return reported.copy()
@@ -207,7 +215,7 @@ def held_lengths(problem: Problem, machine: Machine, poses: Array, reported: Arr
     return np.where(held, lengths, reported)
 
 
-def _poses(problem: Problem, machine: Machine, reported: Array, commanded: Pose | None) -> Array:
+def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commanded: Pose | None) -> Array:
     """Initial pose rows: measured, else commanded, else by forward kinematics of the reported lengths."""
     if commanded is not None:
         poses = np.array(pose_rows(commanded))
@@ -230,7 +238,7 @@ def _poses(problem: Problem, machine: Machine, reported: Array, commanded: Pose 
     return poses
 
 
-def _aligned(problem: Problem, numbers: Array, poses: Array) -> Array:
+def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
     """The parameters with the measuring system aligned to the poses, if it is unknown and there are enough readings.
 
     Its rotation is the mean of those between the platform's and the measured ones, or that between measured points.

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.calibration.candidates import Candidates
+from sagline.calibration.candidates import CandidatePoses
 from sagline.calibration.information import Information, information_of
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import predicted_rows
@@ -23,29 +23,17 @@ NEARLY: Final = 0.9  # of the most that the logarithms of the errors fall by: wh
 WORTH: Final = 0.99  # of the errors: what leaves more is not worth the while
 
 
-class Tool(NamedTuple):
-    """A tool for one kind of unknowns.
-
-    Attributes:
-        words: What to do with it.
-        deviation: What is known then, in the unit of the kind; a share of the value where `share`.
-        share: Whether it is.
-    """
-
-    words: str
-    deviation: float
-    share: bool
-
-
-BESIDE: Final[dict[str, Tool]] = {
-    "mass": Tool("weighing the platform to 0.1 %", 1e-3, True),
-    "linear_density": Tool("weighing a length of the cable to 1 %", 0.01, True),
-    "axial_stiffness": Tool("stretching a length of the cable on a test bench, to 2 %", 0.02, True),
-    "pulley_radius": Tool("a caliper on the pulleys, to 0.1 mm", 1e-4, False),
-    "drum_radius": Tool("a caliper on the drums, to 0.1 mm", 1e-4, False),
-    "load_cell_gain": Tool("a known weight on each load cell, to 0.5 %", 5e-3, True),
-    "load_cell_bias": Tool("reading each load cell without load, to 1 N", 1.0, False),
+# by kind: the measurement, its standard deviation in the unit of the kind, and True if that is a share of the value
+TOOLS: Final[dict[str, tuple[str, float, bool]]] = {
+    "mass": ("weighing the platform to 0.1 %", 1e-3, True),
+    "linear_density": ("weighing a length of the cable to 1 %", 0.01, True),
+    "axial_stiffness": ("stretching a length of the cable on a test bench, to 2 %", 0.02, True),
+    "pulley_radius": ("a caliper on the pulleys, to 0.1 mm", 1e-4, False),
+    "drum_radius": ("a caliper on the drums, to 0.1 mm", 1e-4, False),
+    "load_cell_gain": ("a known weight on each load cell, to 0.5 %", 5e-3, True),
+    "load_cell_bias": ("reading each load cell without load, to 1 N", 1.0, False),
 }
+Option = tuple[str, Array]  # a measurement in words, and the information with it, shape (P, P)
 
 
 class Situation(NamedTuple):
@@ -54,13 +42,13 @@ class Situation(NamedTuple):
     Attributes:
         robot: The robot.
         model: Cable model.
-        parameters: What is looked for.
-        sensors: What reads.
+        parameters: The unknowns.
+        sensors: The sensors.
         scale: A unit of each internal parameter, in which information is counted, shape (P,).
         slopes: Of the values by the internal parameters, shape (P,).
-        known: Information beforehand, with a little where there is none, shape (P, P).
+        known: Prior information, with a little where there is none, shape (P, P).
         standing: The poses chosen.
-        rows: What they tell, in the scale, shape (N, k, P).
+        rows: Whitened rows of their readings, in the scale, shape (N, k, P).
     """
 
     robot: Robot
@@ -70,78 +58,60 @@ class Situation(NamedTuple):
     scale: Array
     slopes: Array
     known: Array
-    standing: Candidates
+    standing: CandidatePoses
     rows: Array
 
     @property
-    def told(self) -> Array:
+    def information(self) -> Array:
         """Information afterwards, shape (P, P)."""
-        told: Array = self.known + information_of(self.rows)
-        return told
+        information: Array = self.known + information_of(self.rows)
+        return information
 
-    def read_by(self, sensors: Sensors) -> Array:
+    def rows_by(self, sensors: Sensors) -> Array:
         """Whitened rows of the poses with other sensors, in the scale, shape (N, m + 6, P)."""
         poses, lengths = self.standing.poses, self.standing.lengths
-        rows: Array = (
-            predicted_rows(self.robot, self.model, self.parameters, sensors, poses, lengths).matrix * self.scale
-        )
-        return rows
-
-
-class Recommendation(NamedTuple):
-    """A measurement that was not foreseen.
-
-    Attributes:
-        words: What it is.
-        known: Information with it, shape (P, P).
-    """
-
-    words: str
-    known: Array
+        found = predicted_rows(self.robot, self.model, self.parameters, sensors, poses, lengths)
+        return np.asarray(found.matrix * self.scale)
 
 
 def most_helpful(situation: Situation) -> str:
     """Sentence on the recommended measurement: the one that lowers the mean logarithm of the errors most."""
-    before = _deviations(situation.told)
-    best: Recommendation | None = None
+    before = _deviations(situation.information)
+    best: Option | None = None
     most = -np.log(WORTH)
-    for further in _options(situation):  # from the least costly of its kind on
-        fall = float(np.log(before / _deviations(further.known)).mean())
+    for option in _options(situation):  # from the least costly of its kind on
+        fall = float(np.log(before / _deviations(option[1])).mean())
         if fall > most / (1.0 if best is None else NEARLY):
-            best, most = further, fall
+            best, most = option, fall
     if best is None:
         return "No further measurement known here lowers the errors by more than a hundredth."
     return (
-        f"Most helpful beside the poses: {best.words}; it leaves {n(np.exp(-most), '.2f')} of the errors on average, "
-        f"{_largest_reduction(situation, before, _deviations(best.known))}."
+        f"Most helpful beside the poses: {best[0]}; it leaves {n(np.exp(-most), '.2f')} of the errors on average, "
+        f"{_largest_reduction(situation, before, _deviations(best[1]))}."
     )
 
 
-def _options(situation: Situation) -> Iterator[Recommendation]:
-    """All that is thought of and not there."""
+def _options(situation: Situation) -> Iterator[Option]:
+    """Possible measurements that are not among the readings."""
     parameters, sensors = situation.parameters, situation.sensors
-    for name, beside in BESIDE.items():
+    for name, (words, deviation, is_share) in TOOLS.items():
         if name in parameters.names:
-            yield Recommendation(beside.words, situation.told + _tool_information(situation, name, beside))
+            mine = np.flatnonzero([other == name for other in parameters.names])
+            size = parameters.prior[mine] if is_share else np.ones(len(mine))
+            gain = np.zeros(len(situation.scale))
+            gain[mine] = (situation.scale[mine] * situation.slopes[mine] / (deviation * size)) ** 2
+            yield words, situation.information + np.diag(gain)
     if sensors.tension_deviation is None:
         deviation = typical_load_cell_deviation(situation.standing.tensions)
-        rows = situation.read_by(sensors.replace(tension_deviation=deviation))
-        yield Recommendation(f"load cells, of {n(deviation, '.2g', 'N')}", situation.known + information_of(rows))
+        rows = situation.rows_by(sensors.replace(tension_deviation=deviation))
+        yield f"load cells, of {n(deviation, '.2g', 'N')}", situation.known + information_of(rows)
     if "frame_anchors" in parameters.names:
-        yield from _anchors(situation)
+        yield from _measured_anchors(situation)
     if sensors.position_deviation is None:
-        yield from _positions(situation)
+        yield from _measured_positions(situation)
 
 
-def _tool_information(situation: Situation, name: str, beside: Tool) -> Array:
-    mine = np.flatnonzero([other == name for other in situation.parameters.names])
-    size = situation.parameters.prior[mine] if beside.share else np.ones(len(mine))
-    told = np.zeros(len(situation.scale))
-    told[mine] = (situation.scale[mine] * situation.slopes[mine] / (beside.deviation * size)) ** 2
-    return np.diag(told)
-
-
-def _anchors(situation: Situation) -> Iterator[Recommendation]:
+def _measured_anchors(situation: Situation) -> Iterator[Option]:
     """One frame anchor, or three, measured."""
     names, cables = np.array(situation.parameters.names), situation.parameters.cables
     m = situation.robot.cable_count
@@ -152,30 +122,30 @@ def _anchors(situation: Situation) -> Iterator[Recommendation]:
     yield from _best_subset(situation, rows, rows, {1: "frame anchor {} measured", 3: "frame anchors {} measured"})
 
 
-def _positions(situation: Situation) -> Iterator[Recommendation]:
+def _measured_positions(situation: Situation) -> Iterator[Option]:
     """The position measured at three of the poses, or six."""
-    read = situation.sensors.replace(position_deviation=TOTAL_STATION)
-    alone = situation.read_by(read.replace(tension_deviation=None, rotation_deviation=None))
+    sensors = situation.sensors.replace(position_deviation=TOTAL_STATION)
+    alone = situation.rows_by(sensors.replace(tension_deviation=None, rotation_deviation=None))
     words = dict.fromkeys((3, 6), "the position at poses {} measured")
-    yield from _best_subset(situation, alone, situation.read_by(read), words, situation.rows)
+    yield from _best_subset(situation, alone, situation.rows_by(sensors), words, situation.rows)
 
 
 def _best_subset(
     situation: Situation, rows: Array, beside: Array, words: dict[int, str], instead: Array | None = None
-) -> Iterator[Recommendation]:
-    """Numbers of rows for which there are words, each the most informative subset.
+) -> Iterator[Option]:
+    """Most informative subset of some rows, for each number of them for which there are words.
 
     rows: information of each alone; beside: with what it comes with; instead: readings that are replaced.
     """
-    found = Information(rows, situation.told)
+    found = Information(rows, situation.information)
     for _ in range(min(max(words), len(rows))):
         found.take(found.best()[0])
         if (size := len(found.chosen)) in words:
-            known = situation.told + information_of(beside[found.chosen])
+            known = situation.information + information_of(beside[found.chosen])
             if instead is not None:
                 known = known - information_of(instead[found.chosen])
             listed = ", ".join(map(str, sorted(found.chosen)))
-            yield Recommendation(f"{words[size].format(listed)} to {error_text(TOTAL_STATION, 'm')}", known)
+            yield f"{words[size].format(listed)} to {error_text(TOTAL_STATION, 'm')}", known
 
 
 def _deviations(known: Array) -> Array:

@@ -97,7 +97,7 @@ def _common_motions(poses: Array) -> Array:
     return slopes
 
 
-def transformed_covariance(slopes: Array, covariance: Array, negligible: Array | float = 0.0) -> Array:
+def _transformed_covariance(slopes: Array, covariance: Array, negligible: Array | float = 0.0) -> Array:
     """Covariance (..., P, P) after a linear map (..., k, P); infinite along rows with an infinite term."""
     infinite = np.isinf(np.diagonal(covariance, axis1=-2, axis2=-1))
     finite = np.where(infinite[..., :, None] | infinite[..., None, :], 0.0, covariance)
@@ -207,7 +207,7 @@ class Calibration(Findings, Saved):
         of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # motion of the center of mass by that of the origin
         for axis, unit in enumerate(np.eye(3)):
             of_center[:, :3, 3 + axis] = np.cross(unit, reach)
-        covariance = transformed_covariance(of_center, covariance)
+        covariance = _transformed_covariance(of_center, covariance)
         return replace(found, covariance=locked(covariance.reshape(*shape, 6, 6)))
 
     def _slopes(self, poses: Array, lengths: Array) -> tuple[Array, Array]:
@@ -217,7 +217,7 @@ class Calibration(Findings, Saved):
         """Covariance of origin and rotation vector (N, 6, 6), by that of the values and of the winches' lengths."""
         size = np.abs(by_values).max(axis=(1, 2), keepdims=True)
         by_length = by_length * self.sensors.length_deviation
-        known = transformed_covariance(by_values, self.covariance, _NEGLIGIBLE * size)
+        known = _transformed_covariance(by_values, self.covariance, _NEGLIGIBLE * size)
         return np.asarray(known + by_length @ np.swapaxes(by_length, 1, 2))
 
     def _common_motion(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,22 +23,12 @@ PULLING: Final = 3.0  # standard deviations above nothing that a load cell must 
 OTHERWISE: Final = 0.5  # share of the rows in which a cable's load cell is read where it is missed in the others
 
 
-class ScreenedLog(NamedTuple):
-    """The rows of a log that are fit, and those that are not.
+def screen(
+    robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT
+) -> tuple[WinchLog, Indices, Mapping[Omission, Indices]]:
+    """Log of the rows at which the platform stood on taut cables and every sensor was read, once.
 
-    Attributes:
-        log: The rows that are kept.
-        rows: Their numbers in the whole log, (N,).
-        left_out: Why, and which rows were not kept; each for the first reason that it has, reasons in order.
-    """
-
-    log: WinchLog
-    rows: Indices
-    left_out: Mapping[Omission, Indices]
-
-
-def screen(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> ScreenedLog:
-    """The rows of a log at which the platform stood on taut cables and every sensor was read, once.
+    Beside it the numbers of these rows (N,), and those of the others by the first reason that each has.
 
     Left out, in this order, are rows
 
@@ -64,7 +54,7 @@ def screen(robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT) -> Scr
         if (wrong & kept).any():
             found[reason] = locked(np.flatnonzero(wrong & kept))
             kept &= ~wrong
-    return ScreenedLog(log if kept.all() else log.rows(kept), locked(np.flatnonzero(kept)), found)
+    return log if kept.all() else log.rows(kept), locked(np.flatnonzero(kept)), found
 
 
 def lengths_of(robot: Robot, log: WinchLog) -> Array:

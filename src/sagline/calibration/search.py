@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 from sagline.calibration.findings import CrossValidation, Omission
 from sagline.calibration.least_squares import evaluate_step, exceeded_with, solve
 from sagline.calibration.log import load_cells_of
-from sagline.calibration.observations import BLOCK, NO_LOAD, Machine
+from sagline.calibration.observations import BLOCK, NO_LOAD, MachineTerms
 from sagline.calibration.outliers import EXAMINED, outliers_in
 from sagline.calibration.problem import (
     Evaluated,
     Fit,
-    Problem,
-    State,
+    FitProblem,
+    SearchState,
     held_lengths,
     machine_at,
     reported_lengths,
@@ -51,7 +51,7 @@ class SearchResult(NamedTuple):
 
 
 def search_from_priors(
-    problem: Problem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
+    problem: FitProblem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
 ) -> SearchResult:
     """Search from the priors; poses that end in another equilibrium are restarted once, then left out."""
     state = start_of(problem, commanded)
@@ -99,7 +99,7 @@ def _improbable(fit: Fit, kept: Flags) -> Flags:
     return improbable
 
 
-def _restart(problem: Problem, state: State, which: Flags) -> State:
+def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchState:
     """A state in which some poses begin anew, where the lengths that the winches say put the platform."""
     machine = state.machine
     reported = reported_lengths(problem, machine, slice(None))
@@ -110,7 +110,7 @@ def _restart(problem: Problem, state: State, which: Flags) -> State:
     return state._replace(poses=poses, lengths=lengths)
 
 
-def _single_cable_outliers(problem: Problem, state: State, which: Flags) -> Flags:
+def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
     """Flags of the poses, among few ones, that fit but for single cables: outliers of little weight."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
@@ -119,7 +119,7 @@ def _single_cable_outliers(problem: Problem, state: State, which: Flags) -> Flag
     return slipped
 
 
-def _other_equilibrium(problem: Problem, state: State, which: Flags) -> Flags:
+def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
     """Flags of the poses, among some, far from those by forward kinematics of the reported lengths, (N,)."""
     reported = reported_lengths(problem, state.machine, slice(None))[which]
     found = search(state.machine.robot, problem.model, locked(reported), NO_LOAD, None)
@@ -129,7 +129,7 @@ def _other_equilibrium(problem: Problem, state: State, which: Flags) -> Flags:
 
 
 def cross_validate(
-    problem: Problem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
+    problem: FitProblem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
     """Calibrate without each part of the poses, and predict their readings from the reported lengths.
 
@@ -149,8 +149,8 @@ def cross_validate(
         current = evaluate_step(problem, found.fit.state, None, rest, progress=progress)
         fit = solve(problem, current, rest, robust=robust, progress=progress)
         whole = slice(int(part[0]), int(part[-1]) + 1)
-        now += prediction_errors(problem, fit.state.machine, found.fit.state.poses, left, whole)
-        before += prediction_errors(problem, nominal, found.fit.state.poses, left, whole)
+        now += _prediction_errors(problem, fit.state.machine, found.fit.state.poses, left, whole)
+        before += _prediction_errors(problem, nominal, found.fit.state.poses, left, whole)
     tension, position = _root_mean_squares(now)
     tension_before, position_before = _root_mean_squares(before)
     if (problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0).any():
@@ -159,13 +159,13 @@ def cross_validate(
 
 
 def _root_mean_squares(sums: Array) -> tuple[float, float]:
-    """Root mean squares of load cells [N] and positions [m], NaN for none, of sums by `prediction_errors`."""
+    """Root mean squares of load cells [N] and positions [m], NaN for none, of sums by `_prediction_errors`."""
     cells, cell_count, positions, position_count = sums.tolist()
     tension = float(np.sqrt(cells / cell_count)) if cell_count else np.nan
     return tension, float(np.sqrt(positions / position_count)) if position_count else np.nan
 
 
-def prediction_errors(problem: Problem, machine: Machine, starts: Array, which: Flags, whole: slice) -> Array:
+def _prediction_errors(problem: FitProblem, machine: MachineTerms, starts: Array, which: Flags, whole: slice) -> Array:
     """Squared errors of predictions from reported lengths: sum and count of load cells, and of positions, (4,)."""
     sums = np.zeros(4)
     for own in blocks(whole.stop - whole.start, BLOCK):
