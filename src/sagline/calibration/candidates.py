@@ -144,8 +144,7 @@ def _different(tensions: Array) -> Flags:
     """Flags of the sets of tensions (N, sets, m) that differ from those before them at their pose, (N, sets)."""
     apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
     same = apart <= SAME * np.nanmax(tensions, initial=0.0)
-    different: Flags = ~np.tril(same, -1).any(axis=-1)
-    return different
+    return np.asarray(~np.tril(same, -1).any(axis=-1))
 
 
 def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
@@ -183,8 +182,7 @@ def shortest_tour(places: Array) -> Indices:
     for _ in range(PASSES):
         if not _reverse_segments(order, apart, _ROUNDING * apart.max()):
             break
-    found: Indices = order[1:-1]
-    return found
+    return np.asarray(order[1:-1])
 
 
 def length_of(places: Array, order: Indices) -> float:

@@ -189,8 +189,7 @@ def _usual(trial: Trial) -> Array:
     if middle is None and trial.log.commanded is not None:
         middle = np.median(trial.log.commanded.position, axis=0)
     assert middle is not None
-    distance: Array = np.linalg.norm(trial.robot.frame_anchors - middle, axis=1)
-    return distance
+    return np.asarray(np.linalg.norm(trial.robot.frame_anchors - middle, axis=1))
 
 
 def _far(trial: Trial, zeros: Array) -> Flags:

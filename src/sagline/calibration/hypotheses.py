@@ -185,8 +185,7 @@ class Trial:
         drums = drums_of(self.robot)
         rate = drums.zero_and_rate()[1]
         _, travel = drums.turns(drums.starts[:, :1].T)
-        found: Array = rate / np.abs(travel[0])
-        return found
+        return np.asarray(rate / np.abs(travel[0]))
 
 
 def _fitted(problem: FitProblem, state: SearchState) -> Evaluated:

@@ -166,8 +166,7 @@ def _null(matrix: Array) -> Array:
     """Orthonormal columns that a matrix takes to zero."""
     _, values, rows = np.linalg.svd(matrix, full_matrices=True)
     rank = int(np.sum(values > 1e-9 * max(values.max(initial=0.0), _TINY)))
-    found: Array = rows[rank:].T
-    return found
+    return np.asarray(rows[rank:].T)
 
 
 def _echelon(rows: Array) -> Array:

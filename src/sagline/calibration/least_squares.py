@@ -97,8 +97,7 @@ def _squares_of(sensors: Sensors, rows: WhitenedRows, reported: Array, lengths: 
 
 def _limits_of(readings: Indices, scale: float) -> Array:
     """Sums of squares beyond which poses have less weight, (N,): a quantile of chi squared times a scale."""
-    limits: Array = scale * exceeded_with(1.0 - QUANTILE, readings)
-    return limits
+    return np.asarray(scale * exceeded_with(1.0 - QUANTILE, readings))
 
 
 def _pose_weights(squares: Array, readings: Indices, scale: float) -> Array:

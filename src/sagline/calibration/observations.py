@@ -31,8 +31,7 @@ NO_LOAD: Final = locked(np.zeros((1, 6)))  # nothing pulls at the platform but i
 
 def lengths_at_counts(drums: Drums, counts: Array) -> Array:
     """Unstrained lengths off the drums at counts [m], both (N, m)."""
-    lengths: Array = drums.lengths_at(counts) / (1.0 + drums.rest_strain)
-    return lengths
+    return np.asarray(drums.lengths_at(counts) / (1.0 + drums.rest_strain))
 
 
 def counts_of(drums: Drums, lengths: Array) -> Array:
@@ -76,8 +75,7 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
 
 def _known_field(of: Winch | Cable, name: str) -> Array:
     """A field whose presence `drums_of` has checked."""
-    value: Array = getattr(of, name)
-    return value
+    return np.asarray(getattr(of, name))
 
 
 class WhitenedRows(NamedTuple):

@@ -311,8 +311,7 @@ def offset_with(robot: Robot, parameters: Parameters, values: Array) -> Array:
     """Offset of reported lengths [m], (m,)."""
     if parameters.counted or "length_zero" not in parameters.names:
         return np.zeros(robot.cable_count)
-    offset: Array = values[parameters.where[kinds.ZERO]]
-    return offset
+    return np.asarray(values[parameters.where[kinds.ZERO]])
 
 
 _SMALL = 1e-4  # rad: below it the first terms of the series are exact
@@ -327,5 +326,4 @@ def left_jacobian(vector: Array) -> Array:
         first, second = 0.5, 1.0 / 6.0
     else:
         first, second = (1.0 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
-    jacobian: Array = np.eye(3) + first * cross + second * cross @ cross
-    return jacobian
+    return np.asarray(np.eye(3) + first * cross + second * cross @ cross)

@@ -12,11 +12,20 @@ import numpy as np
 from sagline.cables.models import Catenary
 from sagline.calibration.calibrate import UNKNOWNS
 from sagline.calibration.candidates import CandidatePoses, candidates_of, length_of, shortest_tour
-from sagline.calibration.information import Choice, choose_informative, deviations_of, information_of, prior_information
+from sagline.calibration.information import (
+    Choice,
+    Situation,
+    choose_informative,
+    deviations_of,
+    error_text,
+    information_of,
+    most_helpful,
+    prior_information,
+    typical_load_cell_deviation,
+)
 from sagline.calibration.log import Sensors
 from sagline.calibration.observations import has_drum_data, predicted_rows
 from sagline.calibration.parameters import KINDS, Parameters, Unknown, parameters_of, slopes_of_values
-from sagline.calibration.recommendations import Situation, error_text, most_helpful, typical_load_cell_deviation
 from sagline.core.arguments import callback, instance, optional, whole_number
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
@@ -129,8 +138,7 @@ def _head(plan: CalibrationPoses, width: int) -> Iterator[str]:
 
 def _first_of_each(position: Array) -> Array:
     """Flags of the poses that are not at the place of the one before."""
-    moved: Array = np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1)))
-    return moved
+    return np.asarray(np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1))))
 
 
 def _sensors(plan: CalibrationPoses) -> Iterator[str]:

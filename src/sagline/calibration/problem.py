@@ -77,13 +77,11 @@ class FitProblem(NamedTuple):
     def prior_deviation(self) -> Array:
         """Its standard deviation, (P,)."""
         known, prior = self.parameters.prior_deviation, self.parameters.prior
-        deviation: Array = known / np.where(self.parameters.logarithmic, prior, 1.0)
-        return deviation
+        return np.asarray(known / np.where(self.parameters.logarithmic, prior, 1.0))
 
     def missed(self, numbers: Array) -> Array:
         """Distance of internal parameters from their prior, in its standard deviations, (P,)."""
-        off: Array = (numbers - self.prior) / self.prior_deviation
-        return off
+        return np.asarray((numbers - self.prior) / self.prior_deviation)
 
     @property
     def scale(self) -> Array:
@@ -92,8 +90,7 @@ class FitProblem(NamedTuple):
         In wider units sums of squares are rounding where a number is well observed.
         """
         usual = np.array([KINDS[name].assumed for name in self.parameters.names])
-        unit: Array = np.fmin(self.prior_deviation, usual)
-        return unit
+        return np.asarray(np.fmin(self.prior_deviation, usual))
 
     @property
     def least(self) -> Array:
@@ -171,8 +168,7 @@ def reported_lengths(problem: FitProblem, machine: MachineTerms, part: slice) ->
     if log.counts is not None and machine.drums is not None:
         return lengths_at_counts(machine.drums, log.counts[part])
     assert log.lengths is not None
-    reported: Array = log.lengths[part] + machine.offset
-    return reported
+    return np.asarray(log.lengths[part] + machine.offset)
 
 
 def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:

@@ -88,15 +88,13 @@ def search_from_priors(
 
 def _without_equilibrium(current: Evaluated) -> Flags:
     """Flags of the poses without an equilibrium, (N,)."""
-    lost: Flags = ~np.isfinite(current[1].squares)
-    return lost
+    return np.asarray(~np.isfinite(current[1].squares))
 
 
 def _improbable(fit: Fit, kept: Flags) -> Flags:
     """Flags of the poses whose misfit no noise explains, (N,)."""
     limit = exceeded_with(STRANGE, fit.normal.readings)
-    improbable: Flags = kept & (fit.normal.squares > limit)
-    return improbable
+    return np.asarray(kept & (fit.normal.squares > limit))
 
 
 def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchState:

@@ -49,8 +49,7 @@ def _complement(frame: PriorUnits, gauge: tuple[Direction, ...]) -> Array:
     left = np.array([one.vector / frame.units for one in gauge]).reshape(len(gauge), count).T
     taken = np.hstack((fixed, left))
     vectors, _, _ = np.linalg.svd(taken, full_matrices=True)
-    found: Array = vectors[:, taken.shape[1] :]
-    return found
+    return np.asarray(vectors[:, taken.shape[1] :])
 
 
 def _groups(parameters: Parameters, frame: PriorUnits) -> Groups:
@@ -168,8 +167,7 @@ def _is_substituted(scatter: Array, many: Indices) -> Flags:
     within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
     share = np.sum(between * np.linalg.solve(within + ridge, between), axis=0)
-    substituted: Flags = share > ALIKE**2 * np.maximum(scatter.diagonal(), _TINY)
-    return substituted
+    return np.asarray(share > ALIKE**2 * np.maximum(scatter.diagonal(), _TINY))
 
 
 def _least_known_combination(scatter: Array, members: Indices, names: tuple[str, ...], frame: PriorUnits) -> Direction:

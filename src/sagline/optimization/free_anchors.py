@@ -202,8 +202,7 @@ def _directions(along: ArrayLike) -> Array:
     lengths = np.linalg.norm(vectors, axis=1)
     if vectors.ndim != 2 or not len(vectors) or lengths.min() < _UNIT:
         raise InvalidValueError("along", brief(along), "directions of shape (K, 3)", "Give [0, 0, 1] for upwards.")
-    unit: Array = vectors / lengths[:, None]
-    return unit
+    return np.asarray(vectors / lengths[:, None])
 
 
 def _shifts(value: ArrayLike, item: str, count: int) -> Array:

@@ -198,8 +198,7 @@ def _between(level: Level, ends: Brackets) -> Array:
         share = at_inner / (at_inner - at_outer)
     k = np.flatnonzero(np.isinf(at_inner) | np.isinf(at_outer))
     share[k] = crossings(level, inner[k], outer[k], at_inner[k], at_outer[k], precision=0.01, narrow=0.05)
-    between: Array = inner + share[:, None] * (outer - inner)
-    return between
+    return np.asarray(inner + share[:, None] * (outer - inner))
 
 
 PRECISE: Final = 1e-4  # of the level at the nearer node, and of an edge of the grid at jumps: less than is seen

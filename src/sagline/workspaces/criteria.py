@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of, modes
-from sagline.workspaces.criterion import Criterion, Given, Judged
+from sagline.workspaces.criterion import NOT_NEGATIVE, POSITIVE, Criterion, Given, Judged
 
 _PRECISION: Final = 1e-6  # m: largest jump of the clearance's level from pose to pose
 _CABLE: Final = re.compile(r"cable (\d+)")
@@ -41,14 +41,11 @@ class LeastMargin(Criterion):
         limit: Reserve [N], >= 0.
     """
 
-    title: ClassVar[str] = "margin"
-    unit: ClassVar[str] = "N"
-    sense: ClassVar[str] = "≥"
+    title = "margin"
+    unit = "N"
+    sense = "≥"
+    limit_range = NOT_NEGATIVE
     limit: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the limit."""
-        self._check_limit(low=0.0)
 
     @property
     def always(self) -> bool:
@@ -90,15 +87,12 @@ class MaximumSag(Criterion):
         limit: Largest sag [m], > 0.
     """
 
-    title: ClassVar[str] = "sag"
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[str] = "≤"
-    needs_tensions: ClassVar[bool] = True
+    title = "sag"
+    unit = "m"
+    sense = "≤"
+    limit_range = POSITIVE
+    needs_tensions = True
     limit: float
-
-    def __post_init__(self) -> None:
-        """Check the limit."""
-        self._check_limit(above=0.0)
 
     def judge(self, given: Given) -> Judged:
         """Limit minus largest sag [m], and the cable that sags most.
@@ -125,17 +119,18 @@ class PositionError(Criterion):
         limit: Largest distance between the platform origin and where it was planned [m], > 0.
     """
 
-    title: ClassVar[str] = "position error"
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[str] = "≤"
-    needs_tensions: ClassVar[bool] = True
+    title = "position error"
+    unit = "m"
+    sense = "≤"
+    limit_range = POSITIVE
+    needs_tensions = True
     model: CableModel
     limit: float
 
     def __post_init__(self) -> None:
         """Check both."""
         instance(self.model, CableModel, "PositionError: model")
-        self._check_limit(above=0.0)
+        super(PositionError, self).__post_init__()
 
     def __str__(self) -> str:
         """Title, limit and model."""
@@ -166,15 +161,12 @@ class LeastStiffness(Criterion):
         limit: Least stiffness [N/m], > 0.
     """
 
-    title: ClassVar[str] = "stiffness"
-    unit: ClassVar[str] = "N/m"
-    sense: ClassVar[str] = "≥"
-    needs_tensions: ClassVar[bool] = True
+    title = "stiffness"
+    unit = "N/m"
+    sense = "≥"
+    limit_range = POSITIVE
+    needs_tensions = True
     limit: float
-
-    def __post_init__(self) -> None:
-        """Check the limit."""
-        self._check_limit(above=0.0)
 
     def judge(self, given: Given) -> Judged:
         """Stiffness of the softest direction above the limit [N/m].
@@ -199,15 +191,12 @@ class LeastFrequency(Criterion):
         limit: Least natural frequency [Hz], > 0.
     """
 
-    title: ClassVar[str] = "frequency"
-    unit: ClassVar[str] = "Hz"
-    sense: ClassVar[str] = "≥"
-    needs_tensions: ClassVar[bool] = True
+    title = "frequency"
+    unit = "Hz"
+    sense = "≥"
+    limit_range = POSITIVE
+    needs_tensions = True
     limit: float
-
-    def __post_init__(self) -> None:
-        """Check the limit."""
-        self._check_limit(above=0.0)
 
     def judge(self, given: Given) -> Judged:
         """Lowest natural frequency above the limit [Hz].
@@ -234,16 +223,17 @@ class Clearance(Criterion):
         obstacles: Obstacles, Box, Capsule, Sphere and Mesh, one or several.
     """
 
-    title: ClassVar[str] = "clearance"
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[str] = "≥"
-    needs_tensions: ClassVar[bool] = True
+    title = "clearance"
+    unit = "m"
+    sense = "≥"
+    limit_range = POSITIVE
+    needs_tensions = True
     limit: float
     obstacles: Obstacle | Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
         """Check both."""
-        self._check_limit(above=0.0)
+        super(Clearance, self).__post_init__()
         given: Any = self.obstacles
         listed = isinstance(given, Obstacle | list | tuple)
         found = obstacles_of(given if listed else [given], "Clearance: obstacles")
@@ -274,14 +264,11 @@ class InFrame(Criterion):
         limit: Least distance from the faces [m], >= 0.
     """
 
-    title: ClassVar[str] = "frame"
-    unit: ClassVar[str] = "m"
-    sense: ClassVar[str] = "≥"
+    title = "frame"
+    unit = "m"
+    sense = "≥"
+    limit_range = NOT_NEGATIVE
     limit: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the limit."""
-        self._check_limit(low=0.0)
 
     def judge(self, given: Given) -> Judged:
         """Least distance of a corner from the faces, above the limit [m].

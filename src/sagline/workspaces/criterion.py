@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest, PolygonWalk
 
+POSITIVE: Final = MappingProxyType({"above": 0.0})  # ranges of limits
+NOT_NEGATIVE: Final = MappingProxyType({"low": 0.0})
 CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centroid, ClosedForm"
 
 
@@ -111,18 +114,23 @@ class Criterion:
         unit: Unit of its values.
         needs_tensions: True if it depends on the tensions.
         sense: "≤" or "≥" of its limit; "" where it has none.
+        limit_range: Range of its field `limit`, as of `number`; empty where that is not checked.
     """
 
     title: ClassVar[str]
     unit: ClassVar[str]
     needs_tensions: ClassVar[bool] = False
     sense: ClassVar[str] = ""
+    limit_range: ClassVar[Mapping[str, float]] = MappingProxyType({})
 
     def __post_init__(self) -> None:
-        """Refuse the interface itself."""
+        """Check the limit, and refuse the interface itself."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
             raise InvalidValueError("Criterion()", "the interface alone", "a criterion", step)
+        if self.limit_range:
+            value, item = getattr(self, "limit", None), f"{type(self).__name__}: limit"
+            object.__setattr__(self, "limit", number(value, item, self.unit, **self.limit_range))
 
     def judge(self, given: Given) -> Judged:
         """Distances of poses to the limit.
@@ -179,11 +187,6 @@ class Criterion:
             Values in the criterion's unit, shape (N,).
         """
         return self.judge(given).value
-
-    def _check_limit(self, **allowed: float) -> None:
-        """Store the limit as a checked number; the allowed range as of `number`."""
-        item = f"{type(self).__name__}: limit"
-        object.__setattr__(self, "limit", number(getattr(self, "limit", None), item, self.unit, **allowed))
 
 
 def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> None:

@@ -135,8 +135,7 @@ class _BisectionSchedule:
 
     def due(self, k: Indices) -> NDArray[np.bool_]:
         """True for brackets k that are to be bisected next."""
-        turn: NDArray[np.bool_] = self._due[k] > 0
-        return turn
+        return np.asarray(self._due[k] > 0)
 
     def update(self, k: Indices, halved: NDArray[np.bool_], width: Array) -> None:
         """Update the counters of brackets k after a step."""

@@ -53,8 +53,7 @@ class Grid(Result):
     @property
     def inside(self) -> Mask:
         """Mask of the nodes inside, shape (nx, ny, nz)."""
-        inside: Mask = self.values >= 0.0
-        return inside
+        return np.asarray(self.values >= 0.0)
 
     @property
     def step(self) -> Array:
@@ -113,8 +112,7 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
 def crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
     """Mask of the cells that the boundary crosses: some of their nodes are inside, and some are not."""
     parts = list(_views(inside, nodes, stride))
-    mask: Mask = np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts)
-    return mask
+    return np.asarray(np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts))
 
 
 def _views(nodes: Mask, offsets: tuple[tuple[int, ...], ...], stride: int) -> list[Mask]:

@@ -73,8 +73,11 @@ class MarginRows:
         freedom, bodies, table = robot_terms(robots)
         if cables is not None:
             table = _locked(cables)
-        _check(shared, table, len(bodies))
-        self.cable_count = shared.cable_count
+        check_cable_count(shared)
+        self.cable_count = m = shared.cable_count
+        if table.shape[1:] != (m, tables.CABLE_COLUMNS) or not len(table) or len(bodies) not in (1, len(table)):
+            wanted = f"shape (R, {m}, {tables.CABLE_COLUMNS})"
+            raise InvalidValueError("cables", f"of shape {table.shape}", wanted, "Make it from cable_table(robot).")
         self.robot_count = len(table)
         limits = (LIMITS_OF[shared.tension_limits_of], np.nan)
         inertias = bodies_of(robots).inertia
@@ -151,11 +154,9 @@ def _locked(array: Array) -> Array:
     return locked(np.ascontiguousarray(array, dtype=np.float64).view())
 
 
-def _check(robot: Robot, table: Array, bodies: int) -> None:
+def check_cable_count(robot: Robot) -> None:
+    """Refuse a robot with fewer cables than degrees of freedom."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     if m < n:
         step = "Add cables, or choose a motion pattern with fewer freedoms."
         raise InvalidValueError(f"{robot.name}: number of cables", m, f">= {n} for {robot.motion_pattern}", step)
-    if table.shape[1:] != (m, tables.CABLE_COLUMNS) or not len(table) or bodies not in (1, len(table)):
-        wanted = f"shape (R, {m}, {tables.CABLE_COLUMNS})"
-        raise InvalidValueError("cables", f"of shape {table.shape}", wanted, "Make it from cable_table(robot).")

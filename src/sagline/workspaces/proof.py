@@ -23,6 +23,7 @@ from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
 from sagline.tension.options import LIMITS_OF
+from sagline.workspaces.margin_rows import check_cable_count
 from sagline.workspaces.orientations import check_tilt
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
@@ -316,7 +317,7 @@ def prove(
         docs/model.md, section 13.
     """
     load = load_of(wrenches)
-    check_robot(instance(robot, Robot, "robot"))
+    _check_robot(instance(robot, Robot, "robot"))
     check_tilt(robot, instance(box, PoseBox, "box").tilt, "box: tilt")
     if box.tilt > 0.0 and load.accelerations[1] > 0.0:
         step = "Give their moments as WrenchBox(moment=...), or prove the level poses."
@@ -339,12 +340,9 @@ def prove(
     return Proof(robot, box, load, model, verdict, inside, outside, undecided, cells, prover.tried)
 
 
-def check_robot(robot: Robot) -> None:
+def _check_robot(robot: Robot) -> None:
     """Refuse robots for which there is no proof: with pulleys, or with fewer cables than degrees of freedom."""
-    n, m = robot.degrees_of_freedom, robot.cable_count
-    if m < n:
-        step = "Add cables, or choose a motion pattern with fewer freedoms."
-        raise InvalidValueError(f"{robot.name}: number of cables", m, f">= {n} for {robot.motion_pattern}", step)
+    check_cable_count(robot)
     if robot.winches is not None and (robot.winches.pulley_radius > 0.0).any():
         cable = int(np.argmax(robot.winches.pulley_radius > 0.0))
         radius = f"{robot.winches.pulley_radius[cable]:g} m"

@@ -71,8 +71,7 @@ class Surface(Result):
 def normals_of(vertices: Array, faces: Indices) -> Array:
     """Outward normals (F, 3) of triangles, each as long as its triangle's area [m^2]."""
     first, second, third = (vertices[faces[:, k]] for k in range(3))
-    normals: Array = np.cross(second - first, third - first) / 2.0
-    return normals
+    return np.asarray(np.cross(second - first, third - first) / 2.0)
 
 
 def volumes_of(vertices: Array, faces: Indices) -> Array:
@@ -80,8 +79,7 @@ def volumes_of(vertices: Array, faces: Indices) -> Array:
     if not len(faces):
         return np.zeros(0)
     top = vertices.mean(axis=0)  # near the surface, so that little cancels
-    volumes: Array = np.einsum("fi,fi->f", vertices[faces[:, 0]] - top, normals_of(vertices, faces)) / 3.0
-    return volumes
+    return np.asarray(np.einsum("fi,fi->f", vertices[faces[:, 0]] - top, normals_of(vertices, faces)) / 3.0)
 
 
 _TOLD: Final = 8  # volumes that are printed
