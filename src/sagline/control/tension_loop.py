@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -13,13 +13,14 @@ from sagline.control.null_space import NullSpace
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import NumberFields, rule
 
 MOST_CABLES: Final = 10**6
 MOST_GAIN: Final = 0.1  # a cycle: a loop with five cycles of delay is unstable from 0.17 on
 
 
 @dataclass(frozen=True, slots=True)
-class TensionSettings:
+class TensionSettings(NumberFields):
     """Settings of the tension loop; the defaults have 24 dB and 62 degrees at a delay of five cycles.
 
     Attributes:
@@ -33,18 +34,15 @@ class TensionSettings:
         InvalidValueError: If a value is out of its range.
     """
 
-    filter_time: float = 0.5
-    gain: float = 0.01
-    act_above: float = 3.0
-    rest_below: float = 0.5
-    largest: float = 5e-3
+    filter_time: float = field(default=0.5, metadata=rule("s", above=0.0))
+    gain: float = field(default=0.01, metadata=rule(low=0.0))
+    act_above: float = field(default=3.0, metadata=rule("N", above=0.0))
+    rest_below: float = field(default=0.5, metadata=rule("N", low=0.0))
+    largest: float = field(default=5e-3, metadata=rule("m", above=0.0))
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name, unit in (("filter_time", "s"), ("act_above", "N"), ("largest", "m")):
-            object.__setattr__(self, name, number(getattr(self, name), name, unit, above=0.0))
-        for name, unit in (("gain", ""), ("rest_below", "N")):
-            object.__setattr__(self, name, number(getattr(self, name), name, unit, low=0.0))
+        super(TensionSettings, self).__post_init__()
         if self.gain > MOST_GAIN:
             step = "Take 0.01; with more it hunts on the friction of the drives."
             raise InvalidValueError("gain", f"{self.gain:g}", f"0 to {MOST_GAIN:g}", step)

@@ -1,13 +1,15 @@
 """Fields of input types: name, default, unit and allowed range stand once, where the type declares the field.
 
 A type is `attrs.frozen`; a field has a converter, from which a type checker knows what the constructor takes, and the
-arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks what is given. A dataclass of
-single numbers derives from `NumberFields` and declares its ranges in the same way.
+arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks what is given; it is `check_fields`
+where each field declares its whole check. A dataclass of single numbers derives from `NumberFields` and declares its
+ranges in the same way.
 """
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 from attrs import fields
@@ -30,6 +32,19 @@ def if_known(value: ArrayLike | None) -> Array | None:
 def rule(unit: str = "", **limits: Any) -> dict[str, Any]:
     """Metadata of a field: arguments of `checked`."""
     return {"unit": unit, **limits}
+
+
+def checked_by(check: Callable[..., Any], *arguments: Any, **limits: Any) -> dict[str, Any]:
+    """Metadata of a field: a check that is called with value, name and these arguments, as of `core.arguments`."""
+    return {"check": lambda value, item: check(value, item, *arguments, **limits)}
+
+
+def check_fields(made: Any) -> None:
+    """Check each field of a new object by its `checked_by`; None is allowed where it is the default."""
+    for about in fields(type(made)):
+        value = getattr(made, about.name)
+        if "check" in about.metadata and not (value is None and about.default is None):
+            object.__setattr__(made, about.name, about.metadata["check"](value, about.name))
 
 
 class NumberFields:

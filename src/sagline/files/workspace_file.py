@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from attrs import fields
 
 from sagline.cables.models import MODELS
 from sagline.core.arguments import choice
@@ -138,7 +138,7 @@ def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Obstacle: texts and numbers as attributes, arrays as variables with dimensions of their own."""
     attributes: dict[str, Any] = {key: type(obstacle).__name__}
     variables: dict[str, Any] = {}
-    for field in fields(obstacle):
+    for field in fields(type(obstacle)):
         value = getattr(obstacle, field.name)
         if isinstance(value, np.ndarray):
             name = f"{key}_{field.name}"

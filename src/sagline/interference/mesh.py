@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
+from attrs import field, frozen
 from numpy.typing import ArrayLike
 
 from sagline.core.arguments import instance, label
 from sagline.core.arrays import Array, Flags, Indices, checked, locked, numbers
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import check_fields, checked_by, given, reduced
 from sagline.core.memory import check_memory
 from sagline.core.numbers import counted
 from sagline.core.results import Result, set_fields
@@ -20,7 +21,12 @@ MOST: Final = 1_000_000  # triangles
 _AT_ONCE: Final = 1 << 19  # triangles times points
 
 
-@dataclass(frozen=True, slots=True, eq=False, repr=False)
+def _as_faces(value: ArrayLike) -> Indices:
+    """Faces as given: a converter that tells type checkers what the constructor takes."""
+    return value  # type: ignore[return-value]
+
+
+@frozen(eq=False, repr=False, weakref_slot=False)
 class Mesh(Result):
     """A closed surface of triangles, at rest in the world; as a platform, in the platform frame.
 
@@ -32,6 +38,10 @@ class Mesh(Result):
         faces: Triangles as numbers of their corners, counter-clockwise seen from outside the solid, shape (F, 3).
         name: Name in messages and results.
 
+    Raises:
+        InvalidValueError: If a face names no corner, there are fewer than 4 or more than a million faces, or the
+            surface is not closed; the message gives its extent.
+
     Examples:
         >>> import sagline as sl
         >>> corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
@@ -41,32 +51,25 @@ class Mesh(Result):
         0.1667 m^3
     """
 
-    vertices: Array
-    faces: Indices
-    name: str
+    vertices: Array = field(converter=given)
+    faces: Indices = field(converter=_as_faces)
+    name: str = field(default="mesh", metadata=checked_by(label))
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, name: str = "mesh") -> None:
-        """Check the fields.
-
-        Args:
-            vertices: Corners [m], shape (V, 3).
-            faces: Triangles as numbers of their corners from 0, shape (F, 3): at least four, at most a million.
-            name: Name in messages and results.
-
-        Raises:
-            InvalidValueError: If a face names no corner, or the surface is not closed; the message gives its extent.
-        """
-        corners = checked(vertices, "vertices", "m", shape=(None, 3))
+    def __attrs_post_init__(self) -> None:
+        """Check the fields, and that the surface is closed."""
+        corners = checked(self.vertices, "vertices", "m", shape=(None, 3))
         if corners.ndim != 2:
             step = "Give one mesh at a time."
             raise InvalidValueError("vertices", f"of shape {corners.shape}", "shape (any, 3)", step)
-        triangles = _faces(faces, len(corners))
-        called = label(name, "name")
-        if wrong := open_edges(triangles):
+        triangles = _faces(self.faces, len(corners))
+        check_fields(self)
+        if wrong := _open_edges(triangles):
             value = f"not closed ({wrong} edges of {len(triangles)} triangles lack a neighbor that faces the same way)"
             step = "Close its holes and turn its faces outward in the program that made it."
-            raise InvalidValueError(called, f"{value}, {extent_text(corners)}", "a closed surface", step)
-        set_fields(self, vertices=corners, faces=triangles, name=called)
+            raise InvalidValueError(self.name, f"{value}, {extent_text(corners)}", "a closed surface", step)
+        set_fields(self, vertices=corners, faces=triangles)
+
+    __reduce__ = reduced
 
     def __str__(self) -> str:
         """Its name, its triangles and its extent."""
@@ -139,7 +142,7 @@ def _faces(given: Any, corners: int) -> Indices:
     return locked(np.ascontiguousarray(values, dtype=np.int64))
 
 
-def open_edges(faces: Indices) -> int:
+def _open_edges(faces: Indices) -> int:
     """Number of edges without a neighbor in the opposite direction."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = int(faces.max()) + 1

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Final
 
 import numpy as np
+from attrs import field, frozen
 from numpy.typing import ArrayLike
 
 from sagline.core.arguments import instance, label
 from sagline.core.arrays import Array, exactly, number
-from sagline.core.results import Result, set_fields
+from sagline.core.fields import check_fields, checked_by, given, reduced
+from sagline.core.results import Result
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
@@ -20,7 +21,14 @@ _LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ROUNDING: Final = 1e-14  # of products of unit vectors
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+def _rotation(value: ArrayLike, item: str) -> Array:
+    """Checked rotation matrix as given, or the nearest one where it differs by more than rounding."""
+    matrix = exactly(value, item, "", (3, 3))
+    nearest = Pose(np.zeros(3), matrix).matrix
+    return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
+
+
+@frozen(eq=False, weakref_slot=False)
 class Box(Result):
     """A solid box.
 
@@ -30,41 +38,21 @@ class Box(Result):
         orientation: Rotation from its edges to the world, shape (3, 3).
         name: Name in messages and results.
 
+    Raises:
+        InvalidValueError: If an edge is not positive, or orientation is no rotation.
+
     Examples:
         >>> import sagline as sl
         >>> table = sl.Box([1.2, 0.8, 0.7], center=[2.0, 0.0, 0.35], name="table")
     """
 
-    size: Array
-    center: Array
-    orientation: Array
-    name: str
+    size: Array = field(converter=given, metadata=checked_by(exactly, "m", (3,), above=0.0))
+    center: Array = field(default=(0.0, 0.0, 0.0), converter=given, metadata=checked_by(exactly, "m", (3,)))
+    orientation: Array = field(default=_LEVEL, converter=given, metadata=checked_by(_rotation))
+    name: str = field(default="box", metadata=checked_by(label))
 
-    def __init__(
-        self,
-        size: ArrayLike,
-        center: ArrayLike = (0.0, 0.0, 0.0),
-        orientation: ArrayLike = _LEVEL,
-        name: str = "box",
-    ) -> None:
-        """Check the fields.
-
-        Args:
-            size: Its edges [m], shape (3,), > 0.
-            center: Its middle [m], shape (3,).
-            orientation: Rotation matrix from its edges to the world, shape (3, 3).
-            name: Name in messages and results.
-
-        Raises:
-            InvalidValueError: If an edge is not positive, or orientation is no rotation.
-        """
-        set_fields(
-            self,
-            size=exactly(size, "size", "m", (3,), above=0.0),
-            center=exactly(center, "center", "m", (3,)),
-            orientation=_rotation(exactly(orientation, "orientation", "", (3, 3))),
-            name=label(name, "name"),
-        )
+    __attrs_post_init__ = check_fields
+    __reduce__ = reduced
 
     @property
     def bounds(self) -> Array:
@@ -73,13 +61,7 @@ class Box(Result):
         return np.stack((self.center - reach, self.center + reach))
 
 
-def _rotation(matrix: Array) -> Array:
-    """Rotation matrix as given, or the nearest one where it differs by more than rounding."""
-    nearest = Pose(np.zeros(3), matrix).matrix
-    return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
-
-
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False, weakref_slot=False)
 class Capsule(Result):
     """A solid rod with round ends: a pole, a pipe, a lamp.
 
@@ -89,35 +71,21 @@ class Capsule(Result):
         radius: [m], >= 0.
         name: Name in messages and results.
 
+    Raises:
+        InvalidValueError: If the radius is negative, or an end is no point.
+
     Examples:
         >>> import sagline as sl
         >>> pole = sl.Capsule([1.0, 0.0, 0.0], [1.0, 0.0, 3.0], radius=0.05, name="pole")
     """
 
-    start: Array
-    end: Array
-    radius: float
-    name: str
+    start: Array = field(converter=given, metadata=checked_by(exactly, "m", (3,)))
+    end: Array = field(converter=given, metadata=checked_by(exactly, "m", (3,)))
+    radius: float = field(metadata=checked_by(number, "m", low=0.0))
+    name: str = field(default="capsule", metadata=checked_by(label))
 
-    def __init__(self, start: ArrayLike, end: ArrayLike, radius: float, name: str = "capsule") -> None:
-        """Check the fields.
-
-        Args:
-            start: One end of its middle line [m], shape (3,).
-            end: The other [m], shape (3,).
-            radius: [m], >= 0.
-            name: Name in messages and results.
-
-        Raises:
-            InvalidValueError: If the radius is negative, or an end is no point.
-        """
-        set_fields(
-            self,
-            start=exactly(start, "start", "m", (3,)),
-            end=exactly(end, "end", "m", (3,)),
-            radius=number(radius, "radius", "m", low=0.0),
-            name=label(name, "name"),
-        )
+    __attrs_post_init__ = check_fields
+    __reduce__ = reduced
 
     @property
     def bounds(self) -> Array:
@@ -126,7 +94,7 @@ class Capsule(Result):
         return np.stack((low - self.radius, high + self.radius))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False, weakref_slot=False)
 class Sphere(Result):
     """A solid ball.
 
@@ -135,32 +103,20 @@ class Sphere(Result):
         radius: [m], >= 0.
         name: Name in messages and results.
 
+    Raises:
+        InvalidValueError: If the radius is negative, or the center is no point.
+
     Examples:
         >>> import sagline as sl
         >>> lamp = sl.Sphere([0.0, 0.0, 2.8], radius=0.2, name="lamp")
     """
 
-    center: Array
-    radius: float
-    name: str
+    center: Array = field(converter=given, metadata=checked_by(exactly, "m", (3,)))
+    radius: float = field(metadata=checked_by(number, "m", low=0.0))
+    name: str = field(default="sphere", metadata=checked_by(label))
 
-    def __init__(self, center: ArrayLike, radius: float, name: str = "sphere") -> None:
-        """Check the fields.
-
-        Args:
-            center: Its middle [m], shape (3,).
-            radius: [m], >= 0.
-            name: Name in messages and results.
-
-        Raises:
-            InvalidValueError: If the radius is negative, or the center is no point.
-        """
-        set_fields(
-            self,
-            center=exactly(center, "center", "m", (3,)),
-            radius=number(radius, "radius", "m", low=0.0),
-            name=label(name, "name"),
-        )
+    __attrs_post_init__ = check_fields
+    __reduce__ = reduced
 
     @property
     def bounds(self) -> Array:

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from attrs import field, frozen
 
 from sagline.core.arguments import brief, choice, whole_number
 from sagline.core.arrays import Array, Flags, Indices, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.results import set_fields
+from sagline.core.fields import check_fields, checked_by, reduced
 from sagline.kernels import tables
 from sagline.optimization.free import Bound, Free, FreeCable, Part
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
+MOST_SAMPLES = 1000
 TWINS = 1e-9  # m: two cables whose ends are nearer than this are one
 
 
@@ -158,50 +159,32 @@ class Solid:
         return found.reshape(points.shape[:-1])
 
 
-TAKEN = ("worst", "mean")
-MOST_SAMPLES = 1000
-
-
-@dataclass(frozen=True, slots=True)
+@frozen(weakref_slot=False)
 class AnchorErrors:
     """Errors of all anchors as a sample, the same for all candidates: normally distributed, each coordinate by itself.
 
     Attributes:
-        deviation: Standard deviation of each coordinate [m].
-        samples: Number of robots with errors for each candidate.
+        deviation: Standard deviation of each coordinate [m], > 0.
+        samples: Number of robots with errors for each candidate, 1 to 1000.
         take: Value of the candidate from those of its samples, "worst" or "mean".
-        seed: Of the sample.
+        seed: Of the sample, a whole number >= 0.
+
+    Raises:
+        InvalidValueError: If an argument is of the wrong kind, or out of range.
+
+    Examples:
+        >>> import sagline as sl
+        >>> print(sl.AnchorErrors(0.01, samples=4).take)
+        worst
     """
 
-    deviation: float
-    samples: int
-    take: str
-    seed: int
+    deviation: float = field(metadata=checked_by(number, "m", above=0.0))
+    samples: int = field(default=8, kw_only=True, metadata=checked_by(whole_number, 1, MOST_SAMPLES))
+    take: str = field(default="worst", kw_only=True, metadata=checked_by(choice, ("worst", "mean")))
+    seed: int = field(default=0, kw_only=True, metadata=checked_by(whole_number, 0))
 
-    def __init__(self, deviation: float, *, samples: int = 8, take: str = "worst", seed: int = 0) -> None:
-        """Check deviation, samples, take and seed.
-
-        Args:
-            deviation: Standard deviation of each coordinate [m], > 0.
-            samples: Number of samples, 1 to 1000.
-            take: "worst" or "mean".
-            seed: Of the sample, a whole number >= 0.
-
-        Raises:
-            InvalidValueError: If an argument is of the wrong kind, or out of range.
-
-        Examples:
-            >>> import sagline as sl
-            >>> print(sl.AnchorErrors(0.01, samples=4).take)
-            worst
-        """
-        set_fields(
-            self,
-            deviation=number(deviation, "deviation", "m", above=0.0),
-            samples=whole_number(samples, "samples", 1, MOST_SAMPLES),
-            take=choice(take, "take", TAKEN),
-            seed=whole_number(seed, "seed", 0),
-        )
+    __attrs_post_init__ = check_fields
+    __reduce__ = reduced
 
     def added(self, cables: Array) -> Array:
         """Cable tables of robots with anchor errors.

@@ -8,11 +8,13 @@ from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from attrs import field, frozen
 
 from sagline.cables.cable import Cable
 from sagline.core.arguments import brief, choice, instance, integer, label
 from sagline.core.arrays import Array, Indices, number
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import check_fields, checked_by, reduced
 from sagline.core.results import ByFields, set_fields
 from sagline.kernels import tables
 from sagline.robot.robot import Robot
@@ -68,13 +70,15 @@ def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -
         raise InvalidValueError(f"low{where}", f"{low[k]:g} {unit}", allowed, "Exchange low and high.")
 
 
-def cable_numbers(cables: Any, item: str) -> tuple[int, ...]:
-    """Cable numbers given by a caller, each once, checked."""
+def cable_numbers(cables: Any) -> tuple[int, ...]:
+    """Checked cable numbers, each once; empty for None, all cables."""
+    if cables is None:
+        return ()
     given = list(cables) if isinstance(cables, Sequence | np.ndarray) and not isinstance(cables, str) else []
     found = [integer(one) for one in given]
     if not found or any(one is None or one < 0 for one in found) or len(set(found)) < len(found):
         step = "Number the cables from 0, or leave cables out for all."
-        raise InvalidValueError(item, brief(cables), "numbers of cables that differ", step)
+        raise InvalidValueError("cables", brief(cables), "numbers of cables that differ", step)
     return tuple(one for one in found if one is not None)
 
 
@@ -95,42 +99,38 @@ def whose_text(cables: Indices, count: int) -> str:
 SAME: Final = 1e-9  # relative: to which a robot's cable is one of a catalogue
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+def _one_cable(value: Any, item: str) -> Cable:
+    """Material of one cable, checked: numbers and no arrays."""
+    cable = instance(value, Cable, item)
+    if cable.linear_density.shape != ():
+        shape = f"of shape {cable.linear_density.shape}"
+        raise InvalidValueError(item, shape, "one cable's material, numbers", "Give Cable(0.067, 44e3).")
+    if not float(cable.linear_density) > 0.0:
+        raise InvalidValueError(f"{item}: linear_density", "0 kg/m", "> 0 kg/m", "Give its mass per length.")
+    return cable
+
+
+@frozen(eq=False, weakref_slot=False)
 class CableChoice:
     """A cable of a catalogue.
 
     Attributes:
         name: Name in messages and files.
-        cable: Its material, one cable's.
-        cost: Of a meter of it, in any currency; None where no goal asks.
-        tension_max: Upper tension limit [N]; None: the robot's limits stay.
+        cable: Its material, numbers and no arrays.
+        cost: Of a meter of it, in any currency, >= 0; None where no goal asks.
+        tension_max: Upper tension limit [N], > 0; None: the robot's limits stay.
+
+    Raises:
+        InvalidValueError: If the material is that of several cables, or an argument is of the wrong kind.
     """
 
-    name: str
-    cable: Cable
-    cost: float | None
-    tension_max: float | None
+    name: str = field(metadata=checked_by(label))
+    cable: Cable = field(metadata=checked_by(_one_cable))
+    cost: float | None = field(default=None, kw_only=True, metadata=checked_by(number, "per m", low=0.0))
+    tension_max: float | None = field(default=None, kw_only=True, metadata=checked_by(number, "N", above=0.0))
 
-    def __init__(self, name: str, cable: Cable, *, cost: float | None = None, tension_max: float | None = None) -> None:
-        """Check name, cable, cost and limit.
-
-        Args:
-            name: Name in messages and files.
-            cable: Its material, numbers and no arrays.
-            cost: Of a meter, >= 0, or None.
-            tension_max: Upper tension limit [N], > 0, or None.
-
-        Raises:
-            InvalidValueError: If the material is that of several cables, or an argument is of the wrong kind.
-        """
-        if instance(cable, Cable, "cable").linear_density.shape != ():
-            value = f"of shape {cable.linear_density.shape}"
-            raise InvalidValueError("cable", value, "one cable's material, numbers", "Give Cable(0.067, 44e3).")
-        if not float(cable.linear_density) > 0.0:
-            raise InvalidValueError("cable: linear_density", "0 kg/m", "> 0 kg/m", "Give its mass per length.")
-        limit = None if tension_max is None else number(tension_max, "tension_max", "N", above=0.0)
-        price = None if cost is None else number(cost, "cost", "per m", low=0.0)
-        set_fields(self, name=label(name, "name"), cable=cable, cost=price, tension_max=limit)
+    __attrs_post_init__ = check_fields
+    __reduce__ = reduced
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -233,8 +233,7 @@ class FreeLimit(Free):
         """
         lower, upper = number(low, "low", "N", low=0.0), number(high, "high", "N", low=0.0)
         check_order(np.array([lower]), np.array([upper]), "N", strictly=True)
-        named = () if cables is None else cable_numbers(cables, "cables")
-        set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=named)
+        set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=cable_numbers(cables))
 
     def bound(self, robot: Robot, item: str) -> Bound:
         """Design variables of a given robot.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Final, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,12 +24,7 @@ NAMES: Final = (*MIRRORED, "turned", "together")
 _ON_PLANE: Final = 1e-9  # of the extent of the anchors
 
 
-def symmetry_of(given: Any) -> Symmetry | None:
-    """Symmetry, checked, or None."""
-    return None if given is None else str(choice(given, "symmetry", NAMES))
-
-
-def symmetric_shifts(
+def _symmetric_shifts(
     symmetry: Symmetry | None, anchors: Array, along: Array, bounds: tuple[Array, Array], item: str
 ) -> list[tuple[int | None, Array]]:
     """Shifts (K, c, 3) of anchors (c, 3) per meter of shift of a leading one along K directions, and its index.
@@ -156,8 +151,8 @@ class FreeAnchors(Free):
             low=locked(lower[free]),
             high=locked(upper[free]),
             along=locked(directions[free]),
-            cables=() if cables is None else cable_numbers(cables, "cables"),
-            symmetry=symmetry_of(symmetry),
+            cables=cable_numbers(cables),
+            symmetry=None if symmetry is None else str(choice(symmetry, "symmetry", NAMES)),
         )
 
     def bound(self, robot: Robot, item: str) -> Bound:
@@ -175,7 +170,7 @@ class FreeAnchors(Free):
         parts: list[Part] = []
         rates: list[Array] = []
         names = _direction_names(self.along)
-        shifts = symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
+        shifts = _symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
         for which, moved in shifts:  # moved: of each cable, for each direction (K, c, 3)
             for k, name in enumerate(names):
                 rate = np.zeros((robot.cable_count, tables.CABLE_COLUMNS))
