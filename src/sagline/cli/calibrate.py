@@ -141,7 +141,7 @@ def _fit(request: Request, log: Path | None, model: CableModel, folds: int, *, r
         raise FileError(log, "is no CSV file of readings", "Give what encoders and load cells read, winches.csv.")
     request.check_files((*ROBOTS, WHOLE))
     robot, readings = load_robot(request.robot), _log(log, request.sensor_deviations())
-    unknowns = parameters.chosen(request.unknowns)  # before anything is compiled
+    unknowns = parameters.checked_unknowns(request.unknowns)  # before anything is compiled
     with working(f"{robot.name}: calibrating from {len(readings):,} rows", FORWARD, STARTING_LENGTHS, READINGS) as line:
         found = calibrate(robot, readings, unknowns, model=model, robust=robust, folds=folds, progress=line.progress)
         files = _written(found, request, line)
@@ -172,7 +172,7 @@ def _plan_poses(request: Request, count: int, seed: int, log: Path | None, *, as
             raise InvalidValueError(item, f"given with --plan: {str(value)!r}", "one of the two", step)
     request.check_files(ROBOTS)
     robot, given = load_robot(request.robot), request.sensor_deviations()
-    unknowns = parameters.chosen(request.unknowns)  # before anything is compiled
+    unknowns = parameters.checked_unknowns(request.unknowns)  # before anything is compiled
     with working(f"{robot.name}: choosing {count:,} poses", INVERSE, READINGS) as line:
         sensors = Sensors(**given) if given else None
         chosen = calibration_poses(robot, count, unknowns, sensors, seed=seed, progress=line.progress)
