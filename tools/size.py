@@ -91,12 +91,21 @@ def public_functions() -> dict[tuple[str, str], FunctionType]:
     return found
 
 
+def overrides_documented(module: str, name: str) -> bool:
+    """Whether a method overrides one of a base class that has an Args section, whose arguments it takes."""
+    kind, _, method = name.rpartition(".")
+    bases = getattr(sys.modules[module], kind).__mro__[1:]
+    return any("Args:" in (getattr(vars(base).get(method), "__doc__", None) or "") for base in bases)
+
+
 def without_args() -> list[str]:
-    """Public methods with parameters but no Args section."""
+    """Public methods with parameters but no Args section, neither their own nor that of the method they override."""
     found = []
     for (module, name), function in public_functions().items():
         parameters = set(inspect.signature(function).parameters) - {"self", "cls"}
-        if "." in name and not name.endswith("__init__") and parameters and "Args:" not in (function.__doc__ or ""):
+        if "." not in name or name.endswith("__init__") or not parameters or "Args:" in (function.__doc__ or ""):
+            continue
+        if not overrides_documented(module, name):
             found.append(f"{module}.{name}")
     return sorted(found)
 

@@ -58,7 +58,18 @@ class Free(ByFields):
     __slots__ = ()
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of the robot that the search begins with; refused outside the bounds."""
+        """Design variables of the robot that the search begins with.
+
+        Args:
+            robot: Initial robot of the search.
+            item: Name of the object in messages.
+
+        Returns:
+            Design variables and the function that writes them.
+
+        Raises:
+            InvalidValueError: If the robot does not have it, or not within the bounds.
+        """
         raise NotImplementedError
 
 
@@ -163,15 +174,7 @@ class FreeCable(Free):
         object.__setattr__(self, "catalogue", entries)
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot.
-
-        Args:
-            robot: Initial robot of the search.
-            item: Name of the object in messages.
-
-        Returns:
-            Design variables and the function that writes them.
-        """
+        """Design variables of a given robot."""
         own = robot.cables
         for k, one in enumerate(self.catalogue):
             pairs = ((own.linear_density, one.cable.linear_density), (own.axial_stiffness, one.cable.axial_stiffness))
@@ -236,15 +239,7 @@ class FreeLimit(Free):
         set_fields(self, which=choice(which, "which", LIMITS), low=lower, high=upper, cables=cable_numbers(cables))
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot.
-
-        Args:
-            robot: Initial robot of the search.
-            item: Name of the object in messages.
-
-        Returns:
-            Design variables and the function that writes them.
-        """
+        """Design variables of a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         own = getattr(robot, self.which)[cables]
         name = f"{self.which}{whose_text(cables, robot.cable_count)}"

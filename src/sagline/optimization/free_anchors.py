@@ -156,15 +156,7 @@ class FreeAnchors(Free):
         )
 
     def bound(self, robot: Robot, item: str) -> Bound:
-        """Design variables of a given robot.
-
-        Args:
-            robot: Initial robot of the search.
-            item: Name of the object in messages.
-
-        Returns:
-            Design variables and the function that writes them.
-        """
+        """Design variables of a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         anchors = robot.frame_anchors if self.end == "frame" else robot.platform_anchors
         parts: list[Part] = []

@@ -53,25 +53,11 @@ class LeastMargin(Criterion):
         return self.limit == 0.0
 
     def judge(self, given: Given) -> Judged:
-        """Margins above the reserve [N], and the cables that limit them.
-
-        Args:
-            given: Poses with their plan and equilibrium.
-
-        Returns:
-            Values, and the cables that decide where there are such.
-        """
+        """Margins above the reserve [N], and the cables that limit them."""
         return Judged(locked(given.margin - self.limit), given.cable)
 
     def scale(self, robot: Robot) -> float:
-        """The platform's weight; without gravity the largest tension of a cable [N].
-
-        Args:
-            robot: Robot whose workspace is computed.
-
-        Returns:
-            Size in the unit of the criterion, > 0.
-        """
+        """The platform's weight; without gravity the largest tension of a cable [N]."""
         weight = robot.mass * robot.gravity
         if weight > 0.0:
             return weight
@@ -95,14 +81,7 @@ class MaximumSag(Criterion):
     limit: float
 
     def judge(self, given: Given) -> Judged:
-        """Limit minus largest sag [m], and the cable that sags most.
-
-        Args:
-            given: Poses with their plan and equilibrium.
-
-        Returns:
-            Values, and the cables that decide where there are such.
-        """
+        """Limit minus largest sag [m], and the cable that sags most."""
         sag = given.state.cables.sag
         return Judged(given.spread(self.limit - sag.max(axis=1)), given.spread_cables(sag.argmax(axis=1)))
 
@@ -137,14 +116,7 @@ class PositionError(Criterion):
         return f"{super(PositionError, self).__str__()} with {type(self.model).__name__}"
 
     def judge(self, given: Given) -> Judged:
-        """Limit minus position error [m]; NaN where the model has no lengths, or no equilibrium at its lengths.
-
-        Args:
-            given: Poses with their plan and equilibrium.
-
-        Returns:
-            Values, and the cables that decide where there are such.
-        """
+        """Limit minus position error [m]; NaN where the model has no lengths, or no equilibrium at its lengths."""
         found = confirm(given.planned(self.model))
         error = np.where(found.held, np.linalg.norm(found.position_error, axis=1), np.nan)
         return Judged(given.spread(self.limit - error))
@@ -169,14 +141,7 @@ class LeastStiffness(Criterion):
     limit: float
 
     def judge(self, given: Given) -> Judged:
-        """Stiffness of the softest direction above the limit [N/m].
-
-        Args:
-            given: Poses with their plan and equilibrium.
-
-        Returns:
-            Values, and the cables that decide where there are such.
-        """
+        """Stiffness of the softest direction above the limit [N/m]."""
         found = _least_stiffness(given.robot.freedom, cable_slopes(given.state).matrix)
         return Judged(given.spread(found - self.limit))
 
@@ -199,14 +164,7 @@ class LeastFrequency(Criterion):
     limit: float
 
     def judge(self, given: Given) -> Judged:
-        """Lowest natural frequency above the limit [Hz].
-
-        Args:
-            given: Poses with their plan and equilibrium.
-
-        Returns:
-            Values, and the cables that decide where there are such.
-        """
+        """Lowest natural frequency above the limit [Hz]."""
         lowest = modes(given.state).frequency[:, 0]
         unstable = np.isnan(lowest) & given.plan.feasible
         return Judged(given.spread(np.where(unstable, 0.0, lowest) - self.limit))
@@ -240,14 +198,7 @@ class Clearance(Criterion):
         object.__setattr__(self, "obstacles", found)
 
     def judge(self, given: Given) -> Judged:
-        """Least distance above the limit [m], and the cable, or the first of two, of the nearest pair.
-
-        Args:
-            given: Poses with their plan and equilibrium.
-
-        Returns:
-            Values, and the cables that decide where there are such.
-        """
+        """Least distance above the limit [m], and the cable, or the first of two, of the nearest pair."""
         rows = _clearance_rows(given.robot, self.obstacles)
         value, pair = rows.least(given.state)
         cables = np.array([*map(_cable_of, rows.pairs.names), -1])
@@ -271,14 +222,7 @@ class InFrame(Criterion):
     limit: float = 0.0
 
     def judge(self, given: Given) -> Judged:
-        """Least distance of a corner from the faces, above the limit [m].
-
-        Args:
-            given: Poses with their plan and equilibrium.
-
-        Returns:
-            Values, and the cables that decide where there are such.
-        """
+        """Least distance of a corner from the faces, above the limit [m]."""
         robot = given.robot
         low, high = bounds(robot)
         axes = np.arange(3) if robot.plane_normal is None else np.flatnonzero(np.abs(robot.plane_normal) < 0.5)
@@ -290,14 +234,7 @@ class InFrame(Criterion):
         return Judged(locked(distance - self.limit))
 
     def scale(self, robot: Robot) -> float:
-        """A tenth of the frame's least edge that is not flat [m].
-
-        Args:
-            robot: Robot whose workspace is computed.
-
-        Returns:
-            Size in the unit of the criterion, > 0.
-        """
+        """A tenth of the frame's least edge that is not flat [m]."""
         low, high = bounds(robot)
         edges = (high - low)[high > low]
         return 0.1 * float(edges.min(initial=np.inf)) if edges.size else 1.0
