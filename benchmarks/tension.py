@@ -19,7 +19,7 @@ from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, memory_for
-from sagline.kernels.tension.nearest import Distribution, new_nearness, share_nearest
+from sagline.kernels.tension.nearest import Distribution, new_reference_point, share_nearest
 from sagline.kernels.tension.other_methods import distribute_by_other_method
 from sagline.kernels.tension.work_arrays import new_work_arrays, reset_work_arrays
 from sagline.tension.options import kernel_options, takes_default_kernel
@@ -56,7 +56,7 @@ def share_batch(  # type: ignore[no-untyped-def]
     """The sharing alone, of many poses that are already factored; otherwise as in `inverse_poses`."""
     sharing = Distribution(*sharing_terms)
     r, m = nulls[0].shape
-    near, rest = new_nearness(Memory(*room), previous, r)
+    near, rest = new_reference_point(Memory(*room), previous, r)
     rows, at = block(rest.numbers, 0, 2, m)
     tension, offset = rows[0], rows[1]
     rest = Memory(rest.numbers[at:], rest.counters)

@@ -36,7 +36,7 @@ from sagline.cli.progress import progress_line
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.inverse.poses import inverse_poses, measure_balance
 from sagline.kernels.jit import FOLDER, is_compiled
-from sagline.kernels.tension.nearest import new_nearness
+from sagline.kernels.tension.nearest import new_reference_point
 from tests.cli import interrupts
 from tests.tiers import extended
 
@@ -152,7 +152,7 @@ def test_no_entry_is_compiled_for_one_that_does_not_come_after_it(names: list[st
 def test_what_is_compiled_is_named_and_counted() -> None:
     stages: list[Stage] = []
     with compilation_events(stages.append), compiling(inverse_poses, ("int64", "none")):
-        with compiling(measure_balance), compiling(new_nearness):
+        with compiling(measure_balance), compiling(new_reference_point):
             pass
         with compiling(SimpleNamespace(py_func=os.getcwd)):  # numba's own are not counted
             pass

@@ -10,14 +10,14 @@ from sagline.kernels.balance.setting import new_balance
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.codes import LOWEST_MAXIMUM, LOWEST_SUM
 from sagline.kernels.memory import Memory, block, memory_for
-from sagline.kernels.tension.nearest import new_nearness
+from sagline.kernels.tension.nearest import new_reference_point
 from sagline.kernels.tension.work_arrays import new_work_arrays
 from tests.kernels.compiled import from_python, memory
 
 take_block = from_python(block)
 room_for_cables = from_python(new_cables)
 room_for_balance = from_python(new_balance)
-room_for_nearness = from_python(new_nearness)
+room_for_nearness = from_python(new_reference_point)
 room_otherwise = from_python(new_work_arrays)
 
 

@@ -298,7 +298,7 @@ class CableState(Result):
     def sag(self) -> Array:
         """Largest vertical drop below the chord [m]; on a vertical chord, below the lower end."""
         out = np.empty(self.unstrained_length.size)
-        shape.sags(self.model.terms(self.gravity), *self._columns(), out)
+        shape.largest_sags(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
 
     @property

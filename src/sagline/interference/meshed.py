@@ -22,7 +22,7 @@ from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.interference.pairs import Pairs
 from sagline.kernels.interference import shapes
-from sagline.kernels.interference.catenary_distance import BEGIN, BULGE, END, PIECE_COLUMNS, cut
+from sagline.kernels.interference.catenary_distance import BEGIN, BULGE, END, PIECE_COLUMNS, cut_piece
 from sagline.robot.pose import Pose
 
 Form = Box | Capsule | Sphere | Mesh
@@ -197,7 +197,7 @@ def package() -> ModuleType:
 
 def _pieces(row: Array, ranges: list[tuple[float, float]]) -> Array:
     out = np.empty((len(ranges), PIECE_COLUMNS))
-    cut(locked(row.view()), locked(np.array(ranges)), out)
+    cut_piece(locked(row.view()), locked(np.array(ranges)), out)
     return out
 
 

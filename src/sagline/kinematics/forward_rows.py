@@ -23,8 +23,8 @@ from sagline.kernels.forward.problem import (
     LAST_COLUMNS,
     MOMENT_RESIDUAL,
     STIFFNESS_MIN,
-    ChainArrays,
-    FoundArrays,
+    LastEquilibriumArrays,
+    SolutionArrays,
 )
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.status import STABLE, ForwardStatus
@@ -124,7 +124,7 @@ class ForwardRows(NamedTuple):
         return locked(self.poses[which]) if which.size else before
 
     @property
-    def arrays(self) -> FoundArrays:
+    def arrays(self) -> SolutionArrays:
         """A plain tuple: kernels know those the fastest."""
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
@@ -221,7 +221,7 @@ def solve_forward_rows(
     return found
 
 
-def new_chain(cables: int, freedoms: int) -> ChainArrays:
+def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
     """Memory of a chain of samples, before the first one."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),

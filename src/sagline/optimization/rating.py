@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Flags, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import blocks
 from sagline.kernels import codes, tables
-from sagline.kernels.cable.shape import sags
+from sagline.kernels.cable.shape import largest_sags
 from sagline.kernels.forward.sensitivity import DATA, describe_states
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.memory import memory_for
@@ -74,7 +74,7 @@ def _sag(model: CableModel, gravity: float, results: Array, cables: Array) -> Ar
         locked(np.ascontiguousarray(row).reshape(-1)) for row in rows
     )
     out = np.empty(length.size)
-    sags(model.terms(gravity), span, rise, density, stiffness, free, horizontal, vertical, tension, out)
+    largest_sags(model.terms(gravity), span, rise, density, stiffness, free, horizontal, vertical, tension, out)
     return out.reshape(length.shape)
 
 

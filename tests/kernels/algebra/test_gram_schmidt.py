@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.algebra.gram_schmidt import normalize_row, orthogonalize_row
 from tests.kernels.compiled import from_python
 
-take, hold = from_python(take_out), from_python(keep)
+take, hold = from_python(orthogonalize_row), from_python(normalize_row)
 
 
 def framed(rows: Array) -> tuple[Array, Array]:

@@ -12,23 +12,23 @@ from sagline.kernels.algebra import nearest_point as n
 from tests.kernels.compiled import from_python, memory
 
 nearest_point = from_python(n.nearest_point)
-new_held = from_python(n.new_held)
+new_held = from_python(n.new_active_set)
 
 
-def held_for(d: int) -> n.Held:
-    held: n.Held = new_held(memory(), d)[0]
+def held_for(d: int) -> n.ActiveSet:
+    held: n.ActiveSet = new_held(memory(), d)[0]
     held.labels[0] = 0
     return held
 
 
-def point_of(rows: Array, bounds: Array, target: Array, held: n.Held | None = None) -> Array:
+def point_of(rows: Array, bounds: Array, target: Array, held: n.ActiveSet | None = None) -> Array:
     """The point, where there is one."""
     point = solve(rows, bounds, target, held)
     assert point is not None
     return point
 
 
-def solve(rows: Array, bounds: Array, target: Array, held: n.Held | None = None) -> Array | None:
+def solve(rows: Array, bounds: Array, target: Array, held: n.ActiveSet | None = None) -> Array | None:
     """The point, from a cold start unless held says otherwise; None for none."""
     held = held_for(target.size) if held is None else held
     point = np.full(target.size, np.nan)

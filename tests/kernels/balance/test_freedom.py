@@ -14,11 +14,11 @@ FREEDOMS = {
     "1R2T": freedom_matrix("1R2T", NORMAL),
     "2T": freedom_matrix("2T", NORMAL),
 }
-turns = from_python(kernels.turns)
+turns = from_python(kernels.is_rotation)
 components_along = from_python(kernels.components_along)
 symmetric_part = from_python(kernels.symmetric_part)
 matrix_along = from_python(kernels.matrix_along)
-spread = from_python(kernels.spread)
+spread = from_python(kernels.motion_along)
 
 
 @pytest.mark.parametrize("pattern", FREEDOMS)

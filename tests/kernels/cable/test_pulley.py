@@ -25,7 +25,7 @@ solve_cable_state = from_python(states.solve_cable_state)
 free_span, free_rise = from_python(pulley.free_span), from_python(pulley.free_rise)
 from_tension = from_python(models.from_tension)
 cable_forces = from_python(forces.cable_forces)
-series = from_python(over_pulleys.series)
+series = from_python(over_pulleys.stiffness_in_series)
 
 GRAVITY = 9.81
 WEIGHT, EA = 8.0, 3e4  # N/m, N: heavy and soft, so that every term shows

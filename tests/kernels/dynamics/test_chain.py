@@ -15,15 +15,15 @@ ROOM = 9
 @entry
 def divide(place: Array, speed: Array, count: int, row: Array, born: int) -> None:
     if born > 0:
-        c.give_birth(place, speed, count, row)
+        c.insert_node(place, speed, count, row)
     else:
-        c.merge(place, speed, count, row)
+        c.merge_nodes(place, speed, count, row)
 
 
 @entry
 def look(place: Array, speed: Array, count: int, row: Array, pulls: Array, seen: Array) -> None:
-    c.enter(place, speed, count, row)
-    seen[0] = c.pull(place, speed, count, row, pulls)
+    c.fill_frame_node_velocity(place, speed, count, row)
+    seen[0] = c.fill_element_forces(place, speed, count, row, pulls)
     seen[1], seen[2] = c.potential(place, count, row)
     seen[3] = c.kinetic(speed, count, row)
     seen[4] = c.whole_force(place, speed, count, row, pulls)

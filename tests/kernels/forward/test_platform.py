@@ -11,7 +11,7 @@ from sagline.kernels.forward import platform
 from sagline.kernels.tables import BODY_COLUMNS, CENTER_X, POSE_COLUMNS
 from tests.kernels.compiled import from_python
 
-move, add_force = from_python(platform.move), from_python(platform.add_force)
+move, add_force = from_python(platform.moved_pose), from_python(platform.add_force)
 
 
 @pytest.mark.parametrize("size", [1e-12, 0.3, 3.0])

@@ -3,7 +3,7 @@ import pytest
 
 from sagline.core.arrays import locked
 from sagline.kernels.interference import shapes
-from sagline.kernels.interference.catenary_distance import BULGE, PIECE_COLUMNS, cut
+from sagline.kernels.interference.catenary_distance import BULGE, PIECE_COLUMNS, cut_piece
 from tests.interference.scenes import from_segment
 from tests.kernels.interference.hanging import (
     KINDS,
@@ -78,7 +78,7 @@ def test_pieces_lie_within_their_bulge_of_their_chord_and_not_much_nearer(kind: 
         cable = random_cable(rng, kind)
         begin, end = np.sort(rng.random(2)) if rng.random() < 0.8 else (0.0, 1.0)
         piece = np.empty((1, PIECE_COLUMNS))
-        cut(locked(cable.row), locked(np.array([[begin, end]])), piece)
+        cut_piece(locked(cable.row), locked(np.array([[begin, end]])), piece)
         points = cable.points(np.linspace(begin, end, 801))
         size = 1e-11 * (1.0 + np.abs(points).max())
         assert piece[0, :3] == pytest.approx(points[0], abs=size)
@@ -95,6 +95,6 @@ def test_a_parabola_s_pieces_touch_their_bulge() -> None:
     row[shapes.KIND], row[shapes.LAST], row[shapes.LEVEL] = shapes.PARABOLA, 1.0, 1.0
     row[shapes.SPAN], row[shapes.RISE], row[shapes.DROP] = 10.0, 0.0, 2.0
     piece = np.empty((1, PIECE_COLUMNS))
-    cut(locked(row), locked(np.array([[0.25, 0.75]])), piece)
+    cut_piece(locked(row), locked(np.array([[0.25, 0.75]])), piece)
     assert piece[0, BULGE] == pytest.approx(2.0 * 0.25**2)  # 4 drops (1/4 - 1/16), from 4 drops 3/16
     assert piece[0, 2] == pytest.approx(-2.0 * 0.1875)

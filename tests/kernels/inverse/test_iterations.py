@@ -11,7 +11,7 @@ from tests.kernels.tension.problems import nearness, room_of
 
 take_tensions = from_python(iterations.take_tensions)
 sag_force_change = from_python(iterations.sag_force_change)
-stay = from_python(iterations.stay)
+stay = from_python(iterations.fix_reference)
 reset_work_arrays = from_python(work_arrays.reset_work_arrays)
 room_for_cables = from_python(new_cables)
 room_for_balance = from_python(new_balance)

@@ -8,7 +8,7 @@ from sagline.core.arrays import Array
 from sagline.kernels.cable.sag_forces import TURN_ROWS, Curves
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT
-from sagline.kernels.tension.least_change import Change, Demand
+from sagline.kernels.tension.least_change import Demand, TensionChange
 from tests.kernels.cable.plain import plain_cables
 
 
@@ -25,6 +25,6 @@ def demand_of(matrix: Array, right: Array, soft: int) -> Demand:
     return Demand(matrix.copy(), np.zeros_like(matrix), right.copy(), soft, float(np.abs(right).max()))
 
 
-def change_from(tau: Array, n: int) -> Change:
+def change_from(tau: Array, n: int) -> TensionChange:
     """A search that begins at tensions (m,); the rest must be written before it is read."""
-    return Change(tau.copy(), np.full(len(tau), np.nan), np.full(n, np.nan), np.full(n, np.nan))
+    return TensionChange(tau.copy(), np.full(len(tau), np.nan), np.full(n, np.nan), np.full(n, np.nan))

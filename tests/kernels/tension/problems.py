@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.algebra.linear_program import Basis
-from sagline.kernels.algebra.nearest_point import Held
+from sagline.kernels.algebra.nearest_point import ActiveSet
 from sagline.kernels.tension.nearest import ReferencePoint
 from sagline.kernels.tension.polygon import SPARE_CORNERS
 from sagline.kernels.tension.work_arrays import WorkArrays
@@ -83,7 +83,7 @@ def random_problem(rng: np.random.Generator, m: int, r: int, feasible: bool = Tr
 
 def nearness(r: int, reference: Array | None = None, previous: Array | None = None) -> ReferencePoint:
     """Work arrays for the point of r redundant cables, near to a reference or to 0."""
-    held = Held(
+    held = ActiveSet(
         np.zeros(r + 2, dtype=np.int64),
         np.full((r + 1, r), np.nan),
         np.full((r + 1, r + 1), np.nan),

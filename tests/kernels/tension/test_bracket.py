@@ -13,7 +13,7 @@ from tests.kernels.cable.curves import pulls_of, random_curves
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.demands import change_from, demand_of, weightless
 
-decide = from_python(bracket.decide)
+decide = from_python(bracket.decide_feasibility)
 
 
 def test_weightless_cables_by_hand() -> None:

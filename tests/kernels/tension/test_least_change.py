@@ -8,14 +8,14 @@ from scipy.optimize import lsq_linear
 
 from sagline.core.arrays import Array
 from sagline.kernels.tension import least_change as kernels
-from sagline.kernels.tension.least_change import Change
+from sagline.kernels.tension.least_change import TensionChange
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.demands import change_from, demand_of, weightless
 
 least_change = from_python(kernels.least_change)
 
 
-def search(matrix: Array, right: Array, low: Array, high: Array, soft: int) -> tuple[float, Change]:
+def search(matrix: Array, right: Array, low: Array, high: Array, soft: int) -> tuple[float, TensionChange]:
     change = change_from(0.5 * (low + high), len(right))
     left = least_change(weightless(low, high), demand_of(matrix, right, soft), np.stack((low, high)), change, memory())
     return left, change

@@ -14,9 +14,9 @@ from tests.tiers import wide
 
 capacity_margin = from_python(margin.capacity_margin)
 next_choice = from_python(margin.next_choice)
-extend = from_python(margin.extend)
-complete = from_python(margin.complete)
-support = from_python(margin.reach)
+extend = from_python(margin.extend_frame)
+complete = from_python(margin.complete_frame)
+support = from_python(margin.zonotope_reach)
 
 
 @pytest.mark.parametrize(("count", "m"), [(1, 4), (2, 5), (5, 8), (3, 3), (0, 2)])

@@ -15,10 +15,10 @@ from tests.kernels.tension.problems import Problem, nearness, random_problem
 from tests.tiers import wide
 
 share_nearest = from_python(n.share_nearest)
-refer = from_python(n.refer)
+refer = from_python(n.set_reference)
 set_point = from_python(n.set_point)
 satisfies_limits = from_python(n.satisfies_limits)
-new_nearness = from_python(n.new_nearness)
+new_nearness = from_python(n.new_reference_point)
 
 
 def by_daqp(problem: Problem, reference: Array) -> Array:

@@ -16,7 +16,7 @@ from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import Problem, basis_of, nearness, random_problem
 from tests.tiers import wide
 
-status_of = from_python(p.status_of)
+status_of = from_python(p.program_status)
 share_lowest_sum = from_python(p.share_lowest_sum)
 share_lowest_maximum = from_python(p.share_lowest_maximum)
 

@@ -10,7 +10,7 @@ from sagline.kernels.workspaces import loads as kernels
 from sagline.kernels.workspaces.loads import Loads
 from tests.kernels.compiled import from_python
 
-reach, farthest = from_python(kernels.reach), from_python(kernels.farthest)
+reach, farthest = from_python(kernels.reach_of_loads), from_python(kernels.farthest)
 
 
 def loads_of(kind: str, rng: np.random.Generator) -> Loads:

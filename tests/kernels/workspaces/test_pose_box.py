@@ -13,10 +13,10 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.tables import BODY_COLUMNS, CABLE_COLUMNS
 from sagline.kernels.workspaces import pose_box
-from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place
+from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
 from tests.kernels.compiled import from_python
 
-set_place, geometry_of = from_python(pose_box.set_place), from_python(cable_geometry)
+set_place, geometry_of = from_python(pose_box.set_cables_in_box), from_python(cable_geometry)
 M = 8
 
 
@@ -37,10 +37,10 @@ def _given(rng: np.random.Generator) -> Given:
     return Given(cables, body, np.append(rng.uniform(-1, 1, 3), Rotation.random(random_state=rng).as_quat()))
 
 
-def _place(given: Given, box: Box) -> tuple[Place, bool]:
+def _place(given: Given, box: PoseRange) -> tuple[CablesInBox, bool]:
     rotation, geometry = np.empty((3, 3)), np.empty((g.GEOMETRY_ROWS, M))
     geometry_of(given.cables, given.body, given.pose, rotation, geometry)
-    place = Place(
+    place = CablesInBox(
         np.empty((6, 6)), np.empty((6, M)), np.empty((6, M)), np.empty((3, M)), np.zeros((MOTIONS, 6 * M)),
         *np.empty((5, M)),
     )  # fmt: skip
@@ -59,14 +59,14 @@ def test_bounds(turn: float) -> None:
     nearest = np.zeros(3)
     for _ in range(15):
         given = _given(rng)
-        box = Box(0.3 * rng.uniform(0.2, 1.0, 3), turn)
+        box = PoseRange(0.3 * rng.uniform(0.2, 1.0, 3), turn)
         place, possible = _place(given, box)
         if not possible:
             continue
         for _ in range(60):
             motion = np.append(rng.choice([-1.0, 1.0], 3) * box.half, rng.normal(size=3))
             motion[3:] *= turn / np.linalg.norm(motion[3:])
-            there, _ = _place(_moved(given, motion), Box(np.zeros(3), 0.0))
+            there, _ = _place(_moved(given, motion), PoseRange(np.zeros(3), 0.0))
             linear = place.full + (motion @ place.slopes).reshape(6, M)
             ways = np.linalg.norm(there.full[:3] - place.full[:3], axis=0)
             bent = np.linalg.norm(there.full[:3] - linear[:3], axis=0)
@@ -84,10 +84,11 @@ def test_slopes() -> None:
     step = 1e-6
     for _ in range(10):
         given = _given(rng)
-        place, _ = _place(given, Box(np.zeros(3), 1e-3))
+        place, _ = _place(given, PoseRange(np.zeros(3), 1e-3))
         for motion in range(MOTIONS):
             ends = [
-                _place(_moved(given, side * step * np.eye(6)[motion]), Box(np.zeros(3), 0.0))[0] for side in (1, -1)
+                _place(_moved(given, side * step * np.eye(6)[motion]), PoseRange(np.zeros(3), 0.0))[0]
+                for side in (1, -1)
             ]
             slope = (ends[0].full - ends[1].full) / (2 * step)
             np.testing.assert_allclose(place.slopes[motion].reshape(6, M), slope, atol=1e-7)

@@ -11,7 +11,7 @@ LESS, MORE = math.sqrt(2.0) - 1.0, math.sqrt(2.0) + 1.0  # tangents of pi/8 and 
 
 
 @formula
-def arctangent_ratio(y: float) -> float:
+def _arctangent_ratio(y: float) -> float:
     """The ratio atan(t)/t for y = t^2 <= tan(pi/8)^2; a Chebyshev fit, its error below 2e-18."""
     q = y * y
     r = q * q
@@ -35,5 +35,5 @@ def angle(sine: float, cosine: float) -> float:
     base = EIGHTH if middle else 0.0
     base = 2.0 * EIGHTH if steep else base
     t = above / beside
-    first = base + t * arctangent_ratio(t * t)
+    first = base + t * _arctangent_ratio(t * t)
     return math.pi - first if cosine < 0.0 else first

@@ -12,7 +12,7 @@ STILL = 1e-16  # of the largest eigenvalue: a step that rounding hides
 
 
 @formula
-def tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
+def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
     """Householder: fill diagonal (n,) and beside (n,), last entry 0, of a similar matrix; matrix is destroyed."""
     n = matrix.shape[0]
     product = diagonal  # which is filled at the end
@@ -49,7 +49,7 @@ def tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array)
 
 
 @formula
-def circle(diagonal: Array, beside: Array, sign: float) -> float:
+def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
     """Lower bound of the eigenvalues of sign times a tridiagonal matrix, by Gershgorin's circles."""
     low = math.inf
     before = 0.0
@@ -61,15 +61,15 @@ def circle(diagonal: Array, beside: Array, sign: float) -> float:
 
 
 @kernel
-def lowest_root(diagonal: Array, beside: Array, sign: float) -> float:
+def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
     """Smallest eigenvalue of sign times a tridiagonal matrix, by Laguerre's iteration from below.
 
     The pivots q of the shifted matrix have the characteristic polynomial as their product, and are positive below:
     the iteration never passes the root.
     """
     n = diagonal.shape[0]
-    root = circle(diagonal, beside, sign)
-    size = max(abs(root), abs(circle(diagonal, beside, -sign)))
+    root = _gershgorin_bound(diagonal, beside, sign)
+    size = max(abs(root), abs(_gershgorin_bound(diagonal, beside, -sign)))
     for _ in range(STEPS):
         first, second = 0.0, 0.0  # sums of 1/(l - root), 1/(l - root)^2 over the eigenvalues l
         carried, slope, bend = 0.0, 0.0, 0.0  # b^2/q; q'/q and q''/q by the shift
@@ -97,9 +97,9 @@ def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Arr
     The largest only where the smallest is within a share flat of it: else a bound above it, at most three times as
     large, which takes less time.
     """
-    tridiagonalize(matrix, diagonal, beside, work)
-    low = lowest_root(diagonal, beside, 1.0)
-    bound = -circle(diagonal, beside, -1.0)
+    _tridiagonalize(matrix, diagonal, beside, work)
+    low = _lowest_eigenvalue(diagonal, beside, 1.0)
+    bound = -_gershgorin_bound(diagonal, beside, -1.0)
     if abs(low) > flat * abs(bound):
         return low, bound
-    return low, -lowest_root(diagonal, beside, -1.0)
+    return low, -_lowest_eigenvalue(diagonal, beside, -1.0)

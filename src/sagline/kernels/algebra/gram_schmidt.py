@@ -9,7 +9,7 @@ from sagline.kernels.jit import formula
 
 
 @formula
-def take_out(frame: Array, count: int, triangle: Array) -> float:
+def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
     """Take the first rows of an orthonormal frame (.., d), count of them, out of the row that follows them.
 
     Fills column count of the triangle above its diagonal with the shares taken out; returns the square of what is left.
@@ -32,8 +32,8 @@ def take_out(frame: Array, count: int, triangle: Array) -> float:
 
 
 @formula
-def keep(frame: Array, count: int, triangle: Array, square: float) -> None:
-    """Make what `take_out` left in row count, of a given square, a row of the frame."""
+def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> None:
+    """Make what `orthogonalize_row` left in row count, of a given square, a row of the frame."""
     length = math.sqrt(square)
     triangle[count, count] = length
     for k in range(frame.shape[1]):

@@ -49,7 +49,7 @@ def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
 
 
 @formula
-def along(rows: Array, label: int, inverse: Array, j: int) -> float:
+def _growth_along_edge(rows: Array, label: int, inverse: Array, j: int) -> float:
     """Growth of normal . x of a bound along edge j of the present basis."""
     total = 0.0
     for i in range(inverse.shape[0]):
@@ -58,7 +58,7 @@ def along(rows: Array, label: int, inverse: Array, j: int) -> float:
 
 
 @formula
-def miss_of(rows: Array, bounds: Array, label: int, radius: float, cost: Array, point: Array) -> float:
+def _violation(rows: Array, bounds: Array, label: int, radius: float, cost: Array, point: Array) -> float:
     """By how much a point misses a side, or, from 2k on, a side of the box."""
     box = label - 2 * rows.shape[1]
     if box >= 0:
@@ -70,7 +70,7 @@ def miss_of(rows: Array, bounds: Array, label: int, radius: float, cost: Array, 
 
 
 @glue
-def start_in_the_box(rows: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
+def _start_at_box_corner(rows: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
     """Stand on the corner of the box at which the cost is least."""
     labels, weights, inverse = basis
     d = cost.size
@@ -85,17 +85,17 @@ def start_in_the_box(rows: Array, cost: Array, radius: float, basis: Basis, poin
 
 
 @glue
-def exchange(rows: Array, entering: int, leaving: int, miss: float, basis: Basis, point: Array) -> None:
+def _exchange_sides(rows: Array, entering: int, leaving: int, miss: float, basis: Basis, point: Array) -> None:
     """Let a side that the point misses enter the basis in place of another, and move to the new point."""
     labels, weights, inverse = basis
     d = point.size
-    pivot = along(rows, entering, inverse, leaving)
+    pivot = _growth_along_edge(rows, entering, inverse, leaving)
     ratio = weights[leaving] / pivot
     for i in range(d):
         point[i] += inverse[i, leaving] * (miss / pivot)
     for j in range(d):
         if j != leaving:
-            share = along(rows, entering, inverse, j)
+            share = _growth_along_edge(rows, entering, inverse, j)
             weights[j] = max(weights[j] - ratio * share, 0.0)
             for i in range(d):
                 inverse[i, j] -= share / pivot * inverse[i, leaving]
@@ -106,12 +106,12 @@ def exchange(rows: Array, entering: int, leaving: int, miss: float, basis: Basis
 
 
 @glue
-def stand_on(rows: Array, bounds: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
+def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
     """Move the point to where all sides of the basis meet: from anywhere, then twice by what they still miss."""
     d = point.size
     for _ in range(3):
         for j in range(d):
-            miss = miss_of(rows, bounds, basis.labels[j], radius, cost, point)
+            miss = _violation(rows, bounds, basis.labels[j], radius, cost, point)
             for i in range(d):
                 point[i] += basis.inverse[i, j] * miss
 
@@ -129,11 +129,11 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
     if slack == 0.0:
         slack = TOLERANCE * largest
     if labels[0] < 0:
-        start_in_the_box(rows, cost, radius, basis, point)
+        _start_at_box_corner(rows, cost, radius, basis, point)
     else:
         for k in range(d):
             point[k] = 0.0
-        stand_on(rows, bounds, cost, radius, basis, point)
+        _move_to_vertex(rows, bounds, cost, radius, basis, point)
     for pivots in range(PIVOTS):
         careful = pivots > CAREFUL
         far = 0.0
@@ -142,7 +142,7 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
         seen = max(slack, ROUNDING * d * far)  # far out, rounding hides more than the slack
         entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
-            stand_on(rows, bounds, cost, radius, basis, point)  # the rounding of many pivots is gone
+            _move_to_vertex(rows, bounds, cost, radius, basis, point)  # the rounding of many pivots is gone
             entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
             outcome = LP_SOLVED
@@ -152,12 +152,12 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
             return outcome
         largest_share = 0.0
         for j in range(d):
-            largest_share = max(largest_share, abs(along(rows, entering, inverse, j)))
+            largest_share = max(largest_share, abs(_growth_along_edge(rows, entering, inverse, j)))
         leaving = -1
         pivot = 0.0
         least = math.inf
         for j in range(d):
-            share = along(rows, entering, inverse, j)
+            share = _growth_along_edge(rows, entering, inverse, j)
             if share > PIVOT * largest_share:
                 ratio = weights[j] / share
                 tied = leaving >= 0 and ratio == least
@@ -165,9 +165,9 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
                     least, leaving, pivot = ratio, j, share
         if leaving < 0:
             for j in range(d):
-                weights[j] = max(-along(rows, entering, inverse, j), 0.0)
+                weights[j] = max(-_growth_along_edge(rows, entering, inverse, j), 0.0)
             labels[d] = entering
             weights[d] = 1.0
             return LP_EMPTY
-        exchange(rows, entering, leaving, miss_of(rows, bounds, entering, radius, cost, point), basis, point)
+        _exchange_sides(rows, entering, leaving, _violation(rows, bounds, entering, radius, cost, point), basis, point)
     return LP_GAVE_UP

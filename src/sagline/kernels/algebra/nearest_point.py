@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import inward, most_violated_bound, side_of
-from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.algebra.gram_schmidt import normalize_row, orthogonalize_row
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
@@ -27,7 +27,7 @@ DEPENDENT = 1e-10  # a side that leaves less than this of itself outside the spa
 PUSH, SHARE = 0, 1  # how hard each held side pushes; how the one that enters is made of them
 
 
-class Held(NamedTuple):
+class ActiveSet(NamedTuple):
     """The sides a nearest point stands on, and the memory to find them in.
 
     Attributes:
@@ -44,17 +44,17 @@ class Held(NamedTuple):
 
 
 @glue
-def new_held(memory: Memory, d: int) -> tuple[Held, Memory]:
+def new_active_set(memory: Memory, d: int) -> tuple[ActiveSet, Memory]:
     """Work arrays for d unknowns, and the memory that is left."""
     frame, at = block(memory.numbers, 0, d + 1, d)
     triangle, at = block(memory.numbers, at, d + 1, d + 1)
     pushes, at = block(memory.numbers, at, 2, d + 1)
     labels, after = counters(memory, 0, d + 2)
-    return Held(labels, frame, triangle, pushes), Memory(memory.numbers[at:], memory.counters[after:])
+    return ActiveSet(labels, frame, triangle, pushes), Memory(memory.numbers[at:], memory.counters[after:])
 
 
 @glue
-def stand_on_held(rows: Array, bounds: Array, held: Held, target: Array, point: Array) -> bool:
+def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: Array, point: Array) -> bool:
     """Fill the point of the held sides' common edge that is nearest to the target; False if that is not optimal."""
     labels, frame, triangle, pushes = held
     count, d = labels[0], point.size
@@ -68,10 +68,10 @@ def stand_on_held(rows: Array, bounds: Array, held: Held, target: Array, point: 
             frame[c, k] = inward(label) * rows[k, label // 2]
             size += frame[c, k] * frame[c, k]
             miss -= frame[c, k] * target[k]
-        square = take_out(frame, c, triangle)
+        square = orthogonalize_row(frame, c, triangle)
         if not square > DEPENDENT * size:
             return False
-        keep(frame, c, triangle, square)
+        normalize_row(frame, c, triangle, square)
         for b in range(c):
             miss -= triangle[b, c] * pushes[SHARE, b]
         pushes[SHARE, c] = miss / triangle[c, c]
@@ -88,7 +88,7 @@ def stand_on_held(rows: Array, bounds: Array, held: Held, target: Array, point: 
 
 
 @glue
-def drop(rows: Array, held: Held, leaving: int) -> None:
+def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
     """Let go of the held side at a place, and make the frame of the others anew."""
     labels, frame, triangle, pushes = held
     count = labels[0] - 1
@@ -99,18 +99,18 @@ def drop(rows: Array, held: Held, leaving: int) -> None:
     for c in range(leaving, count):
         for k in range(rows.shape[0]):
             frame[c, k] = inward(labels[1 + c]) * rows[k, labels[1 + c] // 2]
-        keep(frame, c, triangle, take_out(frame, c, triangle))
+        normalize_row(frame, c, triangle, orthogonalize_row(frame, c, triangle))
 
 
 @kernel
-def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: Held, point: Array) -> bool:
+def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
     """Fill the point (d,) nearest to the target (d,) that keeps all bounds up to a slack; False where there is none.
 
     held: what a similar problem left, or labels[0] = 0; filled with what this point stands on.
     """
     labels, frame, triangle, pushes = held
     d = target.size
-    if labels[0] > 0 and not stand_on_held(rows, bounds, held, target, point):
+    if labels[0] > 0 and not _point_on_active_sides(rows, bounds, held, target, point):
         labels[0] = 0
     if labels[0] == 0:
         for k in range(d):
@@ -126,7 +126,7 @@ def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held:
             for k in range(d):
                 frame[count, k] = inward(entering) * rows[k, entering // 2]
                 size += frame[count, k] * frame[count, k]
-            square = take_out(frame, count, triangle)
+            square = orthogonalize_row(frame, count, triangle)
             first = math.inf
             leaving = -1
             for c in range(count - 1, -1, -1):
@@ -157,9 +157,9 @@ def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held:
             if full <= first:
                 labels[1 + count] = entering
                 pushes[PUSH, count] = push
-                keep(frame, count, triangle, square)
+                normalize_row(frame, count, triangle, square)
                 labels[0] = count + 1
                 break
-            drop(rows, held, leaving)
+            _drop_side(rows, held, leaving)
     labels[0] = 0
     return False

@@ -12,16 +12,16 @@ from sagline.kernels.jit import formula, glue, kernel
 
 
 @glue
-def translations_of(freedom: Array) -> int:
+def translation_count(freedom: Array) -> int:
     """Number of free translations; they come before the free rotations."""
     count = 0
     for k in range(freedom.shape[0]):
-        count += 0 if turns(freedom, k) else 1
+        count += 0 if is_rotation(freedom, k) else 1
     return count
 
 
 @formula
-def turns(freedom: Array, k: int) -> bool:
+def is_rotation(freedom: Array, k: int) -> bool:
     """True if free motion k of the platform is a rotation; the translations come first."""
     return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
 
@@ -67,7 +67,7 @@ def components_along(free: Array, full: Array, part: Array) -> float:
 
 
 @formula
-def spread(free: Array, part: Array, motion: Array) -> None:
+def motion_along(free: Array, part: Array, motion: Array) -> None:
     """Fill the motion (6,) that components (n,) along the free motions stand for."""
     for a in range(6):
         motion[a] = 0.0

@@ -53,7 +53,7 @@ class Platform(NamedTuple):
     wrench: Array
 
 
-class Limits(NamedTuple):
+class TensionLimits(NamedTuple):
     """Limits of the tensions.
 
     Attributes:
@@ -129,7 +129,13 @@ def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
 
 @glue
 def set_pose(
-    model: Model, limits: Limits, variable: int, weight: Array, platform: Platform, cables: Cables, balance: Balance
+    model: Model,
+    limits: TensionLimits,
+    variable: int,
+    weight: Array,
+    platform: Platform,
+    cables: Cables,
+    balance: Balance,
 ) -> int:
     """Fill cables, with the pulls of first order, and balance of one pose; returns POSE_SOLVED or why there is none.
 
@@ -140,12 +146,12 @@ def set_pose(
         return POSE_NO_CHORD
     fill_structure_matrix(balance.geometry, balance.full)
     rows_along_freedom(platform.freedom, balance.full, balance.matrix)
-    choose_variable(variable, weight, cables, balance)
+    _choose_variable(variable, weight, cables, balance)
     return POSE_SOLVED if factor_balance(balance) else POSE_SINGULAR
 
 
 @glue
-def place_cables(model: Model, limits: Limits, robot: Array, geometry: Array, cables: Cables) -> bool:
+def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Array, cables: Cables) -> bool:
     """Fill chords, material, first pulls and limits of the chord tensions; False where a cable has no chord."""
     for i in range(robot.shape[0]):
         chord, sine = geometry[g.CHORD, i], geometry[g.SINE, i]
@@ -178,7 +184,7 @@ def place_cables(model: Model, limits: Limits, robot: Array, geometry: Array, ca
 
 
 @glue
-def choose_variable(variable: int, weight: Array, cables: Cables, balance: Balance) -> None:
+def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Balance) -> None:
     """Fill scale, offset and limits of the variable in which the load is shared.
 
     The frame-end tension starts as tau - wD/2 sin phi, its first order.
@@ -222,7 +228,7 @@ def factor_balance(balance: Balance) -> bool:
 
 
 @glue
-def need(platform: Platform, cables: Cables, balance: Balance) -> None:
+def fill_needed_wrench(platform: Platform, cables: Cables, balance: Balance) -> None:
     """Fill the needed wrench with the present pulls."""
     needed_wrench(balance.geometry, platform.body, platform.wrench, cables.pull, balance.needed)
     along_freedom(platform.freedom, balance.needed, balance.right)

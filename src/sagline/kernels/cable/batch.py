@@ -23,7 +23,7 @@ BUFFERS = 11
 
 
 @kernel
-def lift(source: Array, start: int, stop: int, target: Array) -> None:
+def _copy_chunk(source: Array, start: int, stop: int, target: Array) -> None:
     """Copy a chunk of an operand, or repeat its one value."""
     if source.shape[0] == 1:
         for i in range(stop - start):
@@ -61,11 +61,11 @@ def batch_from_tension(
     for start in range(0, count, CHUNK):
         stop = min(start + CHUNK, count)
         size = stop - start
-        lift(span, start, stop, x)
-        lift(rise, start, stop, z)
-        lift(density, start, stop, rho)
-        lift(stiffness, start, stop, ea)
-        lift(tension, start, stop, tau)
+        _copy_chunk(span, start, stop, x)
+        _copy_chunk(rise, start, stop, z)
+        _copy_chunk(density, start, stop, rho)
+        _copy_chunk(stiffness, start, stop, ea)
+        _copy_chunk(tension, start, stop, tau)
         for i in range(size):
             chord[i] = math.sqrt(x[i] * x[i] + z[i] * z[i])
         for i in range(size):

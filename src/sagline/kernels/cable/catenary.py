@@ -70,7 +70,7 @@ def is_ordinary(half_weight: float, strain: float) -> bool:
 
 
 @formula
-def ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: float, strain: float) -> float:
+def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: float, strain: float) -> float:
     """One Newton step on P3 in its root form; square = X^2."""
     taut = 1.0 - strain * ratio
     y = square * taut * taut
@@ -96,14 +96,14 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
     start = sinhc_polynomial(square)
     ratio = math.sqrt(start * start * cosine2 + sine2)  # the inextensible answer
     ratio = ratio / (1.0 + strain * ratio)
-    ratio = ordinary_newton_step(ratio, square, cosine2, sine2, strain)
-    return ordinary_newton_step(ratio, square, cosine2, sine2, strain)
+    ratio = _ordinary_newton_step(ratio, square, cosine2, sine2, strain)
+    return _ordinary_newton_step(ratio, square, cosine2, sine2, strain)
 
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
     """One Newton step more, from a ratio close by: that of a tension nearby, or of two steps."""
-    return ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
+    return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
 @kernel
@@ -170,7 +170,7 @@ def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, rat
 
 
 @formula
-def product_error(a: float, product: float) -> float:
+def _product_error(a: float, product: float) -> float:
     """a*a - product exactly, where product is a*a rounded (Dekker)."""
     split = 134217729.0 * a  # 2^27 + 1
     high = split - (split - a)
@@ -190,12 +190,12 @@ def relative_excess(span: float, rise: float, length: float) -> float:
     difference = d2 - l2
     big = difference - d2
     tail += (d2 - (difference - big)) - (l2 + big)
-    tail += product_error(span, x2) + product_error(rise, z2) - product_error(length, l2)
+    tail += _product_error(span, x2) + _product_error(rise, z2) - _product_error(length, l2)
     return (difference + tail) / l2
 
 
 @formula
-def parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> float:
+def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> float:
     """First guess of h: root of xi^2 h^3/3 + excess h = 2 kappa (1 + excess), or the deep-sag asymptote."""
     scale = 3.0 / (xi * xi)
     p = scale * excess
@@ -213,13 +213,13 @@ def parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> floa
 
 
 @formula
-def catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> tuple[float, int]:
+def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> tuple[float, int]:
     """P2: the h of a cable with span/L = xi > 0, rise/L = zeta, kappa = wL/(2EA) and (D^2 - L^2)/L^2, and a status."""
     xi2 = xi * xi
     zeta2 = zeta * zeta
     low = 0.0
     high = math.inf
-    h = parameter_start(xi, zeta, kappa, excess)
+    h = _parameter_start(xi, zeta, kappa, excess)
     for _ in range(STEPS):
         s = h * sinhc(h)
         c = cosh(h)
@@ -254,7 +254,7 @@ def catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> t
 
 
 @formula
-def vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
+def _vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
     """P2 on a vertical chord, in closed form: vertical force, chord tension and a status."""
     height = abs(rise)
     kappa = 0.5 * weight * length / stiffness
@@ -273,12 +273,12 @@ def vertical_from_length(rise: float, length: float, weight: float, stiffness: f
 def catenary_from_length(span: float, rise: float, length: float, weight: float, stiffness: float) -> tuple[Force, int]:
     """P2: force on the platform end and a status; weight > 0."""
     if span == 0.0:
-        vertical, tension, status = vertical_from_length(rise, length, weight, stiffness)
+        vertical, tension, status = _vertical_from_length(rise, length, weight, stiffness)
         return Force(0.0, vertical, tension), status
     kappa = 0.5 * weight * length / stiffness
     excess = relative_excess(span, rise, length)
     inverse = 1.0 / length
-    h, status = catenary_parameter(span * inverse, rise * inverse, kappa, excess)
+    h, status = _catenary_parameter(span * inverse, rise * inverse, kappa, excess)
     half = 0.5 * weight / (h + kappa)
     tangent = h * sinhc(h) / cosh(h) if h < 20.0 else 1.0  # tanh h
     vertical = 0.5 * weight * (length + rise / (tangent + kappa))

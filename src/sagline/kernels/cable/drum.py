@@ -23,20 +23,20 @@ SETTLED = 1e-8  # turns, or of all turns: the step after would be its square
 
 
 @formula
-def detour(distance: float, offset: float) -> float:
+def _slant_length(distance: float, offset: float) -> float:
     """Extra length of the run to the pulley because it is slanted; zero at infinite distance [m]."""
     return offset * offset / (math.sqrt(distance * distance + offset * offset) + distance)
 
 
 @formula
-def turn_length(drum: Array, layer: int) -> float:
+def _turn_length(drum: Array, layer: int) -> float:
     """Length of one turn of a layer, a helix [m]."""
     circle = 2.0 * math.pi * (drum[PITCH_RADIUS] + layer * drum[LAYER_RISE])
     return math.sqrt(circle * circle + drum[GROOVE_PITCH] * drum[GROOVE_PITCH])
 
 
 @formula
-def exit_place(drum: Array, layer: int, turns: float) -> tuple[float, float]:
+def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]:
     """Place where the cable leaves the drum in a layer, from the pulley's middle, and its advance per turn."""
     if layer % 2 == 0:
         return drum[OFFSET] + drum[GROOVE_PITCH] * turns, drum[GROOVE_PITCH]
@@ -44,12 +44,12 @@ def exit_place(drum: Array, layer: int, turns: float) -> tuple[float, float]:
 
 
 @formula
-def wound(drum: Array, layer: int, turns: float) -> float:
+def _wound_length(drum: Array, layer: int, turns: float) -> float:
     """By how much the first turns of a layer shorten the length off the drum [m]; convex in the turns, and rising."""
-    first, _ = exit_place(drum, layer, 0.0)
-    place, _ = exit_place(drum, layer, turns)
+    first, _ = _exit_position(drum, layer, 0.0)
+    place, _ = _exit_position(drum, layer, turns)
     distance = drum[DISTANCE]
-    return turn_length(drum, layer) * turns + (detour(distance, place) - detour(distance, first))
+    return _turn_length(drum, layer) * turns + (_slant_length(distance, place) - _slant_length(distance, first))
 
 
 @entry
@@ -72,9 +72,9 @@ def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Arra
             layer = 0
             while layer < last and length[p, i] < starts[i, layer + 1]:
                 layer += 1
-            turn, distance = turn_length(drum, layer), drum[DISTANCE]
-            first, advance = exit_place(drum, layer, 0.0)
-            missing = starts[i, layer] - length[p, i] + detour(distance, first)
+            turn, distance = _turn_length(drum, layer), drum[DISTANCE]
+            first, advance = _exit_position(drum, layer, 0.0)
+            missing = starts[i, layer] - length[p, i] + _slant_length(distance, first)
             turns = (starts[i, layer] - length[p, i]) / turn
             travel = turn
             for _ in range(STEPS):
@@ -100,7 +100,7 @@ def lengths_of_turns(drums: Array, starts: Array, turns: Array, length_out: Arra
             if turns[p, i] > drum[LAYER_TURNS]:
                 layer = int(min(turns[p, i] / drum[LAYER_TURNS], drum[LAYERS] - 1.0))
             below = layer * drum[LAYER_TURNS] if layer > 0 else 0.0
-            length_out[p, i] = starts[i, layer] - wound(drum, layer, turns[p, i] - below)
+            length_out[p, i] = starts[i, layer] - _wound_length(drum, layer, turns[p, i] - below)
 
 
 @entry

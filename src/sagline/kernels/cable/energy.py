@@ -44,7 +44,7 @@ def elastic_energy(chord: float, length: float, tension: float, stiffness: float
 
 
 @formula
-def cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
+def _cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
     """Energy [J] of a cable of the exact or the weightless model; NaN for the others."""
     weight = material.density * model.gravity
     if model.code == CATENARY and weight > 0.0:
@@ -72,7 +72,7 @@ def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | No
     for i in range(cables.shape[0]):
         span, rise, length = rows[x, i], rows[z, i], rows[whole, i]
         force = force_of(rows, i)
-        energy += cable_energy(model, span, rise, material_at(cables, i), length, force)
+        energy += _cable_energy(model, span, rise, material_at(cables, i), length, force)
         size += abs(force.horizontal * span) + abs(force.vertical * rise)
         if behind is not None:
             more = energy_over(model, cables, rows, i)

@@ -16,7 +16,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
-from sagline.kernels.cable.over_pulleys import ask, begin_passes, take_answers
+from sagline.kernels.cable.over_pulleys import fill_equivalent_cables, start_passes, update_from_equivalent_cables
 from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.codes import CABLE_NOT_CONVERGED, CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import formula, glue
@@ -28,7 +28,7 @@ MISSED = 1e-13  # of a cable's length: a platform end missed by less is met
 
 
 @formula
-def halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float) -> float:
+def _halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float) -> float:
     """One Halley step on P2 (docs/model.md, section 2) for h <= 2, free of branches."""
     y = h * h
     more = h * y * sinh_excess_polynomial(y)  # sinh h - h
@@ -51,13 +51,13 @@ def halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float)
 
 
 @formula
-def square_share(part: float, length: float) -> float:
+def _square_share(part: float, length: float) -> float:
     """(part/length)^2."""
     ratio = part / length
     return ratio * ratio
 
 
-class Asked(NamedTuple):
+class _EquivalentCables(NamedTuple):
     """The cables that are solved, each of m values: span, rise and unstrained length [m], EA [N]."""
 
     span: Array
@@ -67,7 +67,7 @@ class Asked(NamedTuple):
 
 
 @glue
-def step_twice(gravity: float, cables: Array, asked: Asked, rows: Array) -> None:
+def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
     """Two Halley steps for every cable from the remembered parameter; one result a loop, so that each vectorizes."""
     m = cables.shape[0]
     for i in range(m):
@@ -75,17 +75,17 @@ def step_twice(gravity: float, cables: Array, asked: Asked, rows: Array) -> None
     for i in range(m):
         rows[t.EXCESS, i] = relative_excess(asked.span[i], asked.rise[i], asked.length[i])
     for i in range(m):
-        xi2 = square_share(asked.span[i], asked.length[i])
-        zeta2 = square_share(asked.rise[i], asked.length[i])
-        rows[t.FIRST, i] = halley_step(rows[t.PARAMETER, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
+        xi2 = _square_share(asked.span[i], asked.length[i])
+        zeta2 = _square_share(asked.rise[i], asked.length[i])
+        rows[t.FIRST, i] = _halley_step(rows[t.PARAMETER, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
     for i in range(m):
-        xi2 = square_share(asked.span[i], asked.length[i])
-        zeta2 = square_share(asked.rise[i], asked.length[i])
-        rows[t.SECOND, i] = halley_step(rows[t.FIRST, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
+        xi2 = _square_share(asked.span[i], asked.length[i])
+        zeta2 = _square_share(asked.rise[i], asked.length[i])
+        rows[t.SECOND, i] = _halley_step(rows[t.FIRST, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
 
 
 @formula
-def has_arrived(rows: Array, i: int) -> bool:
+def _has_converged(rows: Array, i: int) -> bool:
     """True if the second step is exact; false for NaN."""
     first, second, kappa = rows[t.FIRST, i], rows[t.SECOND, i], rows[t.KAPPA, i]
     near = abs(first - rows[t.PARAMETER, i]) <= CLOSE * (first + kappa)
@@ -105,16 +105,16 @@ def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) 
         behind: That of the model, by itself, so that what it rules out is not compiled.
     """
     if behind is None:
-        bare = Asked(rows[g.SPAN], rows[g.RISE], rows[t.LENGTH], cables[:, tables.STIFFNESS])
-        solve_asked(model, cables, bare, rows)
+        bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[t.LENGTH], cables[:, tables.STIFFNESS])
+        _solve_equivalent_cables(model, cables, bare, rows)
     else:
-        asked = Asked(rows[t.ASKED_SPAN], rows[t.ASKED_RISE], rows[t.ASKED_LENGTH], rows[t.SOFT])
-        begin_passes(cables, rows)
+        asked = _EquivalentCables(rows[t.ASKED_SPAN], rows[t.ASKED_RISE], rows[t.ASKED_LENGTH], rows[t.SOFT])
+        start_passes(cables, rows)
         missed = math.inf
         for _ in range(PASSES):
-            ask(model, cables, rows)
-            solve_asked(model, cables, asked, rows)
-            missed = take_answers(model, cables, rows)
+            fill_equivalent_cables(model, cables, rows)
+            _solve_equivalent_cables(model, cables, asked, rows)
+            missed = update_from_equivalent_cables(model, cables, rows)
             if missed <= MISSED:
                 break
         if not missed <= MISSED:
@@ -123,17 +123,17 @@ def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) 
 
 
 @glue
-def solve_asked(model: Model, cables: Array, asked: Asked, rows: Array) -> None:
+def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
     """Fill T_x, T_z, tau and status of the cables that are asked for."""
     exact = model.code == CATENARY
     if exact:
-        step_twice(model.gravity, cables, asked, rows)
+        _two_halley_steps(model.gravity, cables, asked, rows)
     for i in range(cables.shape[0]):
         span, rise, length = asked.span[i], asked.rise[i], asked.length[i]
         chord = math.sqrt(span * span + rise * rise)
         density = cables[i, tables.DENSITY]
         weight = density * model.gravity
-        if exact and has_arrived(rows, i):
+        if exact and _has_converged(rows, i):
             h, kappa = rows[t.SECOND, i], rows[t.KAPPA, i]
             half = 0.5 * weight / (h + kappa)
             y = h * h

@@ -16,7 +16,7 @@ GEOMETRY_ROWS = 10
 
 
 @formula
-def rotation_matrix(pose: Array, rotation: Array) -> None:
+def _rotation_matrix(pose: Array, rotation: Array) -> None:
     """Fill the 3 x 3 rotation platform -> world of a pose row."""
     x, y, z, w = pose[3], pose[4], pose[5], pose[6]
     rotation[0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -54,7 +54,7 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
 
     The chord of a cable over a pulley is the tangent from its platform end; NaN where there is none.
     """
-    rotation_matrix(pose, rotation)
+    _rotation_matrix(pose, rotation)
     for i in range(cables.shape[0]):
         bx = cables[i, tables.PLATFORM_X]
         by = cables[i, tables.PLATFORM_Y]

@@ -16,7 +16,7 @@ from sagline.kernels.codes import CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import entry, kernel
 
 
-class Held(NamedTuple):
+class _CableAtTension(NamedTuple):
     """A cable that is held at a pose: all of it off the drum [m], what it pulls with [N], and at its frame end [N]."""
 
     length: float
@@ -25,7 +25,7 @@ class Held(NamedTuple):
 
 
 @kernel
-def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> Held:
+def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
     """A cable at a chord tension, with what is on its pulley and behind it; pull: T_z - tau sin phi."""
     weightless = model.code == STRAIGHT or model.code == ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
@@ -38,7 +38,7 @@ def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, t
         there = tension
         sine, cosine = horizontal / there, pulley.entry * vertical / there
     rest = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))
-    return Held(length + (rest.wrapped + rest.dead), pull, tension)
+    return _CableAtTension(length + (rest.wrapped + rest.dead), pull, tension)
 
 
 @entry

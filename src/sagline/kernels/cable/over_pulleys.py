@@ -51,13 +51,13 @@ def chord_at(rows: Array, i: int) -> Chord:
 
 
 @formula
-def wrap_at(rows: Array, i: int) -> Wrap:
-    """Wrap of one cable of a pose on its pulley, after `take_answers`."""
+def _wrap_at(rows: Array, i: int) -> Wrap:
+    """Wrap of one cable of a pose on its pulley, after `update_from_equivalent_cables`."""
     return Wrap(rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], rows[t.WRAP, i])
 
 
 @glue
-def begin_passes(cables: Array, rows: Array) -> None:
+def start_passes(cables: Array, rows: Array) -> None:
     """Fill what is behind the chords, and forget what was missed where the pose before left no parameter."""
     for i in range(rows.shape[1]):
         rows[t.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
@@ -67,7 +67,7 @@ def begin_passes(cables: Array, rows: Array) -> None:
 
 
 @glue
-def ask(model: Model, cables: Array, rows: Array) -> None:
+def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
     """Fill the cables that are solved in the stead of those over pulleys."""
     m = rows.shape[1]
     for i in range(m):
@@ -92,21 +92,21 @@ def ask(model: Model, cables: Array, rows: Array) -> None:
 
 
 @glue
-def take_answers(model: Model, cables: Array, rows: Array) -> float:
+def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
     """Fill the forces and free spans from those of the cables asked for; returns the largest miss, of the length.
 
     A miss is added to what is asked for next time: of the exact cable by how much its platform end is missed, of the
     shallow ones by how much their length.
     """
     if model.code == CATENARY:
-        leave_by_force(model, cables, rows)
-        end_exactly(model, cables, rows)
-        return missed_ends(rows)
-    return missed_lengths(model, cables, rows)
+        _exit_points_from_forces(model, cables, rows)
+        _fill_free_span_ends(model, cables, rows)
+        return _end_errors(rows)
+    return _length_errors(model, cables, rows)
 
 
 @glue
-def leave_by_force(model: Model, cables: Array, rows: Array) -> None:
+def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
     """Fill where exact cables leave their pulleys, from T_x and T_zA, and their free spans and lengths."""
     m = rows.shape[1]
     for i in range(m):  # T_zA
@@ -122,7 +122,7 @@ def leave_by_force(model: Model, cables: Array, rows: Array) -> None:
         rows[t.WRAP, i] = angle(rows[t.WRAP_SINE, i] + TINY, rows[t.WRAP_COSINE, i])
     for i in range(m):
         material = material_at(cables, i)
-        wrapped, dead = behind_cable(model, material, pulley_at(cables, i), rows[t.LEAVING, i], wrap_at(rows, i))
+        wrapped, dead = behind_cable(model, material, pulley_at(cables, i), rows[t.LEAVING, i], _wrap_at(rows, i))
         rows[t.FREE_LENGTH, i] = rows[t.LENGTH, i] - (wrapped + dead)
     for i in range(m):  # T_z
         rows[t.VERTICAL, i] += cables[i, tables.DENSITY] * model.gravity * rows[t.FREE_LENGTH, i]
@@ -136,7 +136,7 @@ def leave_by_force(model: Model, cables: Array, rows: Array) -> None:
 
 
 @glue
-def end_exactly(model: Model, cables: Array, rows: Array) -> None:
+def _fill_free_span_ends(model: Model, cables: Array, rows: Array) -> None:
     """Fill where the free spans of exact cables end; `catenary_end`, its ordinary cases in loops that vectorize."""
     m = rows.shape[1]
     for i in range(m):
@@ -160,25 +160,25 @@ def end_exactly(model: Model, cables: Array, rows: Array) -> None:
 
 
 @formula
-def larger(one: float, other: float) -> float:
+def _larger(one: float, other: float) -> float:
     """The larger of two, NaN if either is."""
     return other if not other <= one and not math.isnan(one) else one
 
 
 @glue
-def missed_ends(rows: Array) -> float:
+def _end_errors(rows: Array) -> float:
     """Add by how much the platform ends are missed to what is asked for; returns the most, of a cable's length."""
     largest = 0.0
     for i in range(rows.shape[1]):
         x, z = rows[t.FREE_SPAN, i] - rows[t.END_X, i], rows[t.FREE_RISE, i] - rows[t.END_Z, i]
         rows[t.OFF_X, i] += x
         rows[t.OFF_Z, i] += z
-        largest = larger(largest, (abs(x) + abs(z)) / rows[t.LENGTH, i])
+        largest = _larger(largest, (abs(x) + abs(z)) / rows[t.LENGTH, i])
     return largest
 
 
 @glue
-def missed_lengths(model: Model, cables: Array, rows: Array) -> float:
+def _length_errors(model: Model, cables: Array, rows: Array) -> float:
     """The same of cables that leave along their chord: shallow ones, and weightless ones, which miss nothing."""
     largest = 0.0
     for i in range(rows.shape[1]):
@@ -191,36 +191,41 @@ def missed_lengths(model: Model, cables: Array, rows: Array) -> float:
         rows[t.WRAP, i] = angle(sine, cosine)
         rows[t.FREE_SPAN, i] = rows[g.SPAN, i]
         rows[t.FREE_RISE, i] = rows[g.RISE, i]
-        wrapped, dead = behind_cable(model, material, pulley, tension, wrap_at(rows, i))
+        wrapped, dead = behind_cable(model, material, pulley, tension, _wrap_at(rows, i))
         free = rows[t.LENGTH, i] - (wrapped + dead)
         rows[t.FREE_LENGTH, i] = free
         if model.code != ELASTIC and tension > 0.0:
             miss = free - from_tension(model, chord, material, tension)[0]
             rows[t.OFF_LENGTH, i] += miss
-            largest = larger(largest, abs(miss) / rows[t.LENGTH, i])
+            largest = _larger(largest, abs(miss) / rows[t.LENGTH, i])
     return largest
 
 
 @formula
-def weight_of(model: Model, material: Material) -> float:
+def _weight_per_length(model: Model, material: Material) -> float:
     """Weight per length that the part behind P has [N/m]: the exact cable's alone."""
     return material.density * model.gravity if model.code == CATENARY else 0.0
 
 
 @formula
 def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
-    """Unstrained cable behind P, after `take_answers`."""
-    return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[t.LEAVING, i], wrap_at(rows, i))
+    """Unstrained cable behind P, after `update_from_equivalent_cables`."""
+    return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[t.LEAVING, i], _wrap_at(rows, i))
 
 
 @formula
-def fed(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
+def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
     """Motion of the platform end at a fixed force per meter of cable, x and z, and per newton of H.
 
     The last is along the first, of which it is the share by which the part behind P gives way.
     """
-    material, pulley, wrap, tension = material_at(cables, i), pulley_at(cables, i), wrap_at(rows, i), rows[t.LEAVING, i]
-    weight = weight_of(model, material)
+    material, pulley, wrap, tension = (
+        material_at(cables, i),
+        pulley_at(cables, i),
+        _wrap_at(rows, i),
+        rows[t.LEAVING, i],
+    )
+    weight = _weight_per_length(model, material)
     strained = 1.0 + tension / material.stiffness
     soft = softness(pulley, weight, material.stiffness, tension, wrap)
     along = pulley.entry * wrap.cosine
@@ -229,11 +234,11 @@ def fed(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float,
 
 
 @formula
-def series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
+def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
     """In-plane stiffness of a cable, whose free span's is given, with the part behind P that gives way along it."""
     if not rows[t.LEAVING, i] > 0.0:
         return plane
-    x, z, gives = fed(model, cables, rows, i)
+    x, z, gives = end_motion_per_length(model, cables, rows, i)
     left_x, left_z = plane.xx * x + plane.xz * z, plane.zx * x + plane.zz * z
     right_x, right_z = plane.xx * x + plane.zx * z, plane.xz * x + plane.zz * z
     share = gives / (1.0 + gives * (x * left_x + z * left_z))
@@ -258,5 +263,5 @@ def across_pulley(cables: Array, rows: Array, i: int) -> float:
 def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
     """Energy [J] that the part behind P adds to that of the free span."""
     material, tension = material_at(cables, i), rows[t.LEAVING, i]
-    weight, free = weight_of(model, material), rows[t.FREE_LENGTH, i]
-    return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, wrap_at(rows, i), free)
+    weight, free = _weight_per_length(model, material), rows[t.FREE_LENGTH, i]
+    return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, _wrap_at(rows, i), free)

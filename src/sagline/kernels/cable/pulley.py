@@ -79,7 +79,7 @@ def pulley_at(cables: Array, i: int) -> Pulley:
 
 
 @kernel
-def robot_has_machine(cables: Array) -> bool:
+def _robot_has_machine(cables: Array) -> bool:
     """True if a cable of a robot's cable_table (m, CABLE_COLUMNS) has a pulley or dead length."""
     total = 0.0
     for i in range(cables.shape[0]):
@@ -91,7 +91,7 @@ def robot_has_machine(cables: Array) -> bool:
 def robots_have_machine(robots: Array) -> bool:
     """True if a cable of several robots has one, (1 or N, m, CABLE_COLUMNS)."""
     for p in range(robots.shape[0]):
-        if robot_has_machine(robots[p]):
+        if _robot_has_machine(robots[p]):
             return True
     return False
 
@@ -124,7 +124,9 @@ def from_axis(pulley: Pulley, chord: Chord) -> float:
 
 
 @formula
-def strains(pulley: Pulley, weight: float, stiffness: float, tension: float, sine: float) -> tuple[float, float, float]:
+def _strains(
+    pulley: Pulley, weight: float, stiffness: float, tension: float, sine: float
+) -> tuple[float, float, float]:
     """E = 1 + e at P, where the cable enters the pulley, and where it leaves the drum; sine of the wrap angle."""
     leaving = 1.0 + tension / stiffness
     entering = math.sqrt(leaving * leaving - 2.0 * pulley.entry * weight * pulley.radius / stiffness * sine)
@@ -134,7 +136,7 @@ def strains(pulley: Pulley, weight: float, stiffness: float, tension: float, sin
 @formula
 def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
     """Unstrained length on the pulley and behind it, from the tension at P; weight per length, 0 for weightless."""
-    strained, first, last = strains(pulley, weight, stiffness, tension, wrap.sine)
+    strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     beta = weight * pulley.radius / stiffness
     falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
     wrapped = pulley.radius * (wrap.angle - falls / (strained * strained)) / strained
@@ -153,7 +155,7 @@ def behind_cable(model: Model, material: Material, pulley: Pulley, tension: floa
 @formula
 def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
     """S: how much unstrained length the part behind P gives for a newton more of H, E_A^2 S that at P [m/N]."""
-    strained, first, last = strains(pulley, weight, stiffness, tension, wrap.sine)
+    strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     on_pulley = pulley.radius * wrap.angle / (strained * strained * strained)
     return (on_pulley + 2.0 * pulley.dead / ((first + last) * first * last)) / stiffness
 
@@ -162,7 +164,7 @@ def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wr
 def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap, free: float) -> float:
     """Energy [J] of the part behind P, and of lifting the free one (of unstrained length `free`) to P; z from A."""
     radius, entry, dead, _rise = pulley
-    strained, entering, drawn = strains(pulley, weight, stiffness, tension, wrap.sine)
+    strained, entering, drawn = _strains(pulley, weight, stiffness, tension, wrap.sine)
     first, last = entering - 1.0, drawn - 1.0
     height = entry * radius * wrap.sine
     whole = tension + 0.5 * tension * tension / stiffness - weight * height  # H
@@ -179,7 +181,7 @@ def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: floa
 
 
 @formula
-def length_behind_by(
+def _length_behind_by(
     pulley: Pulley, weight: float, stiffness: float, force: Force, free: float, change: Change, grown: float
 ) -> tuple[float, float]:
     """Derivatives of wrap angle and unstrained length behind P at a fixed force on the platform end.
@@ -201,7 +203,7 @@ def length_behind_by(
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
     sine, cosine = force.horizontal / tension, entry * vertical_a / tension
     wrapped = angle(sine, cosine)
-    strained, first, last = strains(pulley, weight, stiffness, tension, sine)
+    strained, first, last = _strains(pulley, weight, stiffness, tension, sine)
     cube = strained * strained * strained
     beta = weight * radius / stiffness
     vertical_by = -(free * change.weight + weight * grown)
@@ -234,10 +236,10 @@ def end_by(
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
     along_x, along_z = force.horizontal / tension, vertical_a / tension
     strained = 1.0 + tension / material.stiffness
-    still = length_behind_by(pulley, weight, material.stiffness, force, free, change, 0.0)[1]
-    more = length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
+    still = _length_behind_by(pulley, weight, material.stiffness, force, free, change, 0.0)[1]
+    more = _length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
     grown = (change.length - still) / (1.0 + more)
-    turned = length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
+    turned = _length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
     # the free span grows at P, where it is strained by E_A, and P goes along the tangent
     feed = strained * grown + pulley.radius * turned
     softer = -free * change.stiffness / (material.stiffness * material.stiffness)

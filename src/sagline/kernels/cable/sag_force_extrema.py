@@ -42,7 +42,7 @@ ROWS = 8
 
 
 @kernel
-def growths(curves: Curves, tau: Array, growth: Array) -> None:
+def _growths(curves: Curves, tau: Array, growth: Array) -> None:
     """Fill the growth of the pulls with the logarithm of the chord tensions [N], (m,)."""
     cables = curves.cables
     for i in range(tau.size):
@@ -56,14 +56,14 @@ def growths(curves: Curves, tau: Array, growth: Array) -> None:
 
 
 @formula
-def growth_of(curves: Curves, i: int, tau: float) -> float:
+def _growth_of(curves: Curves, i: int, tau: float) -> float:
     """The same of one cable."""
     above, below = sag_force_at(curves, i, tau * (1.0 + SLOPE_STEP)), sag_force_at(curves, i, tau * (1.0 - SLOPE_STEP))
     return (above - below) / (2.0 * SLOPE_STEP)
 
 
 @formula
-def parts(curves: Curves, i: int, tau: float) -> tuple[float, float, float]:
+def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, float, float]:
     """Stretch, slope and depth of the first-order growth of one cable's pull [N]."""
     cables = curves.cables
     half_weight = cables.half_weight[i]
@@ -73,44 +73,44 @@ def parts(curves: Curves, i: int, tau: float) -> tuple[float, float, float]:
 
 
 @kernel
-def rise_between(curves: Curves, i: int, low: float, high: float) -> float:
+def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> float:
     """A chord tension between two at which the pull rises, where it falls at both; NaN where it never rises.
 
     Its growth has one peak, which golden sections find.
     """
     a, b = math.log(low), math.log(high)
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-    at_c, at_d = growth_of(curves, i, math.exp(c)), growth_of(curves, i, math.exp(d))
+    at_c, at_d = _growth_of(curves, i, math.exp(c)), _growth_of(curves, i, math.exp(d))
     for _ in range(PEAK_STEPS):
         if at_c > 0.0 or at_d > 0.0 or b - a < PEAK_PRECISION:
             break
         if at_c > at_d:
             b, d, at_d = d, c, at_c
             c = b - GOLDEN * (b - a)
-            at_c = growth_of(curves, i, math.exp(c))
+            at_c = _growth_of(curves, i, math.exp(c))
         else:
             a, c, at_c = c, d, at_d
             d = a + GOLDEN * (b - a)
-            at_d = growth_of(curves, i, math.exp(d))
+            at_d = _growth_of(curves, i, math.exp(d))
     if at_c > 0.0:
         return math.exp(c)
     return math.exp(d) if at_d > 0.0 else math.nan
 
 
 @glue
-def find_rises(curves: Curves, work: Array) -> None:
+def _find_rises(curves: Curves, work: Array) -> None:
     """Fill for each cable a tension between A and B at which its pull rises: RISEN, NaN where it never does."""
     cables = curves.cables
     for i in range(work.shape[1]):
         best = 1.5 * cables.half_weight[i] * cables.cosine[i] * cables.cosine[i] / abs(cables.sine[i])
         work[TENSION, i] = min(max(best, work[A, i]), work[B, i])
-    growths(curves, work[A], work[AT_A])
-    growths(curves, work[B], work[AT_B])
-    growths(curves, work[TENSION], work[GROWTH])
+    _growths(curves, work[A], work[AT_A])
+    _growths(curves, work[B], work[AT_B])
+    _growths(curves, work[TENSION], work[GROWTH])
     for i in range(work.shape[1]):
         risen = math.nan
         if cables.sine[i] < 0.0 and cables.half_weight[i] > 0.0 and work[A, i] < work[B, i]:
-            stretch, slope, depth = parts(curves, i, work[TENSION, i])
+            stretch, slope, depth = _first_order_growth(curves, i, work[TENSION, i])
             if work[AT_A, i] > 0.0:
                 risen = work[A, i]
             elif work[AT_B, i] > 0.0:
@@ -118,12 +118,12 @@ def find_rises(curves: Curves, work: Array) -> None:
             elif work[GROWTH, i] > 0.0:
                 risen = work[TENSION, i]
             elif work[GROWTH, i] > -FALLS_FOR_SURE * (stretch + slope + depth):
-                risen = rise_between(curves, i, work[A, i], work[B, i])
+                risen = _rising_tension_between(curves, i, work[A, i], work[B, i])
         work[RISEN, i] = risen
 
 
 @glue
-def find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, pulls: Array) -> None:
+def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, pulls: Array) -> None:
     """Fill where and how far the pulls turn between A and B, of the cables whose tension is not NaN.
 
     Newton steps from TENSION on, with the slope of first order, then with that of the last two points, within what is
@@ -138,14 +138,14 @@ def find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, pu
     """
     m = tensions.size
     for step in range(STEPS):
-        growths(curves, work[TENSION], work[GROWTH])
+        _growths(curves, work[TENSION], work[GROWTH])
         largest = 0.0
         for i in range(m):
             if not math.isnan(tensions[i]):
                 tau, growth = work[TENSION, i], work[GROWTH, i]
                 side = A if (growth > 0.0) == rising else B
                 work[side, i] = tau
-                stretch, slope, depth = parts(curves, i, tau)
+                stretch, slope, depth = _first_order_growth(curves, i, tau)
                 bend = 2.0 * depth - slope - stretch
                 if step > 0 and tau != tensions[i] and growth != work[LAST, i]:
                     bend = (growth - work[LAST, i]) / math.log(tau / tensions[i])
@@ -178,7 +178,7 @@ def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> Non
         work[B, i] = high[i]
     if curves.model.code != CATENARY:
         return
-    find_rises(curves, work)
+    _find_rises(curves, work)
     sought = False
     for i in range(m):
         risen = work[RISEN, i]
@@ -188,7 +188,7 @@ def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> Non
             work[TENSION, i] = min(max(guess, risen), work[B, i])
             sought = True
     if sought:
-        find_extremum(curves, True, work, turns[MOST_TENSION], turns[MOST_PULL])
+        _find_extremum(curves, True, work, turns[MOST_TENSION], turns[MOST_PULL])
     sought = False
     for i in range(m):
         risen = work[RISEN, i]
@@ -199,4 +199,4 @@ def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> Non
             work[TENSION, i] = min(max(guess, low[i]), risen)
             sought = True
     if sought:
-        find_extremum(curves, False, work, turns[LEAST_TENSION], turns[LEAST_PULL])
+        _find_extremum(curves, False, work, turns[LEAST_TENSION], turns[LEAST_PULL])

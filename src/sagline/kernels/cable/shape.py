@@ -46,14 +46,14 @@ def shape_points(
                     t, horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i]
                 )
             else:
-                drop = shallow_drop(t, model, span[i], rise[i], vertical[i], tension[i])
+                drop = _shallow_drop(t, model, span[i], rise[i], vertical[i], tension[i])
                 x, z = t * span[i], t * rise[i] - drop
             points_out[i, k, 0] = x
             points_out[i, k, 1] = z
 
 
 @kernel
-def shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
+def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
     """Drop below the chord [m] at a fraction t of it: b D t (1 - t)/tau, with b the pull on the end."""
     if model.code == STRAIGHT or model.code == ELASTIC or tension == 0.0:
         return 0.0
@@ -63,7 +63,7 @@ def shallow_drop(t: float, model: Model, span: float, rise: float, vertical: flo
 
 
 @kernel
-def catenary_sag(
+def _catenary_sag(
     span: float, rise: float, length: float, horizontal: float, vertical: float, weight: float, stiffness: float
 ) -> float:
     """Largest drop below the chord [m]; on a vertical chord, how far the cable hangs below its lower end."""
@@ -78,7 +78,7 @@ def catenary_sag(
 
 
 @entry
-def sags(
+def largest_sags(
     terms: Terms,
     span: Array,
     rise: Array,
@@ -95,9 +95,9 @@ def sags(
     for i in range(sag_out.shape[0]):
         weight = density[i] * model.gravity
         if model.code == CATENARY and weight > 0.0:
-            sag_out[i] = catenary_sag(span[i], rise[i], length[i], horizontal[i], vertical[i], weight, stiffness[i])
+            sag_out[i] = _catenary_sag(span[i], rise[i], length[i], horizontal[i], vertical[i], weight, stiffness[i])
         else:
-            sag_out[i] = shallow_drop(0.5, model, span[i], rise[i], vertical[i], tension[i])
+            sag_out[i] = _shallow_drop(0.5, model, span[i], rise[i], vertical[i], tension[i])
 
 
 @entry

@@ -22,7 +22,7 @@ class Pair(NamedTuple):
     z: float
 
 
-class ForceSlopes(NamedTuple):
+class _ForceSlopes(NamedTuple):
     """Derivatives of the force on the platform end: dT/dL [N/m], dT/d(rho) [N m/kg], dT/d(EA) [1]."""
 
     by_length: Pair
@@ -30,7 +30,7 @@ class ForceSlopes(NamedTuple):
     by_stiffness: Pair
 
 
-class MachineSlopes(NamedTuple):
+class _MachineSlopes(NamedTuple):
     """Derivatives of the force on the platform end by R and the dead cable [N/m]."""
 
     by_radius: Pair
@@ -38,13 +38,13 @@ class MachineSlopes(NamedTuple):
 
 
 @formula
-def gives_way(plane: PlaneStiffness, end: Pair) -> Pair:
+def force_change(plane: PlaneStiffness, end: Pair) -> Pair:
     """Change of force where the free end would move so and is held: minus stiffness times motion."""
     return Pair(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
 
 
 @formula
-def catenary_by_length(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
+def _catenary_by_length(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
     """Motion of P1's end for a meter of cable at fixed force: it enters at the frame end, along the tangent there."""
     vertical_a = vertical - weight * length
     grown = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a) + 1.0 / stiffness
@@ -52,7 +52,7 @@ def catenary_by_length(horizontal: float, vertical: float, length: float, weight
 
 
 @formula
-def catenary_by_weight(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
+def _catenary_by_weight(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
     """Motion of P1's end by the weight per length at fixed force [m^2/N]."""
     vertical_a = vertical - weight * length
     tension_a = math.hypot(horizontal, vertical_a)
@@ -80,8 +80,8 @@ def force_by_length(
     """dT/dL [N/m] of a cable of the exact or the weightless model; zero where a weightless one is slack."""
     weight = material.density * model.gravity
     if model.code == CATENARY and weight > 0.0:
-        end = catenary_by_length(force.horizontal, force.vertical, length, weight, material.stiffness)
-        return gives_way(plane, end)
+        end = _catenary_by_length(force.horizontal, force.vertical, length, weight, material.stiffness)
+        return force_change(plane, end)
     if force.tension == 0.0:
         return Pair(0.0, 0.0)
     along = -material.stiffness / (length * length)  # of tau, over the chord's x and z
@@ -89,16 +89,16 @@ def force_by_length(
 
 
 @formula
-def shallow_force_slopes(
+def _shallow_force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
-) -> ForceSlopes:
+) -> _ForceSlopes:
     """The three of a shallow cable."""
     slopes = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.hypot(span, rise)
     cosine = span / chord
     sine = rise / chord
     pull = pull_of_shallow(model, chord, 1.0)
-    return ForceSlopes(
+    return _ForceSlopes(
         Pair(slopes.by_length * cosine, slopes.by_length * sine),
         Pair(slopes.by_density * cosine, slopes.by_density * sine + pull),
         Pair(slopes.by_stiffness * cosine, slopes.by_stiffness * sine),
@@ -108,31 +108,31 @@ def shallow_force_slopes(
 @formula
 def force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
-) -> ForceSlopes:
+) -> _ForceSlopes:
     """The three of a cable of any model but the straight one."""
     horizontal, vertical, tension = force
     stiffness = material.stiffness
     weight = material.density * model.gravity
     if model.code not in (CATENARY, ELASTIC) and weight > 0.0:
-        return shallow_force_slopes(model, span, rise, material, length, tension)
+        return _shallow_force_slopes(model, span, rise, material, length, tension)
     by_length = force_by_length(model, span, rise, material, length, force, plane)
     if model.code == CATENARY and weight > 0.0:
-        by_weight = gives_way(plane, catenary_by_weight(horizontal, vertical, length, weight, stiffness))
+        by_weight = force_change(plane, _catenary_by_weight(horizontal, vertical, length, weight, stiffness))
         soft = -length / (stiffness * stiffness)
         stretched = Pair(soft * horizontal, soft * (vertical - 0.5 * weight * length))
-        return ForceSlopes(
+        return _ForceSlopes(
             by_length,
             Pair(model.gravity * by_weight.x, model.gravity * by_weight.z),
-            gives_way(plane, stretched),
+            force_change(plane, stretched),
         )
     along = tension / (stiffness * math.hypot(span, rise))
-    return ForceSlopes(by_length, Pair(0.0, 0.0), Pair(along * span, along * rise))
+    return _ForceSlopes(by_length, Pair(0.0, 0.0), Pair(along * span, along * rise))
 
 
 @formula
 def slopes_over(
     model: Model, material: Material, pulley: Pulley, free: float, force: Force, plane: PlaneStiffness
-) -> tuple[ForceSlopes, MachineSlopes]:
+) -> tuple[_ForceSlopes, _MachineSlopes]:
     """The five of a cable that may have something behind it; of the shallow models as of the exact one.
 
     Args:
@@ -146,11 +146,11 @@ def slopes_over(
     weight = 0.0 if model.code == ELASTIC else material.density * model.gravity
     by_weight = Motion(0.0, 0.0)
     if weight > 0.0:
-        x, z = catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
+        x, z = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
         by_weight = Motion(x, z)
     if force.horizontal == 0.0 and force.vertical == weight * free:  # no force at P
         none = Pair(0.0, 0.0)
-        return ForceSlopes(none, none, none), MachineSlopes(none, none)
+        return _ForceSlopes(none, none, none), _MachineSlopes(none, none)
     heavier = model.gravity if weight > 0.0 else 0.0
     length = end_by(pulley, material, weight, force, free, Change(1.0, 0.0, 0.0, 0.0, 0.0), by_weight)
     density = end_by(pulley, material, weight, force, free, Change(0.0, heavier, 0.0, 0.0, 0.0), by_weight)
@@ -158,10 +158,10 @@ def slopes_over(
     radius = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 1.0, 0.0), by_weight)
     dead = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 0.0, 1.0), by_weight)
     return (
-        ForceSlopes(
-            gives_way(plane, Pair(length.x, length.z)),
-            gives_way(plane, Pair(density.x, density.z)),
-            gives_way(plane, Pair(stiffness.x, stiffness.z)),
+        _ForceSlopes(
+            force_change(plane, Pair(length.x, length.z)),
+            force_change(plane, Pair(density.x, density.z)),
+            force_change(plane, Pair(stiffness.x, stiffness.z)),
         ),
-        MachineSlopes(gives_way(plane, Pair(radius.x, radius.z)), gives_way(plane, Pair(dead.x, dead.z))),
+        _MachineSlopes(force_change(plane, Pair(radius.x, radius.z)), force_change(plane, Pair(dead.x, dead.z))),
     )

@@ -33,7 +33,7 @@ TAUT = 1.25  # of wD/2: a chord tension above that of the least tension at the f
 
 
 @glue
-def leave_pulleys(model: Model, cables: Cables, fresh: bool) -> None:
+def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
     """Fill the free spans and their tensions, from where the forces at the pulleys say that the cables leave them.
 
     The forces are those of the last length and pull (fresh: of first order) at the present chord tensions. Cables of
@@ -82,7 +82,7 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
     """
     m = cables.tau.size
     if cables.machine:
-        leave_pulleys(model, cables, fresh)
+        _fill_exit_points(model, cables, fresh)
     for i in range(m):
         cables.slackness[i] = cables.free_half_weight[i] / cables.free_tau[i]
     for i in range(m):

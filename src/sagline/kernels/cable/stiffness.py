@@ -15,14 +15,14 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow
-from sagline.kernels.cable.over_pulleys import across_pulley, material_at, series
+from sagline.kernels.cable.over_pulleys import across_pulley, material_at, stiffness_in_series
 from sagline.kernels.cable.shallow import stretching_tension
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import formula, kernel
 
 
-class ShallowSlopes(NamedTuple):
+class _ShallowSlopes(NamedTuple):
     """Derivatives of tau of a shallow cable by x_B, z_B [N/m], L [N/m], rho [N m/kg] and EA [1]."""
 
     by_x: float
@@ -87,7 +87,7 @@ def catenary_stiffness(
 
 
 @formula
-def elastic_stiffness(span: float, rise: float, length: float, tension: float, stiffness: float) -> PlaneStiffness:
+def _elastic_stiffness(span: float, rise: float, length: float, tension: float, stiffness: float) -> PlaneStiffness:
     """In-plane stiffness of the weightless cable; zero where it is slack."""
     if tension == 0.0:
         return PlaneStiffness(0.0, 0.0, 0.0, 0.0)
@@ -105,7 +105,7 @@ def elastic_stiffness(span: float, rise: float, length: float, tension: float, s
 @kernel
 def shallow_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
-) -> ShallowSlopes:
+) -> _ShallowSlopes:
     """Derivatives of tau of a shallow cable by its chord and its own data.
 
     From L (1 + s/EA) = D (1 + S/tau^2), S = k (rho x_B)^2, s = |T| (empirical) or tau (parabolic).
@@ -131,11 +131,11 @@ def shallow_slopes(
     slope_length = -(1.0 + stretch / stiffness) / by_tension
     slope_density = (2.0 * chord * share - length * by_pull * pull / stiffness) / (density * by_tension)
     slope_stiffness = length * stretch / (stiffness * stiffness * by_tension)
-    return ShallowSlopes(slope_x, slope_z, slope_length, slope_density, slope_stiffness)
+    return _ShallowSlopes(slope_x, slope_z, slope_length, slope_density, slope_stiffness)
 
 
 @formula
-def shallow_stiffness(
+def _shallow_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> PlaneStiffness:
     """In-plane stiffness of a shallow cable, not symmetric: its forces are no gradient."""
@@ -164,8 +164,8 @@ def cable_stiffness(
     if model.code == CATENARY and weight > 0.0:
         return catenary_stiffness(force.horizontal, force.vertical, length, weight, material.stiffness)
     if model.code in (CATENARY, ELASTIC) or weight == 0.0:
-        return elastic_stiffness(span, rise, length, force.tension, material.stiffness)
-    return shallow_stiffness(model, span, rise, material, length, force.tension)
+        return _elastic_stiffness(span, rise, length, force.tension, material.stiffness)
+    return _shallow_stiffness(model, span, rise, material, length, force.tension)
 
 
 @formula
@@ -179,7 +179,7 @@ def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool 
         plane = cable_stiffness(model, span, rise, material_at(cables, i), length, force_of(rows, i))
         rows[t.ACROSS, i] = rows[t.TENSION, i] / rows[g.CHORD, i]
         if behind is not None:
-            plane = series(model, cables, rows, i, plane)
+            plane = stiffness_in_series(model, cables, rows, i, plane)
             rows[t.ACROSS, i] = across_pulley(cables, rows, i)
         rows[t.XX, i] = plane.xx
         rows[t.XZ, i] = plane.xz

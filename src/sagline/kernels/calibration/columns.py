@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sagline.core.arrays import Array
-from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.freedom import is_rotation
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import material_at
@@ -12,29 +12,29 @@ from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.motion import fill_length, respond
-from sagline.kernels.calibration.tension_slopes import share_of, tension_slopes
-from sagline.kernels.calibration.terms import Sensing, Slopes, Sought, Space
-from sagline.kernels.calibration.vectors import column_of, cross, into, opposite, plus, scaled, unit_vector
+from sagline.kernels.calibration.motion import fill_length, fill_motion_by_wrench
+from sagline.kernels.calibration.tension_slopes import frame_end_slopes, in_world_axes
+from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Slopes, Unknowns
+from sagline.kernels.calibration.vectors import column_of, cross, in_axes, opposite, plus, scaled, unit_vector
 from sagline.kernels.forward.platform import Triple, end_stiffness
 from sagline.kernels.jit import formula, glue, kernel
 
 
 @formula
-def lever_of(rows: Array, i: int) -> Triple:
+def _lever_of(rows: Array, i: int) -> Triple:
     """From the center of mass to a platform end."""
     return rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
 
 
 @formula
-def force_at(rows: Array, i: int) -> Triple:
+def _force_at(rows: Array, i: int) -> Triple:
     """T of a cable, on its platform end, world axes."""
     x = rows[t.HORIZONTAL, i]
     return x * rows[g.AZIMUTH_X, i], x * rows[g.AZIMUTH_Y, i], rows[t.VERTICAL, i]
 
 
 @formula
-def resisted(ends: Array, i: int, vector: Triple) -> Triple:
+def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
     """Change of a cable's force by a motion of its platform end."""
     return (
         ends[i, 0] * vector[0] + ends[i, 1] * vector[1] + ends[i, 2] * vector[2],
@@ -44,7 +44,7 @@ def resisted(ends: Array, i: int, vector: Triple) -> Triple:
 
 
 @formula
-def resisted_back(ends: Array, i: int, shares: Array) -> Triple:
+def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
     """Change of a frame end's tension by a motion of the platform end, but for its height: K^T times the shares."""
     x, y, z = shares[i, 0], shares[i, 1], shares[i, 2]
     return (
@@ -55,19 +55,19 @@ def resisted_back(ends: Array, i: int, shares: Array) -> Triple:
 
 
 @formula
-def share_at(shares: Array, i: int, force: Triple) -> float:
+def _tension_by_force(shares: Array, i: int, force: Triple) -> float:
     """Change of a frame end's tension by a change of the force on the platform end."""
     return shares[i, 0] * force[0] + shares[i, 1] * force[1] + shares[i, 2] * force[2]
 
 
 @formula
-def turned_out(rows: Array, i: int, pair: Pair) -> Triple:
+def _in_world_axes(rows: Array, i: int, pair: Pair) -> Triple:
     """A vector of a cable's plane in world axes."""
     return pair.x * rows[g.AZIMUTH_X, i], pair.x * rows[g.AZIMUTH_Y, i], pair.z
 
 
 @formula
-def pull_column(slopes: Slopes, at: int, scale: float, force: Triple, moment: Triple) -> None:
+def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, moment: Triple) -> None:
     """Add to a column a change of the wrench on the platform."""
     for k in range(3):
         slopes.pull[k, at] += scale * force[k]
@@ -75,46 +75,48 @@ def pull_column(slopes: Slopes, at: int, scale: float, force: Triple, moment: Tr
 
 
 @formula
-def own_column(slopes: Slopes, space: Space, i: int, at: int, scale: float, force: Triple, direct: float) -> None:
+def _add_force_change(
+    slopes: Slopes, space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float
+) -> None:
     """Add to a column what a change of one cable's force does, which also changes its own reading directly."""
-    pull_column(slopes, at, scale, force, cross(lever_of(space.rows, i), force))
+    _add_wrench_change(slopes, at, scale, force, cross(_lever_of(space.rows, i), force))
     slopes.work[i, at] += scale * direct
 
 
 @kernel
-def datum_column(
-    sought: Sought, row: int, i: int, gain: float, pair: Pair, alone: float, space: Space, slopes: Slopes
+def _add_parameter_change(
+    sought: Unknowns, row: int, i: int, gain: float, pair: Pair, alone: float, space: CalibrationArrays, slopes: Slopes
 ) -> None:
     """Add to a column what a datum of cable i does: to the force on its platform end, and to its tension alone."""
     at = sought.where[row, i]
     if at >= 0:
-        change = turned_out(space.rows, i, pair)
-        direct = gain * (share_at(space.shares, i, change) + alone)
-        own_column(slopes, space, i, at, sought.scale[row, i], change, direct)
+        change = _in_world_axes(space.rows, i, pair)
+        direct = gain * (_tension_by_force(space.shares, i, change) + alone)
+        _add_force_change(slopes, space, i, at, sought.scale[row, i], change, direct)
 
 
 @glue
-def fill_ends(model: Model, cables: Array, space: Space) -> None:
+def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
     """Fill the stiffness of the platform ends, and how the frame ends' tensions share in the forces there."""
     for i in range(cables.shape[0]):
         across = end_stiffness(space.rows, i)
         for k in range(3):
             space.ends[i, k], space.ends[i, 3 + k], space.ends[i, 6 + k] = across[0][k], across[1][k], across[2][k]
-        slopes = tension_slopes(model, cables, space.rows, i)
-        x, y, z = share_of(space.rows, i, slopes.along, slopes.up)
+        slopes = frame_end_slopes(model, cables, space.rows, i)
+        x, y, z = in_world_axes(space.rows, i, slopes.along, slopes.up)
         space.shares[i, 0], space.shares[i, 1], space.shares[i, 2] = x, y, z
         space.shares[i, 3], space.shares[i, 4] = slopes.by_height, slopes.tension
 
 
 @glue
-def fill_moved(sensing: Sensing, free: Array, m: int, reach: Triple, space: Space) -> None:
+def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
     """Fill what a wrench on the platform changes of every reading, by the motion it causes; needs the factor."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
-            own = plus(resisted_back(space.ends, j, space.shares), (0.0, 0.0, space.shares[j, 3]))
+            own = plus(_tension_by_motion(space.ends, j, space.shares), (0.0, 0.0, space.shares[j, 3]))
             force = scaled(sensing.gain[j], own)
-            moment = cross(lever_of(space.rows, j), force)
+            moment = cross(_lever_of(space.rows, j), force)
         elif j < m + 3:
             force = column_of(space.axes, j - m)
             moment = cross(reach, force)
@@ -123,32 +125,32 @@ def fill_moved(sensing: Sensing, free: Array, m: int, reach: Triple, space: Spac
             moment = column_of(space.axes, j - m - 3)
         six[0], six[1], six[2] = force
         six[3], six[4], six[5] = moment
-        respond(free, six, space, space.moved[j])
+        fill_motion_by_wrench(free, six, space, space.moved[j])
 
 
 @glue
 def fill_cable(
-    model: Model, cables: Array, gain: float, sought: Sought, p: int, i: int, space: Space, slopes: Slopes
+    model: Model, cables: Array, gain: float, sought: Unknowns, p: int, i: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
     """Add to the columns what is unknown of cable i, and fill what its length changes."""
     where, scale, rows, ends, shares = sought.where, sought.scale, space.rows, space.ends, space.shares
-    lever, force = lever_of(rows, i), force_at(rows, i)
+    lever, force = _lever_of(rows, i), _force_at(rows, i)
     for axis in range(3):
         at = where[kinds.FRAME + axis, i]
         if at >= 0:
-            change = opposite(resisted(ends, i, unit_vector(axis)))
+            change = opposite(_force_by_motion(ends, i, unit_vector(axis)))
             fall = shares[i, 3] if axis == 2 else 0.0
-            direct = gain * (share_at(shares, i, change) - fall)
-            own_column(slopes, space, i, at, scale[kinds.FRAME + axis, i], change, direct)
+            direct = gain * (_tension_by_force(shares, i, change) - fall)
+            _add_force_change(slopes, space, i, at, scale[kinds.FRAME + axis, i], change, direct)
         at = where[kinds.PLATFORM + axis, i]
         if at >= 0:
             moved = column_of(space.rotation, axis)
-            change = resisted(ends, i, moved)
+            change = _force_by_motion(ends, i, moved)
             moment = plus(cross(moved, force), cross(lever, change))
-            pull_column(slopes, at, scale[kinds.PLATFORM + axis, i], change, moment)
-            direct = gain * (share_at(shares, i, change) + shares[i, 3] * moved[2])
+            _add_wrench_change(slopes, at, scale[kinds.PLATFORM + axis, i], change, moment)
+            direct = gain * (_tension_by_force(shares, i, change) + shares[i, 3] * moved[2])
             slopes.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
-    by = tension_slopes(model, cables, rows, i)
+    by = frame_end_slopes(model, cables, rows, i)
     span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
     material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
     if model.behind is None:
@@ -156,18 +158,18 @@ def fill_cable(
     else:
         free = rows[t.FREE_LENGTH, i]
         own, machine = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
-        datum_column(sought, kinds.RADIUS, i, gain, machine.by_radius, by.by_radius, space, slopes)
-        datum_column(sought, kinds.DEAD, i, gain, machine.by_dead, by.by_dead, space, slopes)
-    datum_column(sought, kinds.DENSITY, i, gain, own.by_density, by.by_density, space, slopes)
-    datum_column(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space, slopes)
-    change = turned_out(rows, i, own.by_length)
-    direct = gain * (share_at(shares, i, change) + by.by_length)
+        _add_parameter_change(sought, kinds.RADIUS, i, gain, machine.by_radius, by.by_radius, space, slopes)
+        _add_parameter_change(sought, kinds.DEAD, i, gain, machine.by_dead, by.by_dead, space, slopes)
+    _add_parameter_change(sought, kinds.DENSITY, i, gain, own.by_density, by.by_density, space, slopes)
+    _add_parameter_change(sought, kinds.STIFFNESS, i, gain, own.by_stiffness, by.by_stiffness, space, slopes)
+    change = _in_world_axes(rows, i, own.by_length)
+    direct = gain * (_tension_by_force(shares, i, change) + by.by_length)
     fill_length(space, i, change, cross(lever, change), direct)
     for k in range(3):
         row = kinds.STIFFNESS if k == 2 else kinds.ZERO + k
         at = where[row, i]
         if at >= 0:
-            own_column(slopes, space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
+            _add_force_change(slopes, space, i, at, scale[row, i] * sought.paid[k, p, i], change, direct)
     if where[kinds.GAIN, i] >= 0:
         slopes.work[i, where[kinds.GAIN, i]] += scale[kinds.GAIN, i] * by.tension
     if where[kinds.BIAS, i] >= 0:
@@ -175,19 +177,19 @@ def fill_cable(
 
 
 @formula
-def allowed(free: Array, vector: Triple) -> Triple:
+def _free_displacement(free: Array, vector: Triple) -> Triple:
     """The part of a displacement that the platform's freedom has."""
     x, y, z = 0.0, 0.0, 0.0
     for k in range(free.shape[0]):
-        if not turns(free, k):
+        if not is_rotation(free, k):
             share = free[k, 0] * vector[0] + free[k, 1] * vector[1] + free[k, 2] * vector[2]
             x, y, z = x + share * free[k, 0], y + share * free[k, 1], z + share * free[k, 2]
     return x, y, z
 
 
 @glue
-def fill_center(
-    cables: Array, sensing: Sensing, sought: Sought, free: Array, axis: int, space: Space, slopes: Slopes
+def _fill_center(
+    cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
     """Add to the columns what a center of mass does that is elsewhere in the platform: the platform moves about it.
 
@@ -195,16 +197,16 @@ def fill_center(
     """
     m = cables.shape[0]
     at, scale = sought.where[kinds.CENTER + axis, 0], sought.scale[kinds.CENTER + axis, 0]
-    back = opposite(allowed(free, column_of(space.rotation, axis)))
+    back = opposite(_free_displacement(free, column_of(space.rotation, axis)))
     for i in range(m):
-        change = resisted(space.ends, i, back)
-        moment = plus(cross(back, force_at(space.rows, i)), cross(lever_of(space.rows, i), change))
-        pull_column(slopes, at, scale, change, moment)
-        own = share_at(space.shares, i, change) + space.shares[i, 3] * back[2]
+        change = _force_by_motion(space.ends, i, back)
+        moment = plus(cross(back, _force_at(space.rows, i)), cross(_lever_of(space.rows, i), change))
+        _add_wrench_change(slopes, at, scale, change, moment)
+        own = _tension_by_force(space.shares, i, change) + space.shares[i, 3] * back[2]
         slopes.work[i, at] += scale * sensing.gain[i] * own
     if slopes.work.shape[0] == m:
         return
-    shifted = into(space.axes, back)
+    shifted = in_axes(space.axes, back)
     for k in range(3):
         slopes.work[m + k, at] += scale * shifted[k]
 
@@ -214,10 +216,10 @@ def fill_platform(
     model: Model,
     cables: Array,
     sensing: Sensing,
-    sought: Sought,
+    sought: Unknowns,
     free: Array,
     from_system: Triple,
-    space: Space,
+    space: CalibrationArrays,
     slopes: Slopes,
 ) -> None:
     """Add to the columns what is unknown of the platform and of the measuring system."""
@@ -225,15 +227,15 @@ def fill_platform(
     where, scale = sought.where, sought.scale
     if where[kinds.MASS, 0] >= 0:
         none = (0.0, 0.0, 0.0)
-        pull_column(slopes, where[kinds.MASS, 0], scale[kinds.MASS, 0], (0.0, 0.0, model.gravity), none)
+        _add_wrench_change(slopes, where[kinds.MASS, 0], scale[kinds.MASS, 0], (0.0, 0.0, model.gravity), none)
     for axis in range(3):
         if where[kinds.CENTER + axis, 0] >= 0:
-            fill_center(cables, sensing, sought, free, axis, space, slopes)
+            _fill_center(cables, sensing, sought, free, axis, space, slopes)
         if slopes.work.shape[0] == m:
             continue
         unit = unit_vector(axis)
-        shifted, around = into(space.axes, unit), into(space.axes, cross(from_system, unit))
-        outward = into(space.axes, column_of(space.rotation, axis))
+        shifted, around = in_axes(space.axes, unit), in_axes(space.axes, cross(from_system, unit))
+        outward = in_axes(space.axes, column_of(space.rotation, axis))
         for k in range(3):
             at = where[kinds.SHIFT + axis, 0]
             if at >= 0:

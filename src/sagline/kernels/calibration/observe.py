@@ -14,32 +14,32 @@ from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.balance.freedom import symmetric_part
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.calibration.columns import fill_cable, fill_ends, fill_moved, fill_platform
+from sagline.kernels.calibration.columns import fill_cable, fill_ends, fill_platform, fill_readings_by_wrench
 from sagline.kernels.calibration.motion import add_motion, fill_motion
 from sagline.kernels.calibration.terms import (
     BESIDE,
-    Observed,
-    ObservedArrays,
+    CalibrationArrays,
+    Linearization,
+    LinearizationArrays,
     ReadingArrays,
     Readings,
     Sensing,
     SensingArrays,
     Slopes,
-    Sought,
-    SoughtArrays,
-    Space,
-    new_space,
+    UnknownArrays,
+    Unknowns,
+    new_calibration_arrays,
 )
-from sagline.kernels.calibration.vectors import into, opposite, plus, unit_vector
-from sagline.kernels.calibration.whitening import store, whiten
+from sagline.kernels.calibration.vectors import in_axes, opposite, plus, unit_vector
+from sagline.kernels.calibration.whitening import store_linearization, whiten
 from sagline.kernels.forward.platform import Triple, platform_stiffness, turned, unbalance
-from sagline.kernels.forward.problem import ForwardTerms, Given, GivenArrays, row_of
+from sagline.kernels.forward.problem import ForwardTerms, SampleArrays, Samples, row_of
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory
 
 
 @formula
-def rotation_between(read: Array, pose: Array, frame: Array) -> Triple:
+def _rotation_between(read: Array, pose: Array, frame: Array) -> Triple:
     """Rotation vector, in the measuring system's axes, from the platform's predicted rotation to that read."""
     # what the system should read: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
@@ -61,16 +61,22 @@ def rotation_between(read: Array, pose: Array, frame: Array) -> Triple:
 
 
 @glue
-def fill_residual(
-    sensing: Sensing, readings: Readings, p: int, pose: Array, from_system: Triple, space: Space, residual: Array
+def _fill_residual(
+    sensing: Sensing,
+    readings: Readings,
+    p: int,
+    pose: Array,
+    from_system: Triple,
+    space: CalibrationArrays,
+    residual: Array,
 ) -> None:
     """Fill readings less predictions, and the deviations: infinite where nothing was read."""
     m = residual.size - BESIDE
     for i in range(m):
         residual[i] = readings.cells[p, i] - (sensing.gain[i] * space.shares[i, 4] + sensing.bias[i])
         space.deviation[i] = sensing.tension_deviation[i]
-    place = into(space.axes, from_system)
-    turn = rotation_between(readings.rotations[p], pose, sensing.frame)
+    place = in_axes(space.axes, from_system)
+    turn = _rotation_between(readings.rotations[p], pose, sensing.frame)
     for k in range(3):
         residual[m + k] = readings.positions[p, k] - place[k]
         residual[m + 3 + k] = turn[k]
@@ -81,30 +87,30 @@ def fill_residual(
 @entry
 def observe(
     model: ForwardTerms,
-    given: GivenArrays,
+    given: SampleArrays,
     sensing: SensingArrays,
     read: ReadingArrays,
-    looked_for: SoughtArrays,
+    looked_for: UnknownArrays,
     room: tuple[Array, Indices],
-    found: ObservedArrays,
+    found: LinearizationArrays,
 ) -> None:
     """Residuals and derivatives at N equilibria; NaN where the platform has no stable one.
 
     Args:
         model: Cable model, the exact or the weightless one, as of `forward_poses`.
-        given: `Given`, its starts the poses, which are equilibria at the lengths.
+        given: `Samples`, its starts the poses, which are equilibria at the lengths.
         sensing: `Sensing`.
         read: `Readings`.
-        looked_for: `Sought`.
+        looked_for: `Unknowns`.
         room: `memory_for` as many cables.
-        found: `Observed`, filled.
+        found: `Linearization`, filled.
     """
-    batch, sensors, readings = Given(*given), Sensing(*sensing), Readings(*read)
-    sought, answer = Sought(*looked_for), Observed(*found)
+    batch, sensors, readings = Samples(*given), Sensing(*sensing), Readings(*read)
+    sought, answer = Unknowns(*looked_for), Linearization(*found)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     free = batch.freedom
-    space = new_space(Memory(*room), m, free.shape[0], answer.work.shape[0] - 6)
+    space = new_calibration_arrays(Memory(*room), m, free.shape[0], answer.work.shape[0] - 6)
     slopes = Slopes(answer.work[:-6], answer.work[-6:])
     for axis in range(3):
         unit = unit_vector(axis)
@@ -133,7 +139,7 @@ def observe(
         shift = (sensors.frame[0], sensors.frame[1], sensors.frame[2])
         from_system = plus(plus((pose[0], pose[1], pose[2]), target), opposite(shift))
         fill_ends(placed, cables, space)
-        fill_moved(sensors, free, m, reach, space)
+        fill_readings_by_wrench(sensors, free, m, reach, space)
         for j in range(answer.work.shape[0]):
             for q in range(answer.work.shape[1]):
                 answer.work[j, q] = 0.0
@@ -143,6 +149,6 @@ def observe(
         if answer.motion.shape[0] > 0:
             fill_motion(free, space, slopes, answer.motion[p])
         add_motion(space, slopes)
-        fill_residual(sensors, readings, p, pose, from_system, space, answer.residual[p])
+        _fill_residual(sensors, readings, p, pose, from_system, space, answer.residual[p])
         whiten(sensors, answer.residual[p], space, slopes.work)
-        store(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)
+        store_linearization(sensors, answer, p, readings.lengths[p], batch.lengths[p], space)

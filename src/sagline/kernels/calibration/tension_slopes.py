@@ -15,7 +15,7 @@ from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula
 
 
-class TensionSlopes(NamedTuple):
+class _FrameEndSlopes(NamedTuple):
     """The tension at the frame end, and its derivatives while the force on the platform end stays, unless named.
 
     Attributes:
@@ -42,7 +42,7 @@ class TensionSlopes(NamedTuple):
 
 
 @formula
-def tension_slopes(model: Model, cables: Array, rows: Array, i: int) -> TensionSlopes:
+def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
     """Those of cable i, after its forces; zero without a force there."""
     material = material_at(cables, i)
     gravity = model.gravity if model.code == CATENARY else 0.0
@@ -54,13 +54,13 @@ def tension_slopes(model: Model, cables: Array, rows: Array, i: int) -> TensionS
         tension = math.sqrt(x * x + at_frame * at_frame)
         share = 1.0 / tension if tension > 0.0 else 0.0
         along, up = x * share, at_frame * share
-        return TensionSlopes(tension, along, up, 0.0, -up * weight, -up * gravity * length, 0.0, 0.0, 0.0)
+        return _FrameEndSlopes(tension, along, up, 0.0, -up * weight, -up * gravity * length, 0.0, 0.0, 0.0)
     # T + T^2/(2 EA) - w z is one number from the platform end to the pulley's exit P, which moves on the pulley
     stiffness, pulley = material.stiffness, pulley_at(cables, i)
     leaving, free = rows[t.LEAVING, i], rows[t.FREE_LENGTH, i]
     end = math.sqrt(x * x + z * z)
     if not (leaving > 0.0 and end > 0.0):
-        return TensionSlopes(leaving, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return _FrameEndSlopes(leaving, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     sine, cosine, entry = rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], pulley.entry
     strained = 1.0 + leaving / stiffness
     share = 1.0 / strained
@@ -68,7 +68,7 @@ def tension_slopes(model: Model, cables: Array, rows: Array, i: int) -> TensionS
     lifted = weight * pulley.radius * entry * cosine * share  # by the wrap angle
     turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # the wrap angle by the force at P
     rise = rows[t.FREE_RISE, i]
-    return TensionSlopes(
+    return _FrameEndSlopes(
         leaving,
         grown * x + lifted * turned_x,
         grown * z + lifted * turned_z,
@@ -82,6 +82,6 @@ def tension_slopes(model: Model, cables: Array, rows: Array, i: int) -> TensionS
 
 
 @formula
-def share_of(rows: Array, i: int, along: float, up: float) -> tuple[float, float, float]:
+def in_world_axes(rows: Array, i: int, along: float, up: float) -> tuple[float, float, float]:
     """Derivatives by the force on the platform end in world axes."""
     return along * rows[g.AZIMUTH_X, i], along * rows[g.AZIMUTH_Y, i], up

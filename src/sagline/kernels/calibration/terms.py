@@ -13,8 +13,8 @@ BESIDE = 6  # readings of a pose beside its load cells: position and rotation in
 
 SensingArrays = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
 ReadingArrays = tuple[Array, Array, Array, Array]
-SoughtArrays = tuple[Indices, Array, Array]
-ObservedArrays = tuple[Array, Array, Array, Array, Array, Array]
+UnknownArrays = tuple[Indices, Array, Array]
+LinearizationArrays = tuple[Array, Array, Array, Array, Array, Array]
 
 
 class Sensing(NamedTuple):
@@ -57,7 +57,7 @@ class Readings(NamedTuple):
     rotations: Array
 
 
-class Sought(NamedTuple):
+class Unknowns(NamedTuple):
     """The P numbers that are looked for.
 
     Attributes:
@@ -71,7 +71,7 @@ class Sought(NamedTuple):
     paid: Array
 
 
-class Observed(NamedTuple):
+class Linearization(NamedTuple):
     """Output arrays; rows of a pose are its load cells, three of its position and three of its rotation.
 
     R is m + 6, or m where no system measures positions or rotations.
@@ -106,7 +106,7 @@ class Slopes(NamedTuple):
     pull: Array
 
 
-class Space(NamedTuple):
+class CalibrationArrays(NamedTuple):
     """Working memory of one pose."""
 
     rows: Array  # (CABLE_ROWS, m)
@@ -128,7 +128,7 @@ class Space(NamedTuple):
 
 
 @glue
-def new_space(memory: Memory, m: int, n: int, readings: int) -> Space:
+def new_calibration_arrays(memory: Memory, m: int, n: int, readings: int) -> CalibrationArrays:
     """Working memory for m cables, n free motions and so many readings."""
     numbers = memory.numbers
     rows, at = block(numbers, 0, CABLE_ROWS, m)
@@ -147,7 +147,7 @@ def new_space(memory: Memory, m: int, n: int, readings: int) -> Space:
     part, six = numbers[at : at + n], numbers[at + n : at + n + 6]
     at += n + 6
     deviation = numbers[at : at + m + BESIDE].reshape((m + BESIDE,))  # which tells when there is too little memory
-    return Space(
+    return CalibrationArrays(
         rows,
         rotation,
         axes,

@@ -26,7 +26,7 @@ def column_of(matrix: Array, k: int) -> Triple:
 
 
 @formula
-def into(axes: Array, vector: Triple) -> Triple:
+def in_axes(axes: Array, vector: Triple) -> Triple:
     """A world vector in the axes that are the columns of a (3, 3)."""
     return (
         axes[0, 0] * vector[0] + axes[1, 0] * vector[1] + axes[2, 0] * vector[2],

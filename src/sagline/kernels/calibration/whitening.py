@@ -6,12 +6,12 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.cholesky import factor_positive
-from sagline.kernels.calibration.terms import BESIDE, Observed, Sensing, Space
+from sagline.kernels.calibration.terms import BESIDE, CalibrationArrays, Linearization, Sensing
 from sagline.kernels.jit import glue
 
 
 @glue
-def whiten(sensing: Sensing, residual: Array, space: Space, work: Array) -> None:
+def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Array) -> None:
     """Leave out what was not read, and fill W with W^T W the inverse of the covariance: the inverse of its factor."""
     readings, m = work.shape[0], residual.size - BESIDE
     for j in range(residual.size):
@@ -45,7 +45,9 @@ def whiten(sensing: Sensing, residual: Array, space: Space, work: Array) -> None
 
 
 @glue
-def store(sensing: Sensing, answer: Observed, p: int, read: Array, lengths: Array, space: Space) -> None:
+def store_linearization(
+    sensing: Sensing, answer: Linearization, p: int, read: Array, lengths: Array, space: CalibrationArrays
+) -> None:
     """Write what one pose says."""
     residual, matrix, whole = answer.residual[p], answer.matrix[p], space.whole
     readings, m = matrix.shape[0], lengths.size

@@ -6,30 +6,30 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import components_along, spread
+from sagline.kernels.balance.freedom import components_along, motion_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.massless import Losses
-from sagline.kernels.dynamics.wind import across
+from sagline.kernels.dynamics.wind import wind_across
 from sagline.kernels.jit import glue, kernel
 
 
 @kernel
-def blow(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
+def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
     """Add half of the wind's force on every cable, as it hangs along its chord, to a wrench (6,)."""
     for i in range(cables.shape[0]):
         x = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i]
         y = rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
         z = rows[g.SINE, i]
         along = wind[0] * x + wind[1] * y + wind[2] * z
-        fx, fy, fz = across(wind, along, x, y, z, 0.5 * drag[i] * rows[g.CHORD, i])
-        add_at_end(rows, i, fx, fy, fz, given)
+        fx, fy, fz = wind_across(wind, along, x, y, z, 0.5 * drag[i] * rows[g.CHORD, i])
+        _add_at_end(rows, i, fx, fy, fz, given)
 
 
 @kernel
-def add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array) -> None:
+def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array) -> None:
     """Add a force at the platform end of a cable to a wrench (6,)."""
     rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
     wrench[0] += x
@@ -41,15 +41,17 @@ def add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array)
 
 
 @glue
-def keep_free(freedom: Array, wrench: Array, part: Array) -> None:
+def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
     """Take from a wrench what the platform's guides carry."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
-        spread(freedom, part, wrench)
+        motion_along(freedom, part, wrench)
 
 
 @kernel
-def pull_of_frame(weight_of: float, cables: Array, rows: Array, data: Array, now: Array, behind: bool | None) -> None:
+def fill_frame_end_tensions(
+    weight_of: float, cables: Array, rows: Array, data: Array, now: Array, behind: bool | None
+) -> None:
     """Fill the tensions at frame ends and drums, and H = T + T^2/(2 EA) - w z, which is one number a cable."""
     for i in range(cables.shape[0]):
         weight, stiffness = cables[i, tables.DENSITY] * weight_of, cables[i, tables.STIFFNESS]
@@ -114,5 +116,5 @@ def damp_cables(
         now[d.STRETCHING, i] = more * strained
         now[d.AT_FRAME, i] = max(now[d.PULL, i] + more, 0.0)
         lost += more * rate + slow * (ux * ux + uy * uy + uz * uz)
-        add_at_end(rows, i, -more * x - slow * ux, -more * y - slow * uy, -more * z - slow * uz, wrench)
+        _add_at_end(rows, i, -more * x - slow * ux, -more * y - slow * uy, -more * z - slow * uz, wrench)
     return lost

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
-from sagline.kernels.dynamics.wind import across
+from sagline.kernels.dynamics.wind import wind_across
 from sagline.kernels.jit import formula, kernel
 
 # columns of the chain table, a row for each cable
@@ -31,7 +31,7 @@ TINY = 1e-300
 
 
 @formula
-def pull(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
+def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
     """Fill the force of every element divided by its length [N/m]; returns the power that they lose [W].
 
     Args:
@@ -49,21 +49,21 @@ def pull(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> fl
         z = place[2, j + 1] - place[2, j]
         distance = math.sqrt(x * x + y * y + z * z)
         pulls[j] = max(stiffness * (distance * inverse - 1.0), 0.0) / (distance + TINY)
-    distance = distance_of(place, count)
-    pulls[count] = max(stiffness * strain_at_exit(row, distance), 0.0) / (distance + TINY)
+    distance = _element_distance(place, count)
+    pulls[count] = max(stiffness * _strain_at_exit(row, distance), 0.0) / (distance + TINY)
     if row[LOSS_TIME] == 0.0:
         return 0.0
-    return lose(place, speed, count, row, pulls)
+    return _add_damping(place, speed, count, row, pulls)
 
 
 @formula
-def strain_at_exit(row: Array, distance: float) -> float:
+def _strain_at_exit(row: Array, distance: float) -> float:
     """Strain of the element at the frame, which has that of the cable behind it: that slides."""
     return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
 
 
 @formula
-def distance_of(place: Array, j: int) -> float:
+def _element_distance(place: Array, j: int) -> float:
     """Length of the element between node j and the next towards the frame [m]."""
     x = place[0, j + 1] - place[0, j]
     y = place[1, j + 1] - place[1, j]
@@ -72,7 +72,7 @@ def distance_of(place: Array, j: int) -> float:
 
 
 @kernel
-def lose(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
+def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
     """Add what resists the stretching of every taut element, which never pushes; returns the power lost [W]."""
     viscous = row[STIFFNESS] * row[LOSS_TIME]
     power = 0.0
@@ -97,14 +97,14 @@ def lose(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> fl
 
 
 @formula
-def enter(place: Array, speed: Array, count: int, row: Array) -> None:
+def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array) -> None:
     """Fill the velocity of the frame's node: that of the cable which enters there, L' (1 + strain) along it."""
     for c in range(3):
         speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
 
 
 @formula
-def kick(place: Array, speed: Array, count: int, row: Array, pulls: Array, h: float) -> None:
+def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array, h: float) -> None:
     """Change the nodes' velocities by what pulls at them during h [s], and by the momentum that enters."""
     share = h / (row[DENSITY] * row[ELEMENT])
     last = h / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
@@ -121,7 +121,7 @@ def kick(place: Array, speed: Array, count: int, row: Array, pulls: Array, h: fl
 
 
 @formula
-def drift(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
+def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
     """Move the nodes for h [s]; the one next to the frame keeps its momentum while its mass changes.
 
     Args:
@@ -143,7 +143,7 @@ def drift(place: Array, speed: Array, count: int, row: Array, before: float, h: 
 
 
 @kernel
-def brake(speed: Array, count: int, row: Array, h: float) -> float:
+def slow_by_air(speed: Array, count: int, row: Array, h: float) -> float:
     """Slow the nodes down by the air for h [s]; returns the energy lost [J]."""
     if row[AIR_RATE] == 0.0:
         return 0.0
@@ -181,12 +181,12 @@ def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
     stretch = 0.0
     height = 0.0
     for j in range(count):
-        more = max(distance_of(place, j) - element, 0.0)
+        more = max(_element_distance(place, j) - element, 0.0)
         stretch += more * more
     for j in range(1, count):
         height += place[2, j] - row[EXIT_Z]
     last = row[REST] + row[BEHIND]
-    more = max(strain_at_exit(row, distance_of(place, count)), 0.0) * last
+    more = max(_strain_at_exit(row, _element_distance(place, count)), 0.0) * last
     strain = 0.5 * stiffness * (stretch / element + more * more / last)
     above = element * height + 0.5 * (element + row[REST]) * (place[2, count] - row[EXIT_Z])
     return strain, row[DENSITY] * row[GRAVITY] * above
@@ -198,8 +198,8 @@ def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array
 
     The energies of `kinetic` and `potential` change by -H times the rate.
     """
-    distance = distance_of(place, count)
-    strain = max(strain_at_exit(row, distance), 0.0)
+    distance = _element_distance(place, count)
+    strain = max(_strain_at_exit(row, distance), 0.0)
     elastic = row[STIFFNESS] * strain
     viscous = pulls[count] * distance - elastic
     density = row[DENSITY]
@@ -233,15 +233,15 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 
 
 @kernel
-def give_birth(place: Array, speed: Array, count: int, row: Array) -> None:
+def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
     """Put a node on the element at the frame, one element from its end; count is then one more, rest less.
 
     Tension, mass and momentum stay, the frame's half element included; without cable behind the exit place and speed
     are linear along the element, and the center of mass stays too.
     """
     rest, rate = row[REST], row[RATE]
-    distance, left = distance_of(place, count), rest - row[ELEMENT]
-    share = 1.0 - row[ELEMENT] * (1.0 + strain_at_exit(row, distance)) / (distance + TINY)
+    distance, left = _element_distance(place, count), rest - row[ELEMENT]
+    share = 1.0 - row[ELEMENT] * (1.0 + _strain_at_exit(row, distance)) / (distance + TINY)
     share = min(max(share, 0.0), 1.0)
     for c in range(3):
         exit_place, exit_speed = place[c, count + 1], speed[c, count + 1]
@@ -253,7 +253,7 @@ def give_birth(place: Array, speed: Array, count: int, row: Array) -> None:
 
 
 @kernel
-def merge(place: Array, speed: Array, count: int, row: Array) -> None:
+def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
     """Join the element at the frame with its neighbor: the node between them goes; count is then one less, rest more.
 
     Its momentum goes to the next, less what the frame's half element takes with it at the velocity of what enters.
@@ -270,20 +270,20 @@ def merge(place: Array, speed: Array, count: int, row: Array) -> None:
 
 
 @formula
-def blow_at(place: Array, j: int, k: int, drag: float, wind: Array) -> tuple[float, float, float]:
+def wind_on_element(place: Array, j: int, k: int, drag: float, wind: Array) -> tuple[float, float, float]:
     """Force of a wind across the line from node j to node k, of drag by the square of its speed [N]."""
     x, y, z = place[0, k] - place[0, j], place[1, k] - place[1, j], place[2, k] - place[2, j]
     along = (wind[0] * x + wind[1] * y + wind[2] * z) / (x * x + y * y + z * z + TINY)
-    return across(wind, along, x, y, z, drag)
+    return wind_across(wind, along, x, y, z, drag)
 
 
 @kernel
-def blow(place: Array, speed: Array, count: int, row: Array, wind: Array, h: float) -> float:
+def add_wind_on_nodes(place: Array, speed: Array, count: int, row: Array, wind: Array, h: float) -> float:
     """Change the nodes' velocities by a wind of h [s] across the cable; returns its work [J]."""
     work = 0.0
     for j in range(1, count + 1):
         length = row[ELEMENT] if j < count else 0.5 * (row[ELEMENT] + row[REST])
-        x, y, z = blow_at(place, j - 1, j + 1, length * row[WIND], wind)
+        x, y, z = wind_on_element(place, j - 1, j + 1, length * row[WIND], wind)
         share = h / (row[DENSITY] * length)
         along = x * (speed[0, j] + 0.5 * share * x) + y * (speed[1, j] + 0.5 * share * y)
         work += h * (along + z * (speed[2, j] + 0.5 * share * z))

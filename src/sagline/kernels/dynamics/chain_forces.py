@@ -14,7 +14,7 @@ from sagline.kernels.jit import glue, kernel
 
 
 @kernel
-def pull_platform(run: ChainRun) -> float:
+def fill_platform_force(run: ChainRun) -> float:
     """Fill what moves the platform and what the winches feel; returns the power that elements and air take [W]."""
     chains, drives, state, rows = run.chains, run.drives, run.state, run.rows
     ends = run.cables[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
@@ -31,15 +31,15 @@ def pull_platform(run: ChainRun) -> float:
         speed[0, 0] = state[VELOCITY] + (wy * z - wz * y)
         speed[1, 0] = state[VELOCITY + 1] + (wz * x - wx * z)
         speed[2, 0] = state[VELOCITY + 2] + (wx * y - wy * x)
-        c.enter(place, speed, n, row)
-        lost += c.pull(place, speed, n, row, chains.pulls[i])
+        c.fill_frame_node_velocity(place, speed, n, row)
+        lost += c.fill_element_forces(place, speed, n, row, chains.pulls[i])
         air = 0.5 * row[c.DENSITY] * row[c.ELEMENT] * row[c.AIR_RATE]
         px = chains.pulls[i, 0] * (place[0, 1] - place[0, 0]) - air * speed[0, 0]
         py = chains.pulls[i, 0] * (place[1, 1] - place[1, 0]) - air * speed[1, 0]
         pz = chains.pulls[i, 0] * (place[2, 1] - place[2, 0]) - air * speed[2, 0]
         lost += air * (speed[0, 0] ** 2 + speed[1, 0] ** 2 + speed[2, 0] ** 2)
         if run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0:
-            bx, by, bz = c.blow_at(place, 0, 1, 0.5 * row[c.ELEMENT] * row[c.WIND], run.wind)
+            bx, by, bz = c.wind_on_element(place, 0, 1, 0.5 * row[c.ELEMENT] * row[c.WIND], run.wind)
             px, py, pz = px + bx, py + by, pz + bz
             lost -= bx * speed[0, 0] + by * speed[1, 0] + bz * speed[2, 0]
         fx, fy, fz = fx + px, fy + py, fz + pz
@@ -58,7 +58,7 @@ def pull_platform(run: ChainRun) -> float:
 
 
 @glue
-def feed(run: ChainRun) -> float:
+def power_of_given_wrench(run: ChainRun) -> float:
     """Power of the given wrench at the present velocities [W]."""
     wx, wy, wz = spin(run.state, run.inertia)
     hx, hy, hz = turned(run.state, run.handle[0], run.handle[1], run.handle[2])
@@ -77,9 +77,9 @@ def kick_chains(run: ChainRun, h: float, begins: bool) -> None:
     for i in range(chains.counts.shape[0]):
         n, row, place, speed = chains.counts[i], chains.table[i], chains.place[i], chains.speed[i]
         if not begins:
-            c.kick(place, speed, n, row, chains.pulls[i], h)
-        audit[d.LOST] += c.brake(speed, n, row, h)
+            c.kick_nodes(place, speed, n, row, chains.pulls[i], h)
+        audit[d.LOST] += c.slow_by_air(speed, n, row, h)
         if blows:
-            audit[d.SUPPLIED] += c.blow(place, speed, n, row, run.wind, h)
+            audit[d.SUPPLIED] += c.add_wind_on_nodes(place, speed, n, row, run.wind, h)
         if begins:
-            c.kick(place, speed, n, row, chains.pulls[i], h)
+            c.kick_nodes(place, speed, n, row, chains.pulls[i], h)

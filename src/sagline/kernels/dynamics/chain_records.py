@@ -30,7 +30,7 @@ GROWTH = 0.5  # of what could have become motion: more than phases that err can 
 
 
 @glue
-def energy_of(run: ChainRun, i: int) -> tuple[float, float]:
+def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
     """Energy of a chain with that of its half element at the exit, and the latter alone [J]."""
     chains, n, row = run.chains, run.chains.counts[i], run.chains.table[i]
     strain, raised = c.potential(chains.place[i], n, row)
@@ -39,7 +39,7 @@ def energy_of(run: ChainRun, i: int) -> tuple[float, float]:
 
 
 @kernel
-def divide_anew(run: ChainRun, i: int) -> None:
+def change_node_count(run: ChainRun, i: int) -> None:
     """Give a chain one node more or less at the frame, and account for the energy that this takes."""
     chains, audit = run.chains, run.drives.audit
     row, place, speed, n = chains.table[i], chains.place[i], chains.speed[i], chains.counts[i]
@@ -47,22 +47,22 @@ def divide_anew(run: ChainRun, i: int) -> None:
     if n + more < FEWEST or n + more + 2 > place.shape[1]:
         run.at[FAILED], run.at[ENDED] = i + 1, (SHORT if more < 0 else LONG)
         return
-    before, entering_before = energy_of(run, i)
+    before, entering_before = _energy_of(run, i)
     if more > 0:
-        c.give_birth(place, speed, n, row)
+        c.insert_node(place, speed, n, row)
     else:
-        c.merge(place, speed, n, row)
+        c.merge_nodes(place, speed, n, row)
     chains.counts[i] = n + more
     row[c.REST] -= more * row[c.ELEMENT]
-    after, entering = energy_of(run, i)
+    after, entering = _energy_of(run, i)
     audit[d.LOST] += before - after
     audit[d.SUPPLIED] -= entering - entering_before  # that of the half element at the exit is the winch's
-    c.pull(place, speed, n + more, row, chains.pulls[i])
+    c.fill_element_forces(place, speed, n + more, row, chains.pulls[i])
     run.drives.now[d.WHOLE, i] = c.whole_force(place, speed, n + more, row, chains.pulls[i])
 
 
 @kernel
-def sample(place: Array, count: int, row: Array, points: Array) -> None:
+def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
     """Fill points (points, 3) of a chain at equal material steps, from the exit on."""
     element, rest = row[c.ELEMENT], row[c.REST]
     length = rest + count * element
@@ -76,7 +76,7 @@ def sample(place: Array, count: int, row: Array, points: Array) -> None:
 
 
 @kernel
-def record(run: ChainRun, records: Records, stock: Array) -> None:
+def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
     """Write down a step, and look whether energy has grown by itself."""
     states, tensions, lengths, energies, _notes, points = records
     state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[RECORDS]
@@ -114,5 +114,5 @@ def record(run: ChainRun, records: Records, stock: Array) -> None:
         energies[r, SUPPLIED], energies[r, LOST] = audit[d.SUPPLIED], audit[d.LOST]
         for i in range(chains.counts.shape[0]):
             tensions[r, i], lengths[r, i] = drives.now[d.AT_FRAME, i], run.rows[t.LENGTH, i]
-            sample(chains.place[i], chains.counts[i], chains.table[i], points[r, i])
+            _sample_points(chains.place[i], chains.counts[i], chains.table[i], points[r, i])
         at[RECORDS] += 1

@@ -10,7 +10,7 @@ from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.drives import Drives, keep_set_points
 from sagline.kernels.dynamics.progress import LENGTH_AT, WIND_AT, WRENCH_AT
-from sagline.kernels.dynamics.tables_in_time import Course, CourseArrays, follow
+from sagline.kernels.dynamics.tables_in_time import TimeTable, TimeTableArrays, interpolate_table
 from sagline.kernels.jit import glue, kernel
 
 ROOM = 21
@@ -18,13 +18,13 @@ ROOM = 21
 Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], share of a new reading in a load cell's filtered one
 Rules = tuple[int, int, int]  # kind of winches, remembered, loops' stride
 Body = tuple[Array, Array, Array, Array]  # cables, inertia, what of a wrench moves the body, where the given one acts
-Courses = tuple[CourseArrays, CourseArrays, CourseArrays]  # of lengths, wrenches, the wind
+Courses = tuple[TimeTableArrays, TimeTableArrays, TimeTableArrays]  # of lengths, wrenches, the wind
 Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
 ChainArrays = tuple[Array, Array, Array, Array, Indices]
 Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes, points
 
 
-class Chains(NamedTuple):
+class _Chains(NamedTuple):
     """The chains of m cables, with room for P nodes each.
 
     Attributes:
@@ -45,7 +45,7 @@ class Chains(NamedTuple):
 class ChainRun(NamedTuple):
     """State and arrays of a run, as in `chains.run_chains`."""
 
-    chains: Chains
+    chains: _Chains
     step: float
     gravity: float
     cables: Array
@@ -53,9 +53,9 @@ class ChainRun(NamedTuple):
     free: Array
     handle: Array
     drives: Drives
-    lengths: Course
-    wrenches: Course
-    winds: Course
+    lengths: TimeTable
+    wrenches: TimeTable
+    winds: TimeTable
     state: Array
     rows: Array
     at: Indices
@@ -68,7 +68,7 @@ class ChainRun(NamedTuple):
 
 
 @glue
-def run_of(
+def chain_run_of(
     rules: Rules, numbers: Numbers, body: Body, data: Array, courses: Courses, kept: Kept, chain_arrays: ChainArrays
 ) -> ChainRun:
     """State and arrays of a run from the arguments of `chains.run_chains`."""
@@ -77,7 +77,7 @@ def run_of(
     state, rows, now, layers, audit, at, room = kept
     wide = courses[0][1].shape[1]
     return ChainRun(
-        Chains(*chain_arrays),
+        _Chains(*chain_arrays),
         step,
         gravity,
         body[0],
@@ -85,9 +85,9 @@ def run_of(
         body[2],
         body[3],
         Drives(kind, remembered > 0, data, now, layers, audit),
-        Course(*courses[0]),
-        Course(*courses[1]),
-        Course(*courses[2]),
+        TimeTable(*courses[0]),
+        TimeTable(*courses[1]),
+        TimeTable(*courses[2]),
         state,
         rows,
         at,
@@ -101,7 +101,7 @@ def run_of(
 
 
 @glue
-def take_lengths(run: ChainRun) -> None:
+def _fill_last_elements(run: ChainRun) -> None:
     """Fill what is left of every length for the element at the frame, and the rates."""
     for i in range(run.chains.counts.shape[0]):
         row = run.chains.table[i]
@@ -110,11 +110,11 @@ def take_lengths(run: ChainRun) -> None:
 
 
 @kernel
-def follow_courses(run: ChainRun, now: float, shift: float) -> None:
+def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
     """Fill what is asked of the winches at a time, and what is given of wrench and wind."""
     at = run.at
-    at[LENGTH_AT] = follow(run.lengths, at[LENGTH_AT], now, shift, run.targets, run.target_rates)
-    at[WRENCH_AT] = follow(run.wrenches, at[WRENCH_AT], now, 0.0, run.given, run.spare)
-    at[WIND_AT] = follow(run.winds, at[WIND_AT], now, 0.0, run.wind, run.spare)
+    at[LENGTH_AT] = interpolate_table(run.lengths, at[LENGTH_AT], now, shift, run.targets, run.target_rates)
+    at[WRENCH_AT] = interpolate_table(run.wrenches, at[WRENCH_AT], now, 0.0, run.given, run.spare)
+    at[WIND_AT] = interpolate_table(run.winds, at[WIND_AT], now, 0.0, run.wind, run.spare)
     keep_set_points(run.drives, run.rows, run.targets, run.target_rates)
-    take_lengths(run)
+    _fill_last_elements(run)

@@ -10,8 +10,8 @@ from sagline.core.arrays import Array
 from sagline.kernels.cable import rows as t
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.chain_forces import feed, kick_chains, pull_platform
-from sagline.kernels.dynamics.chain_records import divide_anew, record
+from sagline.kernels.dynamics.chain_forces import fill_platform_force, kick_chains, power_of_given_wrench
+from sagline.kernels.dynamics.chain_records import change_node_count, record_chain_step
 from sagline.kernels.dynamics.chain_run import (
     Body,
     ChainArrays,
@@ -21,55 +21,55 @@ from sagline.kernels.dynamics.chain_run import (
     Numbers,
     Records,
     Rules,
-    follow_courses,
-    run_of,
+    chain_run_of,
+    follow_time_tables,
 )
 from sagline.kernels.dynamics.drives import (
-    account,
+    add_winch_energy,
     close_loops,
     filter_tensions,
     kick_winches,
-    remember,
+    store_step_start,
     turn_winches,
 )
-from sagline.kernels.dynamics.progress import FAILED, LENGTH_AT, READY, STEPS, has_room, note
-from sagline.kernels.dynamics.rigid_body import drift, free_turn, kick
-from sagline.kernels.dynamics.tables_in_time import MOMENT, ends
+from sagline.kernels.dynamics.progress import FAILED, LENGTH_AT, READY, STEPS, has_room, note_events
+from sagline.kernels.dynamics.rigid_body import drift_body, free_turn, kick_body
+from sagline.kernels.dynamics.tables_in_time import MOMENT, interval_ends
 from sagline.kernels.jit import entry, glue
 
 
 @glue
-def split_step(run: ChainRun, now: float) -> None:
+def _split_step(run: ChainRun, now: float) -> None:
     """One step from a time on; forces at hand before and after are those of the state."""
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
-    drives.audit[d.SUPPLIED] += half * feed(run)
-    kick(run.state, run.inertia, run.force, half)
+    drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
+    kick_body(run.state, run.inertia, run.force, half)
     kick_chains(run, half, True)
     kick_winches(drives, rows, run.targets, half, True)
-    remember(drives, rows)
-    drift(run.state, h)
+    store_step_start(drives, rows)
+    drift_body(run.state, h)
     free_turn(run.state, run.inertia, h)
     turn_winches(drives, run.cables, rows, run.gravity, h)
-    follow_courses(run, now + h, -MOMENT * h)
+    follow_time_tables(run, now + h, -MOMENT * h)
     for i in range(rows.shape[1]):
         row = chains.table[i]
         before = row[c.REST] + (drives.now[d.BEFORE, i] - rows[t.LENGTH, i])
-        c.drift(chains.place[i], chains.speed[i], chains.counts[i], row, before, h)
-    drives.audit[d.LOST] += h * pull_platform(run)
-    account(drives, run.cables, rows, h)
-    kick(run.state, run.inertia, run.force, half)
+        c.drift_nodes(chains.place[i], chains.speed[i], chains.counts[i], row, before, h)
+    drives.audit[d.LOST] += h * fill_platform_force(run)
+    add_winch_energy(drives, run.cables, rows, h)
+    kick_body(run.state, run.inertia, run.force, half)
     kick_chains(run, half, False)
     kick_winches(drives, rows, run.targets, half, False)
-    drives.audit[d.SUPPLIED] += half * feed(run)
+    drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
 
 
 @glue
-def divide_where_needed(run: ChainRun) -> None:
+def _change_node_counts(run: ChainRun) -> None:
     """Give chains one node more or less whose element at the frame has become too long or too short."""
     for i in range(run.chains.counts.shape[0]):
         rest, element = run.chains.table[i, c.REST], run.chains.table[i, c.ELEMENT]
         if not c.LEAST * element < rest < c.MOST * element:
-            divide_anew(run, i)
+            change_node_count(run, i)
 
 
 @entry
@@ -108,30 +108,30 @@ def run_chains(
     """
     kind, _remembered, stride = rules
     step, gravity, filtering = numbers
-    run = run_of(rules, numbers, body, data, courses, kept, chain_arrays)
+    run = chain_run_of(rules, numbers, body, data, courses, kept, chain_arrays)
     drives, rows, at, audit = run.drives, run.rows, run.at, kept[4]
     if at[READY] == 0:
         at[READY] = 1
         begin = audit[d.BEGIN] + at[STEPS] * step
-        follow_courses(run, begin, MOMENT * step)
-        pull_platform(run)
-        note(drives, rows, run.cables, at, begin, gravity, records[4])
-        record(run, records, stock)
+        follow_time_tables(run, begin, MOMENT * step)
+        fill_platform_force(run)
+        note_events(drives, rows, run.cables, at, begin, gravity, records[4])
+        record_chain_step(run, records, stock)
     elif steps == 0:
-        record(run, records, stock)
+        record_chain_step(run, records, stock)
     for _ in range(steps):
         time = audit[d.BEGIN] + at[STEPS] * step
-        if ends(run.lengths, at[LENGTH_AT], time + MOMENT * step):
-            follow_courses(run, time, MOMENT * step)  # rates may jump here
-            pull_platform(run)
+        if interval_ends(run.lengths, at[LENGTH_AT], time + MOMENT * step):
+            follow_time_tables(run, time, MOMENT * step)  # rates may jump here
+            fill_platform_force(run)
         if kind == d.DRUMS and at[STEPS] % stride == 0:
             close_loops(drives, run.targets, run.target_rates, stride * step)
-        split_step(run, time)
+        _split_step(run, time)
         at[STEPS] += 1
         filter_tensions(drives, filtering)
-        divide_where_needed(run)
-        note(drives, rows, run.cables, at, audit[d.BEGIN] + at[STEPS] * step, gravity, records[4])
+        _change_node_counts(run)
+        note_events(drives, rows, run.cables, at, audit[d.BEGIN] + at[STEPS] * step, gravity, records[4])
         if at[STEPS] % every == 0:
-            record(run, records, stock)
+            record_chain_step(run, records, stock)
         if at[FAILED] > 0 or not has_room(at, records[4], rows.shape[1]):
             break

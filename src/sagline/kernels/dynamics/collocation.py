@@ -13,12 +13,12 @@ from sagline.kernels.dynamics.string import (
     BEHIND_Y,
     BEHIND_Z,
     String,
-    element,
-    ended,
+    element_length,
+    is_at_end,
     shortest_wave,
     string_at,
 )
-from sagline.kernels.dynamics.transfer import STAGES, Numbers, Wave, fill_flexibility, sum_of, transfer
+from sagline.kernels.dynamics.transfer import STAGES, Numbers, Wave, fill_flexibility, fill_integral, transfer
 from sagline.kernels.jit import entry, formula, glue, kernel
 
 # columns of a wave: angular frequency; its square; i omega c; factors of C across and along the cable
@@ -37,7 +37,7 @@ SINGULAR, TOO_MANY = -1, -2  # in place of a count
 
 
 @glue
-def move(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
+def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
     """Fill displacement and force at an element's end for a unit at its start, where f = k u: (d, d) each in moved."""
     for a in range(d):
         for b in range(d):
@@ -50,7 +50,7 @@ def move(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
 
 
 @glue
-def begin(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
+def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
     """The same of the first element, whose start moves by give (d, d) lost for a unit of force; give 0: it is held."""
     for a in range(d):
         for b in range(d):
@@ -60,11 +60,11 @@ def begin(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Num
                 force += phi[d + a, j] * lost * give[j, b]
             moved[a, b] = end
             moved[2 + a, b] = force
-    divide(moved, d, k)
+    _stiffness_from_transfer(moved, d, k)
 
 
 @formula
-def divide(moved: Numbers, d: int, k: Numbers) -> None:
+def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
     """Fill k = force end^-1, the two on top of each other in moved."""
     if d == 1:
         k[0, 0] = moved[2, 0] / moved[0, 0]
@@ -77,7 +77,7 @@ def divide(moved: Numbers, d: int, k: Numbers) -> None:
 
 
 @glue
-def negatives(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
+def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
     """Negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; SINGULAR where it is not clear of that.
 
     The determinant of moved is one or a little more at rest, and zero where the cable up to there has a node.
@@ -97,7 +97,7 @@ def negatives(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
 
 
 @glue
-def spring_negatives(phi: Numbers, d: int, give: Numbers) -> int:
+def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
     """The same of the pivot at a start that gives way along one direction: of 1/give + its k00."""
     if d == 1:
         return int(1.0 + (give[0, 0] * phi[0, 0] / phi[0, 1]).real < 0.0)
@@ -111,7 +111,7 @@ def spring_negatives(phi: Numbers, d: int, give: Numbers) -> int:
 
 
 @kernel
-def cable_at(
+def _cable_stiffness_at(
     string: String, wave: Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
 ) -> int:
     """Fill K(omega) - K(0) of a cable's platform end, (d, d); returns how many held frequencies lie below omega.
@@ -127,25 +127,25 @@ def cable_at(
         return TOO_MANY
     lost = wave.across if d == 1 else wave.along
     for number in range(MOST_ELEMENTS + 1):
-        size = element(string, start, omega, phase)
-        last = ended(string, start + size)
+        size = element_length(string, start, omega, phase)
+        last = is_at_end(string, start + size)
         # at rest the end moves by the sum of all C, for a unit of force
         fill_flexibility(string, Wave(wave.mu, 1.0, 1.0), start, size, d == 1, c)
-        sum_of(c, size, d, moved)
+        fill_integral(c, size, d, moved)
         for a in range(d):
             for b in range(d):
                 whole[a, b] = moved[a, b] + (give[a, b] if number == 0 else whole[a, b])
         fill_flexibility(string, wave, start, size, d == 1, c)
         transfer(c, wave.mu, size, d, system, phi)
         if number == 0:
-            count += spring_negatives(phi, d, give)
-            begin(phi, d, give, lost, k, moved)
+            count += _negative_spring_pivots(phi, d, give)
+            _first_transfer(phi, d, give, lost, k, moved)
         else:
-            move(phi, d, k, moved)
-            below = negatives(phi, d, 0.0 if last else CLEAR, moved)
+            _transfer_stiffness(phi, d, k, moved)
+            below = _negative_pivots(phi, d, 0.0 if last else CLEAR, moved)
             if below == SINGULAR:
                 return SINGULAR
-            divide(moved, d, k)
+            _stiffness_from_transfer(moved, d, k)
             count += below
         start += size
         if last:
@@ -153,7 +153,7 @@ def cable_at(
                 for b in range(d):
                     moved[a, b] = whole[a, b]
                     moved[2 + a, b] = 1.0 if a == b else 0.0
-            divide(moved, d, rest)
+            _stiffness_from_transfer(moved, d, rest)
             for a in range(d):
                 for b in range(d):
                     found[a, b] = k[a, b] - rest[a, b]
@@ -191,7 +191,7 @@ def dynamic_stiffnesses(
                     for mesh in range(MESHES):
                         other = Wave(wave.mu * (1.0 + ROUNDING * mesh), wave.across, wave.along)
                         shorter = phase * (1.0 - SHORTER * mesh)
-                        count = cable_at(string, other, omega, shorter, d, give, room, block)
+                        count = _cable_stiffness_at(string, other, omega, shorter, d, give, room, block)
                         if count != SINGULAR:
                             break
                     counts[p, f, i, 2 - d] = count

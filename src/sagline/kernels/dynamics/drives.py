@@ -74,7 +74,7 @@ class Drives(NamedTuple):
 
 
 @formula
-def kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
+def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
     """Change the rates of winches that lag: explicitly where a step begins, its adjoint where it ends."""
     for i in range(rows.shape[1]):
         omega, ratio = drives.data[BANDWIDTH, i], drives.data[RATIO, i]
@@ -88,7 +88,7 @@ def kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begin
 
 
 @formula
-def kick_drums(drives: Drives, time: float) -> None:
+def _kick_drums(drives: Drives, time: float) -> None:
     """Change the speeds of the drums by motor, cable and friction, which holds what it can."""
     for i in range(drives.now.shape[1]):
         inertia, before = drives.data[INERTIA, i], drives.now[SPEED, i]
@@ -107,7 +107,7 @@ def kick_drums(drives: Drives, time: float) -> None:
 
 
 @formula
-def take_stored(drives: Drives, cables: Array, time: float) -> None:
+def _fill_stored_strain(drives: Drives, cables: Array, time: float) -> None:
     """Fill the strain of the cable that the drums let out or take in during a step."""
     for i in range(cables.shape[0]):
         strain, lost = drives.data[WINDING_STRAIN, i], 0.0
@@ -126,7 +126,7 @@ def take_stored(drives: Drives, cables: Array, time: float) -> None:
 @formula
 def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
     """Let out or take in cable for a time, and account for what lies on the drums."""
-    take_stored(drives, cables, time)
+    _fill_stored_strain(drives, cables, time)
     for i in range(cables.shape[0]):
         step, strain = time * drives.now[SPEED, i], drives.now[STORED, i]
         rate = drives.now[SPEED, i] / (1.0 + strain)
@@ -139,7 +139,7 @@ def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time:
 
 
 @formula
-def slip(drives: Drives, cables: Array, time: float) -> None:
+def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
     """Account for the strain that changes where cable leaves its drum, after a step; its rate is still the step's."""
     for i in range(cables.shape[0]):
         stiffness = cables[i, tables.STIFFNESS]
@@ -190,16 +190,16 @@ def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -
 
 @glue
 def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Change the winches' speeds by forces of a time; see `kick_lagging`."""
+    """Change the winches' speeds by forces of a time; see `_kick_lagging`."""
     if drives.kind == DRUMS:
-        kick_drums(drives, time)
+        _kick_drums(drives, time)
     elif drives.kind == SECOND_ORDER:
-        kick_lagging(drives, rows, targets, time, begins)
+        _kick_lagging(drives, rows, targets, time, begins)
 
 
 @glue
-def remember(drives: Drives, rows: Array) -> None:
-    """Keep what `account` needs to know of a step's begin."""
+def store_step_start(drives: Drives, rows: Array) -> None:
+    """Keep what `add_winch_energy` needs to know of a step's begin."""
     for i in range(rows.shape[1]):
         drives.now[BEFORE, i] = rows[t.LENGTH, i]
         drives.now[BEFORE_WHOLE, i] = drives.now[WHOLE, i]
@@ -217,10 +217,10 @@ def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, tim
 
 
 @glue
-def account(drives: Drives, cables: Array, rows: Array, time: float) -> None:
+def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) -> None:
     """Add to the audit what winches did in a step."""
     if drives.kind == DRUMS:
-        slip(drives, cables, time)
+        _add_slip_energy(drives, cables, time)
     else:
         for i in range(rows.shape[1]):
             wound = rows[t.LENGTH, i] - drives.now[BEFORE, i]

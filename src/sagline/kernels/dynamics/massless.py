@@ -9,7 +9,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.dynamics.drives import Drives
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS
-from sagline.kernels.dynamics.tables_in_time import Course, CourseArrays
+from sagline.kernels.dynamics.tables_in_time import TimeTable, TimeTableArrays
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import block
 
@@ -21,7 +21,7 @@ ModelTerms = tuple[int, float, float, float, bool | None]  # with gravity; anyth
 Rules = tuple[int, int, int, int, int]  # integrator, kind of winches, remembered, what damps or loads, loops' stride
 Numbers = tuple[float, float, float, float]  # step [s], loss_time [s], air damping [N s/m^2], share of a new reading
 Robot = tuple[Array, Array, Array, Array]  # cables, body, inertia, freedom
-Courses = tuple[CourseArrays, CourseArrays, CourseArrays]  # of lengths, wrenches, the wind
+Courses = tuple[TimeTableArrays, TimeTableArrays, TimeTableArrays]  # of lengths, wrenches, the wind
 Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
 Records = tuple[Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes
 
@@ -38,9 +38,9 @@ class MasslessRun(NamedTuple):
     inertia: Array
     freedom: Array
     drives: Drives
-    lengths: Course
-    wrenches: Course
-    winds: Course
+    lengths: TimeTable
+    wrenches: TimeTable
+    winds: TimeTable
     state: Array
     rows: Array
     at: Indices
@@ -60,7 +60,7 @@ class MasslessRun(NamedTuple):
 
 
 @glue
-def run_of(
+def massless_run_of(
     model: ModelTerms, rules: Rules, numbers: Numbers, robot: Robot, data: Array, courses: Courses, kept: Kept
 ) -> MasslessRun:
     """State and arrays of a run from the arguments of `motion.run`."""
@@ -83,9 +83,9 @@ def run_of(
         inertia,
         freedom,
         Drives(kind, remembered > 0, data, now, layers, audit),
-        Course(*courses[0]),
-        Course(*courses[1]),
-        Course(*courses[2]),
+        TimeTable(*courses[0]),
+        TimeTable(*courses[1]),
+        TimeTable(*courses[2]),
         state,
         rows,
         at,
@@ -106,6 +106,6 @@ def run_of(
 
 
 @glue
-def weight_of(run: MasslessRun) -> float:
+def cable_gravity(run: MasslessRun) -> float:
     """Gravity where cables weigh, else 0 [m/s^2]."""
     return run.model.gravity if run.model.code == CATENARY else 0.0

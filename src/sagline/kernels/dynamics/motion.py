@@ -9,7 +9,7 @@ from __future__ import annotations
 from sagline.core.arrays import Array
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.drives import close_loops, filter_tensions
-from sagline.kernels.dynamics.forces import damp, evaluate, take_set_points
+from sagline.kernels.dynamics.forces import fill_damping, fill_forces, fill_set_points
 from sagline.kernels.dynamics.massless import (
     SPLITTING,
     Courses,
@@ -20,33 +20,33 @@ from sagline.kernels.dynamics.massless import (
     Records,
     Robot,
     Rules,
-    run_of,
-    weight_of,
+    cable_gravity,
+    massless_run_of,
 )
-from sagline.kernels.dynamics.progress import FAILED, LENGTH_AT, READY, RENEWED, STEPS, has_room, note
-from sagline.kernels.dynamics.records import record
+from sagline.kernels.dynamics.progress import FAILED, LENGTH_AT, READY, RENEWED, STEPS, has_room, note_events
+from sagline.kernels.dynamics.records import record_step
 from sagline.kernels.dynamics.runge_kutta import runge_kutta_step
-from sagline.kernels.dynamics.splitting import split_step
-from sagline.kernels.dynamics.tables_in_time import MOMENT, ends
+from sagline.kernels.dynamics.splitting import splitting_step
+from sagline.kernels.dynamics.tables_in_time import MOMENT, interval_ends
 from sagline.kernels.jit import entry, glue
 
 
 @glue
-def begin(run: MasslessRun, records: Records, room: Array) -> None:
+def _start_run(run: MasslessRun, records: Records, room: Array) -> None:
     """Look at where a run begins, or goes on after something happened to it."""
     at, now = run.at, run.drives.now
     time = run.drives.audit[d.BEGIN] + at[STEPS] * run.step
     at[READY] = 1
     for k in range(room.shape[0]):
         room[k] = 0.0
-    evaluate(run, time)
-    take_set_points(run, time, MOMENT * run.step)
-    damp(run)
+    fill_forces(run, time)
+    fill_set_points(run, time, MOMENT * run.step)
+    fill_damping(run)
     if at[STEPS] == 0:
         for i in range(now.shape[1]):
             now[d.FILTERED, i] = now[d.AT_FRAME, i]
-    note(run.drives, run.rows, run.cables, at, time, weight_of(run), records[4])
-    record(run, records)
+    note_events(run.drives, run.rows, run.cables, at, time, cable_gravity(run), records[4])
+    record_step(run, records)
 
 
 @entry
@@ -82,31 +82,33 @@ def run(
     """
     integrator, kind, _remembered, _work, stride = rules
     step, filtering = numbers[0], numbers[3]
-    moving = run_of(model, rules, numbers, robot, data, courses, kept)
+    moving = massless_run_of(model, rules, numbers, robot, data, courses, kept)
     drives, rows, at, audit = moving.drives, moving.rows, moving.at, kept[4]
     if at[READY] == 0:
-        begin(moving, records, kept[6])
+        _start_run(moving, records, kept[6])
     elif steps == 0:
-        record(moving, records)
+        record_step(moving, records)
     for _ in range(steps):
         time = audit[d.BEGIN] + at[STEPS] * step
-        if ends(moving.lengths, at[LENGTH_AT], time + MOMENT * step) or at[RENEWED] > 0:
+        if interval_ends(moving.lengths, at[LENGTH_AT], time + MOMENT * step) or at[RENEWED] > 0:
             at[RENEWED] = 0
-            take_set_points(moving, time, MOMENT * step)  # rates may jump here
+            fill_set_points(moving, time, MOMENT * step)  # rates may jump here
         if kind == d.DRUMS and at[STEPS] % stride == 0:
             close_loops(drives, moving.targets, moving.target_rates, stride * step)
         if integrator == SPLITTING:
-            split_step(moving, time)
+            splitting_step(moving, time)
         else:
             runge_kutta_step(moving, time)
         at[STEPS] += 1
         filter_tensions(drives, filtering)
-        note(drives, rows, moving.cables, at, audit[d.BEGIN] + at[STEPS] * step, weight_of(moving), records[4])
+        note_events(
+            drives, rows, moving.cables, at, audit[d.BEGIN] + at[STEPS] * step, cable_gravity(moving), records[4]
+        )
         if every > 0 and at[STEPS] % every == 0:
-            record(moving, records)
+            record_step(moving, records)
             if at[FAILED] > 0:
                 break
         if every > 0 and not has_room(at, records[4], rows.shape[1]):
             break
     if every == 0 and steps > 0:
-        record(moving, records)
+        record_step(moving, records)

@@ -25,7 +25,9 @@ ROUNDING = 1e-9  # of the sum of all parts of the energy, of chains of the weigh
 
 
 @kernel
-def note(drives: Drives, rows: Array, cables: Array, at: Indices, now: float, weight_of: float, notes: Array) -> None:
+def note_events(
+    drives: Drives, rows: Array, cables: Array, at: Indices, now: float, weight_of: float, notes: Array
+) -> None:
     """Keep the largest tensions, and note what begins: a cable that no longer pulls, a drive at its limit."""
     largest = 0.0
     for i in range(rows.shape[1]):

@@ -23,7 +23,7 @@ GROWTH = 0.1  # of all energy that moves: an integrator that invents or loses mo
 
 
 @kernel
-def record(run: MasslessRun, records: Records) -> None:
+def record_step(run: MasslessRun, records: Records) -> None:
     """Write down a step, and look whether energy has grown by itself."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at

@@ -24,7 +24,7 @@ Six = tuple[float, float, float, float, float, float]
 
 
 @formula
-def kick(state: Array, inertia: Array, wrench: Array, time: float) -> None:
+def kick_body(state: Array, inertia: Array, wrench: Array, time: float) -> None:
     """Change velocity and angular momentum by what a wrench (6,) does in a time [s]."""
     for k in range(3):
         state[VELOCITY + k] += time * wrench[k] / inertia[MASS]
@@ -32,14 +32,14 @@ def kick(state: Array, inertia: Array, wrench: Array, time: float) -> None:
 
 
 @formula
-def drift(state: Array, time: float) -> None:
+def drift_body(state: Array, time: float) -> None:
     """Move the center of mass on at its velocity."""
     for k in range(3):
         state[CENTER + k] += time * state[VELOCITY + k]
 
 
 @formula
-def into_body(state: Array, x: float, y: float, z: float) -> Triple:
+def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
     """A vector of the world in the body's axes."""
     qx, qy, qz, qw = -state[TURN], -state[TURN + 1], -state[TURN + 2], state[TURN + 3]
     tx, ty, tz = 2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)
@@ -47,7 +47,7 @@ def into_body(state: Array, x: float, y: float, z: float) -> Triple:
 
 
 @formula
-def turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
+def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
     """Turn about the first of three axes in cyclic order by share pa [rad].
 
     Takes the quaternion along them with its scalar, and the angular momentum along them; returns the quaternion, and
@@ -70,13 +70,13 @@ def turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc:
 def free_turn(state: Array, inertia: Array, time: float) -> None:
     """Turn the body for a time without any moment: exactly about one principal axis after the other, symmetrically."""
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
-    px, py, pz = into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
+    px, py, pz = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
     by_x, by_y = 0.5 * time / inertia[MOMENTS], 0.5 * time / inertia[MOMENTS + 1]
-    x, y, z, w, py, pz = turn_about(x, y, z, w, px, py, pz, by_x)
-    y, z, x, w, pz, px = turn_about(y, z, x, w, py, pz, px, by_y)
-    z, x, y, w, px, py = turn_about(z, x, y, w, pz, px, py, time / inertia[MOMENTS + 2])
-    y, z, x, w, pz, px = turn_about(y, z, x, w, py, pz, px, by_y)
-    x, y, z, w, py, pz = turn_about(x, y, z, w, px, py, pz, by_x)
+    x, y, z, w, py, pz = _turn_about(x, y, z, w, px, py, pz, by_x)
+    y, z, x, w, pz, px = _turn_about(y, z, x, w, py, pz, px, by_y)
+    z, x, y, w, px, py = _turn_about(z, x, y, w, pz, px, py, time / inertia[MOMENTS + 2])
+    y, z, x, w, pz, px = _turn_about(y, z, x, w, py, pz, px, by_y)
+    x, y, z, w, py, pz = _turn_about(x, y, z, w, px, py, pz, by_x)
     scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # rounding alone
     state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3] = x * scale, y * scale, z * scale, w * scale
 
@@ -84,14 +84,14 @@ def free_turn(state: Array, inertia: Array, time: float) -> None:
 @formula
 def spin(state: Array, inertia: Array) -> Triple:
     """Angular velocity in world axes [rad/s]."""
-    x, y, z = into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
+    x, y, z = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
     return turned(state, x / inertia[MOMENTS], y / inertia[MOMENTS + 1], z / inertia[MOMENTS + 2])
 
 
 @formula
 def kinetic_energy(state: Array, inertia: Array) -> float:
     """Of motion and rotation [J]."""
-    x, y, z = into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
+    x, y, z = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
     speed2 = 0.0
     for k in range(3):
         speed2 += state[VELOCITY + k] * state[VELOCITY + k]

@@ -6,7 +6,7 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels.cable import rows as t
-from sagline.kernels.cable.over_pulleys import fed
+from sagline.kernels.cable.over_pulleys import end_motion_per_length
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model, Terms, model_of
 from sagline.kernels.dynamics import string as s
@@ -34,7 +34,7 @@ def fill_routing_compliance(
         for i in range(strings.shape[1]):
             rows[t.WRAP, i], rows[t.LEAVING, i] = wraps[p, i], leaving[p, i]
             rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i] = math.sin(wraps[p, i]), math.cos(wraps[p, i])
-            x, z, gives = fed(model, cables, rows, i)
+            x, z, gives = end_motion_per_length(model, cables, rows, i)
             root = math.sqrt(gives)
             strings[p, i, s.BEHIND_X], strings[p, i, s.BEHIND_Z] = root * x, root * z
             # the whole plane turns about the swivel axis

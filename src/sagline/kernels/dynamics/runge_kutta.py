@@ -6,7 +6,7 @@ import math
 
 from sagline.kernels.cable import rows as t
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.forces import damp, evaluate
+from sagline.kernels.dynamics.forces import fill_damping, fill_forces
 from sagline.kernels.dynamics.massless import DAMPED, MasslessRun
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, TURN, rates_of
 from sagline.kernels.jit import glue
@@ -27,7 +27,7 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
     for stage in range(4):
         weight = 1.0 / 3.0 if stage == 1 or stage == 2 else 1.0 / 6.0
         ahead = 0.5 * h if stage < 2 else h
-        damp(run)
+        fill_damping(run)
         for k in range(6):
             run.before[k] = run.gradient[k] + (run.damping[k] if run.work & DAMPED else 0.0)
         rates_of(state, run.inertia, run.before, run.first)
@@ -56,7 +56,7 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
                 scale += state[TURN + k] * state[TURN + k]
             for k in range(4):
                 state[TURN + k] /= math.sqrt(scale)
-        evaluate(run, now + ahead)
+        fill_forces(run, now + ahead)
     drives.audit[d.SUPPLIED] += h * supplied
     drives.audit[d.LOST] += h * lost
-    damp(run)
+    fill_damping(run)

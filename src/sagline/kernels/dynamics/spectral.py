@@ -17,7 +17,7 @@ from sagline.kernels.dynamics.spectral_elements import (
     element_from,
     lagrange,
 )
-from sagline.kernels.dynamics.string import BEHIND_X, BEHIND_Y, BEHIND_Z, ended, string_at
+from sagline.kernels.dynamics.string import BEHIND_X, BEHIND_Y, BEHIND_Z, is_at_end, string_at
 from sagline.kernels.jit import entry, formula
 
 
@@ -30,13 +30,13 @@ def node_counts(strings: Array, omega: float, counts: Indices) -> None:
         for _ in range(100_000):
             part = element_from(string, omega, start, nodes)
             start, nodes = part.start + part.size, nodes + part.degree
-            if ended(string, start):
+            if is_at_end(string, start):
                 break
         counts[i] = nodes + 1
 
 
 @formula
-def carry(points: Array, count: int, carried: Array, still: Array) -> None:
+def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -> None:
     """Fill the shape at rest times the root of the mass, (nodes, 5): xx, xz, zx, zz, yy; and the whole mass, (4,)."""
     end = points[count - 1]
     determinant = end[2] * end[4] - end[3] * end[3]
@@ -58,7 +58,7 @@ def carry(points: Array, count: int, carried: Array, still: Array) -> None:
 
 
 @formula
-def hold(matrix: Array, unknown: int, stiffness: float) -> None:
+def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
     """Hold an unknown: it is left by itself, stiff."""
     for j in range(matrix.shape[0]):
         matrix[unknown, j] = matrix[j, unknown] = 0.0
@@ -66,7 +66,7 @@ def hold(matrix: Array, unknown: int, stiffness: float) -> None:
 
 
 @formula
-def scale(matrix: Array, points: Array, used: int, each: int) -> None:
+def _scale_by_masses(matrix: Array, points: Array, used: int, each: int) -> None:
     """Divide a stiffness by the roots of the masses of its unknowns, so many a node."""
     for i in range(used):
         first = 1.0 / math.sqrt(points[i // each, 1])
@@ -75,7 +75,7 @@ def scale(matrix: Array, points: Array, used: int, each: int) -> None:
 
 
 @formula
-def set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
+def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
     """Let the frame end move along the one direction in which it gives way, its first unknown; the second is idle."""
     x, z = strings[i, BEHIND_X], strings[i, BEHIND_Z]
     square = x * x + z * z
@@ -131,30 +131,30 @@ def spectral_matrices(
             add_sums(string, part, lobatto, points[i])
             add_element(string, part, lobatto, plane[i], normal[i])
             start, first = part.start + part.size, first + part.degree
-            if ended(string, start):
+            if is_at_end(string, start):
                 break
         count = first + 1
-        set_frame_end(strings, i, count, plane[i])
+        _set_frame_end(strings, i, count, plane[i])
         if strings[i, BEHIND_Y] > 0.0:
             normal[i, 0, 0] += 1.0 / strings[i, BEHIND_Y]
-        scale(plane[i], points[i], 2 * count, 2)
-        scale(normal[i], points[i], count, 1)
+        _scale_by_masses(plane[i], points[i], 2 * count, 2)
+        _scale_by_masses(normal[i], points[i], count, 1)
         gives = x * x + z * z > 0.0
-        carry(points[i], count, carried[i], still[i])
+        _fill_rest_shapes(points[i], count, carried[i], still[i])
         if gives:  # the one direction in which the first node moves is its first unknown
             root = math.sqrt(x * x + z * z)
             for k in range(2):
                 carried[i, 0, k] = (x * carried[i, 0, k] + z * carried[i, 0, 2 + k]) / root
                 carried[i, 0, 2 + k] = 0.0
         else:
-            hold(plane[i], 0, stiff)
-        hold(plane[i], 1, stiff)
+            _constrain_unknown(plane[i], 0, stiff)
+        _constrain_unknown(plane[i], 1, stiff)
         if not strings[i, BEHIND_Y] > 0.0:
-            hold(normal[i], 0, stiff)
+            _constrain_unknown(normal[i], 0, stiff)
         for unknown in range(2 * count - 2, plane.shape[1]):
-            hold(plane[i], unknown, stiff)
+            _constrain_unknown(plane[i], unknown, stiff)
         for unknown in range(count - 1, normal.shape[1]):
-            hold(normal[i], unknown, stiff)
+            _constrain_unknown(normal[i], unknown, stiff)
         for q in range(count, points.shape[1]):
             points[i, q, 0] = math.nan
 
@@ -172,7 +172,7 @@ def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values:
             s = string.length * k / (count - 1)
             for _ in range(100_000):
                 end = part.start + part.size
-                if s <= end or ended(string, end):
+                if s <= end or is_at_end(string, end):
                     break
                 part = element_from(string, omega, end, part.first + part.degree)
             place = min(max(2.0 * (s - part.start) / part.size - 1.0, -1.0), 1.0)
@@ -194,7 +194,7 @@ def stretch_matrices(strings: Array, omega: float, rule: Rule, points: Array, ma
             part = element_from(string, omega, start, first)
             add_stretch(string, part, lobatto, matrix)
             start, first = part.start + part.size, first + part.degree
-            if ended(string, start):
+            if is_at_end(string, start):
                 break
-        set_frame_end(strings, i, first + 1, matrix)
-        scale(matrix, points[i], 2 * first + 2, 2)
+        _set_frame_end(strings, i, first + 1, matrix)
+        _scale_by_masses(matrix, points[i], 2 * first + 2, 2)

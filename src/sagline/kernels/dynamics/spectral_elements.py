@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.dynamics.string import String, element, slowness, vertical_at
+from sagline.kernels.dynamics.string import String, element_length, slowness, vertical_at
 from sagline.kernels.jit import formula, kernel
 
 LARGEST_DEGREE = 48
@@ -38,7 +38,7 @@ class Lobatto(NamedTuple):
     integrals: Array
 
 
-class Element(NamedTuple):
+class _Element(NamedTuple):
     """A part of a cable: where it begins and its length [m], its first node, and its degree."""
 
     start: float
@@ -48,18 +48,18 @@ class Element(NamedTuple):
 
 
 @formula
-def element_from(string: String, omega: float, start: float, first: int) -> Element:
+def element_from(string: String, omega: float, start: float, first: int) -> _Element:
     """The element that begins at a material point and a node."""
-    size = element(string, start, omega, MOST_PHASE)
+    size = element_length(string, start, omega, MOST_PHASE)
     vertical = vertical_at(string, start + 0.5 * size)
     force = math.sqrt(string.horizontal * string.horizontal + vertical * vertical)
     waves = omega * size * slowness(string, force) / math.pi
     degree = min(max(math.ceil(HALF_WAVE * waves + ALWAYS), LEAST_DEGREE), LARGEST_DEGREE)
-    return Element(start, size, first, degree)
+    return _Element(start, size, first, degree)
 
 
 @formula
-def resist(string: String, s: float) -> tuple[float, float, float, float, float, float, float]:
+def _element_flexibility(string: String, s: float) -> tuple[float, float, float, float, float, float, float]:
     """C^-1 and C at a material point: xx, xz, zz of each, and C normal to the plane."""
     vertical = vertical_at(string, s)
     square = string.horizontal * string.horizontal + vertical * vertical
@@ -72,7 +72,7 @@ def resist(string: String, s: float) -> tuple[float, float, float, float, float,
 
 
 @kernel
-def add_element(string: String, part: Element, lobatto: Lobatto, plane: Array, normal: Array) -> None:
+def add_element(string: String, part: _Element, lobatto: Lobatto, plane: Array, normal: Array) -> None:
     """Add the stiffness of an element: to plane with two unknowns a node, to normal with one."""
     n = part.degree + 1
     slopes = lobatto.slopes[part.degree]
@@ -80,7 +80,7 @@ def add_element(string: String, part: Element, lobatto: Lobatto, plane: Array, n
     for q in range(n):
         s = part.start + half * (1.0 + lobatto.nodes[part.degree, q])
         weight = lobatto.weights[part.degree, q] / half
-        xx, xz, zz, _, _, _, across = resist(string, s)
+        xx, xz, zz, _, _, _, across = _element_flexibility(string, s)
         xx, xz, zz, yy = xx * weight, xz * weight, zz * weight, weight / across
         row = slopes[q]
         for i in range(n):
@@ -97,7 +97,7 @@ def add_element(string: String, part: Element, lobatto: Lobatto, plane: Array, n
 
 
 @kernel
-def add_sums(string: String, part: Element, lobatto: Lobatto, points: Array) -> None:
+def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) -> None:
     """Fill of an element's nodes: s, the mass (added), and the integral of C from the frame end on."""
     n = part.degree + 1
     half = 0.5 * part.size
@@ -108,7 +108,7 @@ def add_sums(string: String, part: Element, lobatto: Lobatto, points: Array) -> 
         for k in range(4):
             points[at, 2 + k] = points[part.first, 2 + k]
     for i in range(n):
-        _, _, _, xx, xz, zz, yy = resist(string, points[part.first + i, 0])
+        _, _, _, xx, xz, zz, yy = _element_flexibility(string, points[part.first + i, 0])
         for q in range(1, n):
             share = half * lobatto.integrals[part.degree, q, i]
             row = points[part.first + q]
@@ -119,7 +119,7 @@ def add_sums(string: String, part: Element, lobatto: Lobatto, points: Array) -> 
 
 
 @kernel
-def add_stretch(string: String, part: Element, lobatto: Lobatto, plane: Array) -> None:
+def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) -> None:
     """Add that of one element."""
     n = part.degree + 1
     half = 0.5 * part.size

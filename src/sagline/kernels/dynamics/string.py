@@ -62,7 +62,7 @@ def vertical_at(string: String, s: float) -> float:
 
 
 @formula
-def least_force(string: String, start: float, end: float) -> float:
+def _least_force(string: String, start: float, end: float) -> float:
     """Least force between two material points [N]."""
     low, high = vertical_at(string, start), vertical_at(string, end)
     vertical = max(low, -high, 0.0)
@@ -84,24 +84,24 @@ def shortest_wave(string: String, omega: float) -> float:
 
 
 @formula
-def longest(string: String, start: float, end: float, omega: float, phase: float) -> float:
+def _longest_element(string: String, start: float, end: float, omega: float, phase: float) -> float:
     """Longest element [m] that an interval allows: C smooth, and at most so much phase of a transverse wave [rad]."""
-    force = least_force(string, start, end)
+    force = _least_force(string, start, end)
     return min(SMOOTH * force / (string.weight + TINY), phase / (omega * slowness(string, force) + TINY))
 
 
 @formula
-def ended(string: String, s: float) -> bool:
+def is_at_end(string: String, s: float) -> bool:
     """True if the sum of the elements' lengths equals the cable's but for rounding."""
     return s >= string.length * (1.0 - 1e-12)
 
 
 @formula
-def element(string: String, start: float, omega: float, phase: float) -> float:
+def element_length(string: String, start: float, omega: float, phase: float) -> float:
     """Length of the element that begins at a material point [m]."""
     size = string.length - start
     for _ in range(2000):
-        allowed = longest(string, start, start + size, omega, phase)
+        allowed = _longest_element(string, start, start + size, omega, phase)
         if size <= allowed:
             break
         size = max(allowed, 0.5 * size)

@@ -9,10 +9,10 @@ from sagline.kernels.jit import formula, glue
 
 MOMENT = 1e-6  # of a step: instants that are nearer are the same
 
-CourseArrays = tuple[Array, Array, Array, Array]  # a Course as it comes from Python
+TimeTableArrays = tuple[Array, Array, Array, Array]  # a Course as it comes from Python
 
 
-class Course(NamedTuple):
+class TimeTable(NamedTuple):
     """n numbers in time: a cubic on every interval, by its values and rates at both ends; held before and after.
 
     Attributes:
@@ -29,7 +29,7 @@ class Course(NamedTuple):
 
 
 @formula
-def follow(course: Course, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
+def interpolate_table(course: TimeTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
     """Fill values and rates (n,) at a time, from a course whose interval at or before it is known; returns that now.
 
     shift: a moment by which the interval is looked for earlier or later: at an instant of the course that before it is
@@ -58,6 +58,6 @@ def follow(course: Course, at: int, now: float, shift: float, value: Array, rate
 
 
 @glue
-def ends(course: Course, at: int, moment: float) -> bool:
+def interval_ends(course: TimeTable, at: int, moment: float) -> bool:
     """True if the current interval ends by a moment and another follows."""
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]

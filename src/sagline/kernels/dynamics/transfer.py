@@ -59,7 +59,7 @@ def fill_flexibility(string: String, wave: Wave, start: float, size: float, norm
 
 
 @glue
-def sum_of(c: Numbers, size: float, d: int, phi: Numbers) -> None:
+def fill_integral(c: Numbers, size: float, d: int, phi: Numbers) -> None:
     """Fill the integral of C over an element, (d, d)."""
     for a in range(d):
         for b in range(d):
@@ -70,7 +70,7 @@ def sum_of(c: Numbers, size: float, d: int, phi: Numbers) -> None:
 
 
 @glue
-def fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> None:
+def _fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> None:
     """Fill the equations of u at the stages, (STAGES d, STAGES d), and right of them their sides for u, f at 0."""
     scale = size * size * mu
     n = STAGES * d
@@ -93,7 +93,7 @@ def fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> No
 
 
 @glue
-def eliminate(system: Numbers, n: int, columns: int) -> None:
+def _solve_in_place(system: Numbers, n: int, columns: int) -> None:
     """Solve n equations for the columns that follow them, in their place."""
     for k in range(n):
         best = k
@@ -123,8 +123,8 @@ def eliminate(system: Numbers, n: int, columns: int) -> None:
 def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Numbers) -> None:
     """Fill the transfer matrix (2 d, 2 d) of an element: u, f at its end by u, f at its start."""
     n = STAGES * d
-    fill_stages(c, mu, size, d, system)
-    eliminate(system, n, n + 2 * d)
+    _fill_stages(c, mu, size, d, system)
+    _solve_in_place(system, n, n + 2 * d)
     for column in range(2 * d):
         for a in range(d):
             phi[a, column] = 1.0 if a == column else 0.0

@@ -9,7 +9,7 @@ from sagline.kernels.jit import formula
 
 
 @formula
-def across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
+def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
     """Force of a wind (3,) across a line [N].
 
     Args:

@@ -22,7 +22,7 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
         stiffness: EA [N].
     """
     lost = 0.0
-    first, last = bin_of(layer, place - step), bin_of(layer, place)
+    first, last = _bin_of(layer, place - step), _bin_of(layer, place)
     for k in range(first, last + 1):
         begin = max(place - step, k * BIN) if k > first else place - step
         middle = min(place, (k + 1) * BIN) if k < last else place
@@ -47,7 +47,7 @@ def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[
         step: How much more [m], > 0.
         stiffness: EA [N].
     """
-    first, last = bin_of(layer, place), bin_of(layer, place + step)
+    first, last = _bin_of(layer, place), _bin_of(layer, place + step)
     if first == last:
         return layer[first], 0.0
     length, strained, squares = 0.0, 0.0, 0.0
@@ -61,6 +61,6 @@ def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[
 
 
 @formula
-def bin_of(layer: Array, place: float) -> int:
+def _bin_of(layer: Array, place: float) -> int:
     """The bin of a place [m] along the cable."""
     return min(max(int(place / BIN), 0), layer.shape[0] - 1)

@@ -10,8 +10,8 @@ from sagline.core.arrays import Array
 from sagline.kernels.algebra.trust_step import trust_step
 from sagline.kernels.balance.freedom import components_along, norm, symmetric_part
 from sagline.kernels.forward.newton import BALANCED, NEAR
-from sagline.kernels.forward.platform import platform_energy, platform_stiffness, take_step, unbalance
-from sagline.kernels.forward.problem import Problem, Space, copy_pose
+from sagline.kernels.forward.platform import platform_energy, platform_stiffness, step_pose, unbalance
+from sagline.kernels.forward.problem import ForwardArrays, PoseProblem, copy_pose
 from sagline.kernels.jit import glue
 
 DESCENT_STEPS = 150
@@ -21,7 +21,7 @@ NOISE = 4e-15  # of the sum of an energy's parts: what rounding leaves of it
 
 
 @glue
-def descend(problem: Problem, pose: Array, space: Space, known: float) -> tuple[int, float]:
+def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: float) -> tuple[int, float]:
     """Move pose downhill until a full Newton step is short; a start in balance stays where it is, stable or not.
 
     known: the sum of tensions that `unbalance` gave at the pose, if space is still that of the pose with its stiffness
@@ -74,13 +74,13 @@ def descend(problem: Problem, pose: Array, space: Space, known: float) -> tuple[
             components_along(free, gradient, part)
         shift = trust_step(matrix, part, radius, space.factor, motion, step)
         length = norm(step)
-        promised = promised_gain(matrix, part, step)
-        take_step(free, body, pose, step, motion, trial)
+        promised = _promised_gain(matrix, part, step)
+        step_pose(free, body, pose, step, motion, trial)
     return steps, tensions
 
 
 @glue
-def promised_gain(matrix: Array, gradient: Array, step: Array) -> float:
+def _promised_gain(matrix: Array, gradient: Array, step: Array) -> float:
     """Decrease of the quadratic model of the energy along a step."""
     gain = 0.0
     for j in range(step.shape[0]):

@@ -20,22 +20,22 @@ from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at, straight
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_NO_TENSION, FORWARD_FITTED, FORWARD_NO_LENGTHS, FORWARD_NOT_CONVERGED, STRAIGHT
 from sagline.kernels.forward.newton import solve_step
-from sagline.kernels.forward.platform import add_force, take_step
+from sagline.kernels.forward.platform import add_force, step_pose
 from sagline.kernels.forward.problem import (
     ENERGY,
     ITERATIONS,
-    Chain,
-    ChainArrays,
-    Found,
-    FoundArrays,
-    Given,
-    GivenArrays,
-    Problem,
-    Space,
+    ForwardArrays,
+    LastEquilibrium,
+    LastEquilibriumArrays,
+    PoseProblem,
+    SampleArrays,
+    Samples,
+    SolutionArrays,
+    Solutions,
+    clear_solution,
     copy_pose,
-    leave_out,
+    new_forward_arrays,
     new_motions,
-    new_space,
     problem_at,
     row_of,
 )
@@ -49,24 +49,24 @@ NOTHING = 1e-13  # share of the cost whose gain ends a fit
 
 
 @formula
-def straight_length(cables: Array, rows: Array, i: int) -> float:
+def _straight_length(cables: Array, rows: Array, i: int) -> float:
     """Length of a straight cable that is not strained [m], with what is behind it."""
     return rows[g.CHORD, i] + straight_behind(pulley_at(cables, i), chord_at(rows, i))
 
 
 @kernel
-def misfit(cables: Array, body: Array, lengths: Array, pose: Array, rotation: Array, rows: Array) -> float:
+def _half_square_error(cables: Array, body: Array, lengths: Array, pose: Array, rotation: Array, rows: Array) -> float:
     """Half the sum of squared length errors [m^2] at a pose, whose geometry it fills."""
     cable_geometry(cables, body, pose, rotation, rows)
     total = 0.0
     for i in range(lengths.shape[0]):
-        error = straight_length(cables, rows, i) - lengths[i]
+        error = _straight_length(cables, rows, i) - lengths[i]
         total += 0.5 * error * error
     return total
 
 
 @glue
-def normal_equations(free: Array, cables: Array, lengths: Array, space: Space) -> None:
+def _normal_equations(free: Array, cables: Array, lengths: Array, space: ForwardArrays) -> None:
     """Fill matrix J^T J (n, n) and part J^T e (n,) of the length errors e along the free motions."""
     rows, matrix, part = space.rows, space.matrix, space.part
     full, row = space.gradient, space.step
@@ -80,7 +80,7 @@ def normal_equations(free: Array, cables: Array, lengths: Array, space: Space) -
             full[j] = 0.0
         add_force(rows, i, rows[g.COSINE, i], rows[g.SINE, i], full)
         components_along(free, full, row)
-        error = straight_length(cables, rows, i) - lengths[i]
+        error = _straight_length(cables, rows, i) - lengths[i]
         for j in range(n):
             part[j] += row[j] * error
             for k in range(n):
@@ -88,12 +88,12 @@ def normal_equations(free: Array, cables: Array, lengths: Array, space: Space) -
 
 
 @glue
-def fit_pose(problem: Problem, lengths: Array, pose: Array, space: Space) -> tuple[float, int, bool]:
+def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardArrays) -> tuple[float, int, bool]:
     """Move pose to a least-squares fit; returns half the sum of squares [m^2], steps tried, and whether it is a fit."""
     cables, body, free = problem.cables, problem.body, problem.free
     rotation, rows = space.rotation, space.rows
-    cost = misfit(cables, body, lengths, pose, rotation, rows)
-    normal_equations(free, cables, lengths, space)
+    cost = _half_square_error(cables, body, lengths, pose, rotation, rows)
+    _normal_equations(free, cables, lengths, space)
     largest = 0.0
     for j in range(space.part.shape[0]):
         largest = max(largest, space.matrix[j, j])
@@ -107,14 +107,14 @@ def fit_pose(problem: Problem, lengths: Array, pose: Array, space: Space) -> tup
         if length <= SMALL_STEP:
             steps, fitted = iteration, True
             break
-        take_step(free, body, pose, space.step, space.motion, space.trial)
-        new = misfit(cables, body, lengths, space.trial, rotation, rows)
+        step_pose(free, body, pose, space.step, space.motion, space.trial)
+        new = _half_square_error(cables, body, lengths, space.trial, rotation, rows)
         if new < cost:
             copy_pose(space.trial, pose)
             gain = cost - new
             cost = new
             damping = 0.1 * damping if damping > 1e-14 * largest else 0.0
-            normal_equations(free, cables, lengths, space)
+            _normal_equations(free, cables, lengths, space)
             fitted = gain <= NOTHING * cost
         else:
             fitted = length <= 1e-7  # squares of errors are rounded off at the root of the last digit
@@ -122,30 +122,30 @@ def fit_pose(problem: Problem, lengths: Array, pose: Array, space: Space) -> tup
         if fitted:
             steps = iteration + 1
             break
-    misfit(cables, body, lengths, pose, rotation, rows)
+    _half_square_error(cables, body, lengths, pose, rotation, rows)
     return cost, steps, fitted
 
 
 @entry
 def fit_poses(
-    chained: bool, given: GivenArrays, chain: ChainArrays, room: tuple[Array, Indices], found: FoundArrays
+    chained: bool, given: SampleArrays, chain: LastEquilibriumArrays, room: tuple[Array, Indices], found: SolutionArrays
 ) -> None:
     """Fit every sample in turn; arguments as of `forward_poses`. Forces are NaN, energy is half the sum of squares."""
-    batch, answer, kept = Given(*given), Found(*found), Chain(*chain)
+    batch, answer, kept = Samples(*given), Solutions(*found), LastEquilibrium(*chain)
     count, m = batch.lengths.shape
-    space, rest = new_space(Memory(*room), kept.rows, kept.factor)
+    space, rest = new_forward_arrays(Memory(*room), kept.rows, kept.factor)
     motions, rest = new_motions(rest, batch.freedom.shape[0])
     free, arcs, start, pose = motions
     copy_pose(batch.starts[0], start)
     for p in range(count):
-        leave_out(answer, p, FORWARD_NO_LENGTHS, CABLE_NO_TENSION)
+        clear_solution(answer, p, FORWARD_NO_LENGTHS, CABLE_NO_TENSION)
         if math.isnan(batch.lengths[p, 0]):
             continue
         if not chained:
             copy_pose(row_of(batch.starts, p), start)
         problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
         copy_pose(start, pose)
-        answer.numbers[p, ENERGY], answer.numbers[p, ITERATIONS], fitted = fit_pose(
+        answer.numbers[p, ENERGY], answer.numbers[p, ITERATIONS], fitted = _fit_pose(
             problem, batch.lengths[p], pose, space
         )
         answer.pose_statuses[p] = FORWARD_FITTED if fitted else FORWARD_NOT_CONVERGED

@@ -11,7 +11,7 @@ from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
-from sagline.kernels.balance.freedom import components_along, symmetric_part, turns
+from sagline.kernels.balance.freedom import components_along, is_rotation, symmetric_part
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import behind_at
@@ -28,7 +28,7 @@ from sagline.kernels.codes import (
     FORWARD_UNSTABLE,
 )
 from sagline.kernels.forward.descent import descend
-from sagline.kernels.forward.newton import BALANCED, approach, polish, predict
+from sagline.kernels.forward.newton import BALANCED, newton_from, polish, predict
 from sagline.kernels.forward.platform import platform_energy, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import (
     ENERGY,
@@ -37,19 +37,19 @@ from sagline.kernels.forward.problem import (
     LAST_WRENCH,
     MOMENT_RESIDUAL,
     STIFFNESS_MIN,
-    Chain,
-    ChainArrays,
+    ForwardArrays,
     ForwardTerms,
-    Found,
-    FoundArrays,
-    Given,
-    GivenArrays,
-    Problem,
-    Space,
+    LastEquilibrium,
+    LastEquilibriumArrays,
+    PoseProblem,
+    SampleArrays,
+    Samples,
+    SolutionArrays,
+    Solutions,
+    clear_solution,
     copy_pose,
-    leave_out,
+    new_forward_arrays,
     new_motions,
-    new_space,
     problem_at,
     row_of,
 )
@@ -62,7 +62,7 @@ PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # ways to the equilibrium, the later
 
 
 @glue
-def stability(low: float, high: float) -> int:
+def _stability(low: float, high: float) -> int:
     """Stability of an equilibrium from its extreme stiffnesses."""
     if low < -FLAT * high:
         return FORWARD_UNSTABLE
@@ -70,7 +70,7 @@ def stability(low: float, high: float) -> int:
 
 
 @glue
-def hold(model: Model, cables: Array, rows: Array, needed: int) -> int:
+def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> int:
     """Way in which the cables hold a stable platform; needed: number of taut cables required."""
     taut = 0
     strain = 0.0
@@ -85,7 +85,7 @@ def hold(model: Model, cables: Array, rows: Array, needed: int) -> int:
 
 
 @glue
-def fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
+def _fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the free motions."""
     force = 0.0
     moment = 0.0
@@ -93,7 +93,7 @@ def fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
         total = 0.0
         for a in range(6):
             total += freedom[j, a] * gradient[a]
-        if turns(freedom, j):
+        if is_rotation(freedom, j):
             moment += total * total
         else:
             force += total * total
@@ -102,8 +102,14 @@ def fill_residuals(freedom: Array, gradient: Array, numbers: Array) -> None:
 
 
 @glue
-def find_pose(
-    problem: Problem, exact: Model, lengths: Array, start: Array, chain: Chain, space: Space, pose: Array
+def _find_pose(
+    problem: PoseProblem,
+    exact: Model,
+    lengths: Array,
+    start: Array,
+    chain: LastEquilibrium,
+    space: ForwardArrays,
+    pose: Array,
 ) -> tuple[int, float]:
     """Fill the equilibrium, by the first way that is beyond doubt; returns steps, and the sum of tensions there.
 
@@ -118,13 +124,13 @@ def find_pose(
         if way != PREDICTION:
             copy_pose(start, pose)
         if way != DOWNHILL:
-            steps, size = approach(problem, pose, space)
+            steps, size = newton_from(problem, pose, space)
             known = size if steps == 0 and way == FROM_START and model.code == exact.code else 0.0
             if steps <= 0:
                 continue
             platform_stiffness(model, cables, space.rows, space.stiffness)
         else:
-            downhill = Problem(exact, free, cables, body, wrench, problem.unit)
+            downhill = PoseProblem(exact, free, cables, body, wrench, problem.unit)
             steps, size = descend(downhill, pose, space, known)
             if size == 0.0 or model.code != exact.code:
                 size = unbalance(model, cables, body, wrench, pose, space.rotation, space.rows, space.gradient)
@@ -139,23 +145,25 @@ def find_pose(
 
 
 @glue
-def describe(problem: Problem, pose: Array, arcs: Array, size: float, space: Space, numbers: Array) -> int:
+def _fill_stability(
+    problem: PoseProblem, pose: Array, arcs: Array, size: float, space: ForwardArrays, numbers: Array
+) -> int:
     """Fill the numbers of the pose that space holds, but for residuals and steps; returns the status."""
     model, cables, body = problem.model, problem.cables, problem.body
     numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
     symmetric_part(arcs, space.stiffness, space.matrix)
     low, high = extreme_eigenvalues(space.matrix, space.part, space.step, space.motion, FLAT)
     numbers[STIFFNESS_MIN] = low
-    status = stability(low, high)
+    status = _stability(low, high)
     if not components_along(problem.free, space.gradient, space.part) <= BALANCED * size * problem.unit:
         status = FORWARD_NOT_CONVERGED
     elif status == FORWARD_SOLVED:
-        status = hold(model, cables, space.rows, arcs.shape[0])
+        status = _support_status(model, cables, space.rows, arcs.shape[0])
     return status
 
 
 @glue
-def remember(chain: Chain, pose: Array, wrench: Array) -> None:
+def _store_chain(chain: LastEquilibrium, pose: Array, wrench: Array) -> None:
     """Keep a pose as the last equilibrium, if its stiffness was factored."""
     if not math.isnan(chain.factor[0, 0]):
         copy_pose(pose, chain.last)
@@ -164,7 +172,7 @@ def remember(chain: Chain, pose: Array, wrench: Array) -> None:
 
 
 @glue
-def store(problem: Problem, rows: Array, p: int, results: Array, statuses: Codes) -> None:
+def _store_sample(problem: PoseProblem, rows: Array, p: int, results: Array, statuses: Codes) -> None:
     """Write one sample's cables."""
     for i in range(rows.shape[1]):
         statuses[p, i] = int(rows[t.STATUS, i])
@@ -188,10 +196,10 @@ def store(problem: Problem, rows: Array, p: int, results: Array, statuses: Codes
 def forward_poses(
     model: ForwardTerms,
     chained: bool,
-    given: GivenArrays,
-    chain: ChainArrays,
+    given: SampleArrays,
+    chain: LastEquilibriumArrays,
     room: tuple[Array, Indices],
-    found: FoundArrays,
+    found: SolutionArrays,
 ) -> None:
     """Solve every sample in turn.
 
@@ -199,21 +207,21 @@ def forward_poses(
         model: Cable model and the empirical one's constants; the shallow ones go downhill as exact cables and are
             polished as what they are. Whether anything may be behind the cables: True, or None for never.
         chained: Whether each sample starts where the last solved one ended, the first at starts[0].
-        given: `Given`.
-        chain: `Chain`; a chain of samples continues from it where it starts at the remembered pose.
+        given: `Samples`.
+        chain: `LastEquilibrium`; a chain of samples continues from it where it starts at the remembered pose.
         room: `memory_for` as many cables.
-        found: `Found`, filled.
+        found: `Solutions`, filled.
     """
-    batch, answer, kept = Given(*given), Found(*found), Chain(*chain)
+    batch, answer, kept = Samples(*given), Solutions(*found), LastEquilibrium(*chain)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
-    space, rest = new_space(Memory(*room), kept.rows, kept.factor)
+    space, rest = new_forward_arrays(Memory(*room), kept.rows, kept.factor)
     motions, rest = new_motions(rest, batch.freedom.shape[0])
     free, arcs, start, pose = motions
     copy_pose(batch.starts[0], start)
     for p in range(count):
         if math.isnan(batch.lengths[p, 0]):
-            leave_out(answer, p, FORWARD_NO_LENGTHS, 0)
+            clear_solution(answer, p, FORWARD_NO_LENGTHS, 0)
             continue
         if not chained:  # an answer must not depend on the sample before
             copy_pose(row_of(batch.starts, p), start)
@@ -222,14 +230,14 @@ def forward_poses(
                 kept.rows[t.PARAMETER, i] = math.nan
         problem = problem_at(Model(code, k_h, k_p, 0.0, behind), batch, p, free, arcs)
         exact = Model(ELASTIC if code == ELASTIC else CATENARY, 0.0, 0.0, problem.model.gravity, behind)
-        steps, size = find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
-        status = describe(problem, pose, arcs, size, space, answer.numbers[p])
-        fill_residuals(batch.freedom, space.gradient, answer.numbers[p])
+        steps, size = _find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
+        status = _fill_stability(problem, pose, arcs, size, space, answer.numbers[p])
+        _fill_residuals(batch.freedom, space.gradient, answer.numbers[p])
         answer.numbers[p, ITERATIONS] = steps
         answer.pose_statuses[p] = status
         copy_pose(pose, answer.poses[p])
-        store(problem, kept.rows, p, answer.results, answer.statuses)
+        _store_sample(problem, kept.rows, p, answer.results, answer.statuses)
         kept.last[0] = math.nan
         if status != FORWARD_NOT_CONVERGED:
             copy_pose(pose, start)
-            remember(kept, pose, problem.wrench)
+            _store_chain(kept, pose, problem.wrench)

@@ -17,13 +17,13 @@ from sagline.kernels.algebra.elimination import solve_general
 from sagline.kernels.balance.freedom import components_along, matrix_along, norm, symmetric_part
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
-from sagline.kernels.cable.over_pulleys import fed, material_at
-from sagline.kernels.cable.slopes import Pair, force_by_length, gives_way
+from sagline.kernels.cable.over_pulleys import end_motion_per_length, material_at
+from sagline.kernels.cable.slopes import Pair, force_by_length, force_change
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY, ELASTIC
-from sagline.kernels.forward.platform import add_force, platform_stiffness, take_step, unbalance
-from sagline.kernels.forward.problem import LAST_WRENCH, Problem, Space, copy_pose
+from sagline.kernels.forward.platform import add_force, platform_stiffness, step_pose, unbalance
+from sagline.kernels.forward.problem import LAST_WRENCH, ForwardArrays, PoseProblem, copy_pose
 from sagline.kernels.jit import glue, kernel
 
 POLISH_STEPS = 30
@@ -38,13 +38,13 @@ LAST_DIGIT = 1e-15  # a step that rounding hides
 
 
 @glue
-def add_wound(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
+def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
     """Add to a wrench (6,) what new lengths (m,) do to the cables' forces, to first order."""
     for i in range(cables.shape[0]):
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
         if model.behind is not None:
-            x, z, _gives = fed(model, cables, rows, i)
-            slope = gives_way(plane_of(rows, i), Pair(x, z))
+            x, z, _gives = end_motion_per_length(model, cables, rows, i)
+            slope = force_change(plane_of(rows, i), Pair(x, z))
         else:
             material, force = material_at(cables, i), force_of(rows, i)
             slope = force_by_length(model, span, rise, material, length, force, plane_of(rows, i))
@@ -63,7 +63,7 @@ def solve_step(factor: Array, part: Array, step: Array) -> float:
 
 
 @glue
-def predict(problem: Problem, lengths: Array, start: Array, last: Array, space: Space, pose: Array) -> bool:
+def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, space: ForwardArrays, pose: Array) -> bool:
     """Fill the first-order answer to new lengths and wrench; False without a memory of an equilibrium at the start.
 
     The rows know the new lengths afterwards.
@@ -74,18 +74,18 @@ def predict(problem: Problem, lengths: Array, start: Array, last: Array, space: 
     if known:
         for k in range(6):
             space.gradient[k] = last[LAST_WRENCH + k] - problem.wrench[k]
-        add_wound(problem.model, problem.cables, lengths, space.rows, space.gradient)
+        _add_length_change(problem.model, problem.cables, lengths, space.rows, space.gradient)
         components_along(problem.free, space.gradient, space.part)
         known = solve_step(space.factor, space.part, space.step) <= PREDICTED
     if known:
-        take_step(problem.free, problem.body, start, space.step, space.motion, pose)
+        step_pose(problem.free, problem.body, start, space.step, space.motion, pose)
     for i in range(lengths.shape[0]):
         space.rows[t.LENGTH, i] = lengths[i]
     return known
 
 
 @glue
-def approach(problem: Problem, pose: Array, space: Space) -> tuple[int, float]:
+def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tuple[int, float]:
     """Full Newton steps from near by the symmetric stiffness; returns how many, and the sum of tensions at the pose.
 
     0 steps where that is in doubt: the stiffness is not positive definite, or the first step is not short; the pose has
@@ -126,13 +126,15 @@ def approach(problem: Problem, pose: Array, space: Space) -> tuple[int, float]:
         last = length * length <= LAST_DIGIT * before  # each step is a share of the one before, as that was
         before = length
         age += length
-        take_step(free, body, pose, step, space.motion, space.trial)
+        step_pose(free, body, pose, step, space.motion, space.trial)
         copy_pose(space.trial, pose)
     return steps, size
 
 
 @glue
-def improve(problem: Problem, pose: Array, space: Space, best: float, good: float) -> tuple[float, float]:
+def _newton_steps(
+    problem: PoseProblem, pose: Array, space: ForwardArrays, best: float, good: float
+) -> tuple[float, float]:
     """One Newton step on the wrench balance, shortened until the unbalance is below best; needs the stiffness.
 
     Returns the new unbalance and the length of the step; length 0 and an unchanged pose where no step is better.
@@ -155,7 +157,7 @@ def improve(problem: Problem, pose: Array, space: Space, best: float, good: floa
             else:
                 for j in range(step.shape[0]):
                     step[j] *= share
-                take_step(free, body, pose, step, space.motion, trial)
+                step_pose(free, body, pose, step, space.motion, trial)
             unbalance(model, cables, body, wrench, trial, space.rotation, space.rows, space.gradient)
             new = components_along(free, space.gradient, part)
             better = new < best and not last
@@ -168,7 +170,7 @@ def improve(problem: Problem, pose: Array, space: Space, best: float, good: floa
 
 
 @glue
-def polish(problem: Problem, pose: Array, space: Space, good: float) -> int:
+def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
     """Newton on the wrench balance while it gets better, to the last digit; returns the number of steps.
 
     good: an unbalance that counts as none. Before and on return space is that of the pose; the stiffness may be that of
@@ -179,7 +181,7 @@ def polish(problem: Problem, pose: Array, space: Space, good: float) -> int:
     steps = POLISH_STEPS
     for iteration in range(POLISH_STEPS):
         platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
-        best, length = improve(problem, pose, space, best, good)
+        best, length = _newton_steps(problem, pose, space, best, good)
         # each step is as long as the error before it: the next would be about length^3/before^2
         if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
             steps = iteration + 1

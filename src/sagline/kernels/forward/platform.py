@@ -10,7 +10,7 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import spread
+from sagline.kernels.balance.freedom import motion_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.energy import energy_of_cables
@@ -95,7 +95,7 @@ def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
 
 
 @formula
-def add_row(target: Array, share: float, row: Six) -> None:
+def _add_row(target: Array, share: float, row: Six) -> None:
     """Add a share of six numbers to a row (6,)."""
     target[0] += share * row[0]
     target[1] += share * row[1]
@@ -122,15 +122,15 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
         by_x = (kxx, kxy, kxz, kxz * y - kxy * z, kxx * z - kxz * x, kxy * x - kxx * y)
         by_y = (kyx, kyy, kyz, kyz * y - kyy * z, kyx * z - kyz * x, kyy * x - kyx * y)
         by_z = (kzx, kzy, kzz, kzz * y - kzy * z, kzx * z - kzz * x, kzy * x - kzx * y)
-        add_row(stiffness[0], 1.0, by_x)
-        add_row(stiffness[1], 1.0, by_y)
-        add_row(stiffness[2], 1.0, by_z)
-        add_row(stiffness[3], y, by_z)
-        add_row(stiffness[3], -z, by_y)
-        add_row(stiffness[4], z, by_x)
-        add_row(stiffness[4], -x, by_z)
-        add_row(stiffness[5], x, by_y)
-        add_row(stiffness[5], -y, by_x)
+        _add_row(stiffness[0], 1.0, by_x)
+        _add_row(stiffness[1], 1.0, by_y)
+        _add_row(stiffness[2], 1.0, by_z)
+        _add_row(stiffness[3], y, by_z)
+        _add_row(stiffness[3], -z, by_y)
+        _add_row(stiffness[4], z, by_x)
+        _add_row(stiffness[4], -x, by_z)
+        _add_row(stiffness[5], x, by_y)
+        _add_row(stiffness[5], -y, by_x)
         # the force keeps its direction while r turns: r T^T - (r.T) 1
         tx = rows[t.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
         ty = rows[t.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
@@ -147,14 +147,14 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
 
 
 @kernel
-def take_step(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
+def step_pose(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
     """Fill the pose after a step (n,) along the free motions, and that step as a motion (6,)."""
-    spread(free, step, motion)
-    move(body, pose, motion, moved)
+    motion_along(free, step, motion)
+    moved_pose(body, pose, motion, moved)
 
 
 @formula
-def move(body: Array, pose: Array, motion: Array, moved: Array) -> None:
+def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
     """Fill the pose after a motion (6,): the center of mass displaced, the platform turned about it."""
     angle2 = motion[3] * motion[3] + motion[4] * motion[4] + motion[5] * motion[5]
     angle = math.sqrt(angle2)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.freedom import is_rotation
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
@@ -23,12 +23,12 @@ LAST_WRENCH = tables.POSE_COLUMNS
 LAST_COLUMNS = LAST_WRENCH + 6
 
 ForwardTerms = tuple[int, float, float, bool | None]  # code, k_h, k_p; whether anything may be behind the cables
-GivenArrays = tuple[Array, Array, Array, Array, Array, Array]  # as they come from Python: exact tuples are fastest
-FoundArrays = tuple[Array, Array, Codes, Array, Codes]
-ChainArrays = tuple[Array, Array, Array]
+SampleArrays = tuple[Array, Array, Array, Array, Array, Array]  # as they come from Python: exact tuples are fastest
+SolutionArrays = tuple[Array, Array, Codes, Array, Codes]
+LastEquilibriumArrays = tuple[Array, Array, Array]
 
 
-class Given(NamedTuple):
+class Samples(NamedTuple):
     """A batch of N samples to solve.
 
     Attributes:
@@ -48,7 +48,7 @@ class Given(NamedTuple):
     wrenches: Array
 
 
-class Found(NamedTuple):
+class Solutions(NamedTuple):
     """Output arrays of a batch.
 
     Attributes:
@@ -66,7 +66,7 @@ class Found(NamedTuple):
     pose_statuses: Codes
 
 
-class Chain(NamedTuple):
+class LastEquilibrium(NamedTuple):
     """Last equilibrium of a sequence of samples, kept from one call to the next; NaN: none.
 
     Attributes:
@@ -80,7 +80,7 @@ class Chain(NamedTuple):
     last: Array
 
 
-class Problem(NamedTuple):
+class PoseProblem(NamedTuple):
     """One pose to find: the cable model, what the robot is, and what is given.
 
     Attributes:
@@ -100,7 +100,7 @@ class Problem(NamedTuple):
     unit: float
 
 
-class Space(NamedTuple):
+class ForwardArrays(NamedTuple):
     """Working memory for m cables and n free motions; `unbalance` and `platform_stiffness` say what they fill."""
 
     rows: Array  # (CABLE_ROWS, m)
@@ -116,7 +116,7 @@ class Space(NamedTuple):
 
 
 @glue
-def new_space(memory: Memory, rows: Array, factor: Array) -> tuple[Space, Memory]:
+def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[ForwardArrays, Memory]:
     """Working memory, of which rows and factor are remembered, and the memory that is left."""
     n = factor.shape[0]
     numbers = memory.numbers
@@ -126,11 +126,11 @@ def new_space(memory: Memory, rows: Array, factor: Array) -> tuple[Space, Memory
     part, step = numbers[at : at + n], numbers[at + n : at + 2 * n]
     at += 2 * n
     trial = numbers[at : at + tables.POSE_COLUMNS]
-    space = Space(rows, rotation, sixes[0], sixes[1:7], matrix, factor, part, step, sixes[7], trial)
+    space = ForwardArrays(rows, rotation, sixes[0], sixes[1:7], matrix, factor, part, step, sixes[7], trial)
     return space, Memory(numbers[at + tables.POSE_COLUMNS :], memory.counters)
 
 
-class Motions(NamedTuple):
+class _Motions(NamedTuple):
     """The free motions of the sample at hand, and the poses on its way.
 
     Attributes:
@@ -147,11 +147,11 @@ class Motions(NamedTuple):
 
 
 @glue
-def new_motions(memory: Memory, n: int) -> tuple[Motions, Memory]:
+def new_motions(memory: Memory, n: int) -> tuple[_Motions, Memory]:
     """Work arrays for n free motions, and the memory that is left."""
     rows, at = block(memory.numbers, 0, 2 * n, 6)
     poses, at = block(memory.numbers, at, 2, tables.POSE_COLUMNS)
-    return Motions(rows[:n], rows[n:], poses[0], poses[1]), Memory(memory.numbers[at:], memory.counters)
+    return _Motions(rows[:n], rows[n:], poses[0], poses[1]), Memory(memory.numbers[at:], memory.counters)
 
 
 @glue
@@ -161,16 +161,16 @@ def row_of(array: Array, p: int) -> Array:
 
 
 @glue
-def problem_at(model: Model, given: Given, p: int, free: Array, arcs: Array) -> Problem:
+def problem_at(model: Model, given: Samples, p: int, free: Array, arcs: Array) -> PoseProblem:
     """Sample p of a batch as a problem; the model's gravity becomes that of its body. Fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
-    unit = fill_free(given.freedom, cables, body, given.lengths[p], free, arcs)
-    return Problem(placed, free, cables, body, row_of(given.wrenches, p), unit)
+    unit = _fill_free(given.freedom, cables, body, given.lengths[p], free, arcs)
+    return PoseProblem(placed, free, cables, body, row_of(given.wrenches, p), unit)
 
 
 @kernel
-def fill_free(freedom: Array, cables: Array, body: Array, lengths: Array, free: Array, arcs: Array) -> float:
+def _fill_free(freedom: Array, cables: Array, body: Array, lengths: Array, free: Array, arcs: Array) -> float:
     """Fill the free motions in the units of steps, and in those by which stiffnesses are compared, (n, 6) each.
 
     In the latter a rotation counts by the arc it makes at the platform ends' root mean square distance from the
@@ -187,7 +187,7 @@ def fill_free(freedom: Array, cables: Array, body: Array, lengths: Array, free: 
     radius = math.sqrt(square / m)
     units = 0.0
     for j in range(freedom.shape[0]):
-        turning = turns(freedom, j)
+        turning = is_rotation(freedom, j)
         unit = 1.0 if turning else UNIT_SHARE * total / m
         arc = 1.0 / radius if turning and radius > 0.0 else 1.0
         units += unit * unit
@@ -205,7 +205,7 @@ def copy_pose(source: Array, target: Array) -> None:
 
 
 @glue
-def leave_out(found: Found, p: int, status: int, cable_status: int) -> None:
+def clear_solution(found: Solutions, p: int, status: int, cable_status: int) -> None:
     """Fill the answer of a sample that has none yet: NaN, no steps."""
     for k in range(tables.POSE_COLUMNS):
         found.poses[p, k] = math.nan

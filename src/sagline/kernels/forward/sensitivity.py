@@ -16,7 +16,7 @@ from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
-from sagline.kernels.forward.problem import ForwardTerms, Given, GivenArrays, row_of
+from sagline.kernels.forward.problem import ForwardTerms, SampleArrays, Samples, row_of
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import block
 
@@ -26,7 +26,7 @@ DATA = 5
 
 
 @formula
-def turn_out(pair: Pair, rows: Array, i: int, vector: Array) -> None:
+def _fill_in_world_axes(pair: Pair, rows: Array, i: int, vector: Array) -> None:
     """Fill a vector (3,) of a cable's plane in world axes."""
     vector[0] = pair.x * rows[g.AZIMUTH_X, i]
     vector[1] = pair.x * rows[g.AZIMUTH_Y, i]
@@ -34,7 +34,9 @@ def turn_out(pair: Pair, rows: Array, i: int, vector: Array) -> None:
 
 
 @glue
-def describe_cable(model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array) -> None:
+def _describe_cable(
+    model: Model, cables: Array, rows: Array, i: int, block: Array, slopes: Array, lever: Array
+) -> None:
     """Fill block (3, 3), slopes (DATA, m, 3) and lever (3,) of cable i, after `platform_stiffness`."""
     across = end_stiffness(rows, i)
     for j in range(3):
@@ -48,17 +50,17 @@ def describe_cable(model: Model, cables: Array, rows: Array, i: int, block: Arra
     own, machine = slopes_over(model, material, pulley_at(cables, i), free, force, plane)
     if model.behind is None:
         own = force_slopes(model, span, rise, material, length, force, plane)
-    turn_out(machine.by_radius, rows, i, slopes[BY_RADIUS, i])
-    turn_out(machine.by_dead, rows, i, slopes[BY_DEAD, i])
-    turn_out(own.by_length, rows, i, slopes[BY_LENGTH, i])
-    turn_out(own.by_density, rows, i, slopes[BY_DENSITY, i])
-    turn_out(own.by_stiffness, rows, i, slopes[BY_STIFFNESS, i])
+    _fill_in_world_axes(machine.by_radius, rows, i, slopes[BY_RADIUS, i])
+    _fill_in_world_axes(machine.by_dead, rows, i, slopes[BY_DEAD, i])
+    _fill_in_world_axes(own.by_length, rows, i, slopes[BY_LENGTH, i])
+    _fill_in_world_axes(own.by_density, rows, i, slopes[BY_DENSITY, i])
+    _fill_in_world_axes(own.by_stiffness, rows, i, slopes[BY_STIFFNESS, i])
 
 
 @entry
 def describe_states(
     model: ForwardTerms,
-    given: GivenArrays,
+    given: SampleArrays,
     room: tuple[Array, Indices],
     matrices: Array,
     blocks: Array,
@@ -69,14 +71,14 @@ def describe_states(
 
     Args:
         model: Cable model and the empirical one's constants; whether anything may be behind the cables, or None.
-        given: `Given`, its starts the poses.
+        given: `Samples`, its starts the poses.
         room: `memory_for` as many cables.
         matrices: Filled: stiffness of the platform, (N, 6, 6).
         blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
         slopes: Filled: dT of every cable by its data, (N, DATA, m, 3).
         levers: Filled: from the center of mass to the platform ends, (N, m, 3).
     """
-    batch = Given(*given)
+    batch = Samples(*given)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     numbers = room[0]
@@ -98,4 +100,4 @@ def describe_states(
         unbalance(placed, cables, body, row_of(batch.wrenches, p), batch.starts[p], rotation, rows, gradient)
         platform_stiffness(placed, cables, rows, matrices[p])
         for i in range(m):
-            describe_cable(placed, cables, rows, i, blocks[p, i], slopes[p], levers[p, i])
+            _describe_cable(placed, cables, rows, i, blocks[p, i], slopes[p], levers[p, i])

@@ -14,7 +14,19 @@ import numpy as np
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.interference.nearest import nearest_of_curves, nearest_to_box, square_between
 from sagline.kernels.interference.segments import between_segments, nearest_in_box, to_box
-from sagline.kernels.interference.shapes import AXES, BOX, FIRST, HALF, KIND, LAST, PLACE, RADIUS, bulge, point, turn
+from sagline.kernels.interference.shapes import (
+    AXES,
+    BOX,
+    FIRST,
+    HALF,
+    KIND,
+    LAST,
+    PLACE,
+    RADIUS,
+    bulge,
+    level_point,
+    point,
+)
 from sagline.kernels.jit import entry, kernel
 
 # Columns of a piece: its chord's ends (six), its bulge, its range as shares, and the first of its two parts (0: whole).
@@ -38,7 +50,7 @@ def work_arrays_for_pieces() -> tuple[Array, Array]:
 
 
 @kernel
-def set_piece(piece: Array, row: Array, first: float, last: float) -> None:
+def _set_piece(piece: Array, row: Array, first: float, last: float) -> None:
     """Range and bulge of a piece whose ends are there."""
     dx, dy, dz = piece[3] - piece[0], piece[4] - piece[1], piece[5] - piece[2]
     piece[BULGE] = bulge(row, first, last, dx * dx + dy * dy + dz * dz)
@@ -48,21 +60,21 @@ def set_piece(piece: Array, row: Array, first: float, last: float) -> None:
 
 
 @kernel
-def whole_piece(piece: Array, row: Array) -> None:
+def _whole_piece(piece: Array, row: Array) -> None:
     """The piece that is all of a cable that counts."""
     piece[0], piece[1], piece[2] = point(row, row[FIRST])
     piece[3], piece[4], piece[5] = point(row, row[LAST])
-    set_piece(piece, row, row[FIRST], row[LAST])
+    _set_piece(piece, row, row[FIRST], row[LAST])
 
 
 @kernel
-def split(pieces: Array, index: int, row: Array) -> None:
+def _split_piece(pieces: Array, index: int, row: Array) -> None:
     """Split a piece in the middle, or where the cable turns, which straightens a fold."""
     count = int(pieces[COUNTER, PARTS])
     piece, one, other = pieces[index], pieces[count], pieces[count + 1]
     middle = 0.5 * (piece[BEGIN] + piece[END])
     width = piece[END] - piece[BEGIN]
-    bottom = turn(row)
+    bottom = level_point(row)
     if piece[BEGIN] + 1e-3 * width < bottom < piece[END] - 1e-3 * width:
         middle = bottom
     x, y, z = point(row, middle)
@@ -71,14 +83,14 @@ def split(pieces: Array, index: int, row: Array) -> None:
         other[3 + k] = piece[3 + k]
     one[3], one[4], one[5] = x, y, z
     other[0], other[1], other[2] = x, y, z
-    set_piece(one, row, piece[BEGIN], middle)
-    set_piece(other, row, middle, piece[END])
+    _set_piece(one, row, piece[BEGIN], middle)
+    _set_piece(other, row, middle, piece[END])
     piece[PARTS] = count
     pieces[COUNTER, PARTS] = count + 2
 
 
 @kernel
-def chords(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[float, float, float, float]:
+def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[float, float, float, float]:
     """Distance of two pieces' chords [m], a lower bound of the pieces' own, and the nearest shares of the cables."""
     one = pieces[i]
     if to_a_box:
@@ -95,7 +107,7 @@ def chords(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[f
 
 
 @kernel
-def refined(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
+def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
     """Distance where it is least around two points of a pair [m], and these points."""
     if to_a_box:
         square, s = nearest_to_box(one, other, s)
@@ -105,7 +117,7 @@ def refined(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tup
 
 
 @kernel
-def square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> float:
+def _square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> float:
     """Squared distance of two points of a pair [m^2]."""
     if not to_a_box:
         return square_between(one, other, s, t)
@@ -115,7 +127,7 @@ def square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> f
 
 
 @kernel
-def least_of_pair(
+def _least_of_pair(
     one: Array,
     other: Array,
     i: int,
@@ -130,14 +142,14 @@ def least_of_pair(
     What lies farther than `enough` is not looked at closely: the lower bound then is at least `enough` - precision.
     """
     to_a_box = other[KIND] == BOX
-    distance, low, s, t = chords(pieces, i, j, other, to_a_box)
+    distance, low, s, t = _chord_distance(pieces, i, j, other, to_a_box)
     if math.isnan(distance):
         return math.nan, math.nan, math.nan, math.nan
     best, best_s, best_t = distance, s, t
     if low < enough - precision:
-        best, best_s, best_t = refined(one, other, to_a_box, s, t)
+        best, best_s, best_t = _refined_distance(one, other, to_a_box, s, t)
     else:
-        best = math.sqrt(square_at(one, other, to_a_box, s, t))
+        best = math.sqrt(_square_at(one, other, to_a_box, s, t))
     size = ROUNDING * (abs(pieces[i, 0]) + abs(pieces[i, 1]) + abs(pieces[i, 2]) + best)
     proved = FAR
     waiting[0, 0], waiting[0, 1], waiting[0, 2] = i, j, low
@@ -154,14 +166,14 @@ def least_of_pair(
         of_one = bulge_a >= bulge_b
         index = a if of_one else b
         if pieces[index, PARTS] == 0.0:
-            split(pieces, index, one if of_one else other)
+            _split_piece(pieces, index, one if of_one else other)
         first = int(pieces[index, PARTS])
         for k in range(first, first + 2):
             new_a, new_b = (k, b) if of_one else (a, k)
-            distance, low, s, t = chords(pieces, new_a, new_b, other, to_a_box)
+            distance, low, s, t = _chord_distance(pieces, new_a, new_b, other, to_a_box)
             looked += 1
-            if distance < best and square_at(one, other, to_a_box, s, t) < best * best:
-                found, at_s, at_t = refined(one, other, to_a_box, s, t)
+            if distance < best and _square_at(one, other, to_a_box, s, t) < best * best:
+                found, at_s, at_t = _refined_distance(one, other, to_a_box, s, t)
                 if found < best:
                     best, best_s, best_t = found, at_s, at_t
             if low >= min(best, enough) - precision:
@@ -176,7 +188,7 @@ def least_of_pair(
 
 
 @kernel
-def edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
+def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
     """One of the four edges of a box along an axis."""
     for k in range(3):
         middle = box[PLACE + k]
@@ -190,11 +202,11 @@ def edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
 
 
 @kernel
-def edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
+def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
     """Least distance of a box's edges from another box [m], if it is below one that is known; its points if so."""
     for axis in range(3):
         for corner in range(4):
-            edge_of(box, axis, corner, edge)
+            _edge_of(box, axis, corner, edge)
             square, _, t = to_box(edge, other)
             if math.sqrt(square) < best:
                 best = math.sqrt(square)
@@ -207,10 +219,10 @@ def edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: fl
 
 
 @kernel
-def least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> float:
+def _least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> float:
     """Least distance of two boxes [m], 0 where they touch: an edge of one is part of it, or lies in the other."""
-    best = edges_to_box(box, other, edge, nearest, FAR)
-    turned = edges_to_box(other, box, edge, nearest, best)
+    best = _edges_to_box(box, other, edge, nearest, FAR)
+    turned = _edges_to_box(other, box, edge, nearest, best)
     if turned < best:
         for k in range(3):
             nearest[0, k], nearest[1, k] = nearest[1, k], nearest[0, k]
@@ -218,7 +230,7 @@ def least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> flo
 
 
 @kernel
-def set_nearest(one: Array, other: Array, s: float, t: float, nearest: Array) -> None:
+def _set_nearest(one: Array, other: Array, s: float, t: float, nearest: Array) -> None:
     """The nearest points of a pair, from their shares."""
     x, y, z = point(one, s)
     nearest[0, 0], nearest[0, 1], nearest[0, 2] = x, y, z
@@ -259,12 +271,12 @@ def least_distances(
     count = several + still.shape[0]
     for k in range(still.shape[0]):
         if still[k, KIND] != BOX:
-            whole_piece(pieces[several + k], still[k])
+            _whole_piece(pieces[several + k], still[k])
     for n in range(poses):
         pieces[COUNTER, PARTS] = count
         for k in range(several):
             if moving[n, k, KIND] != BOX:
-                whole_piece(pieces[k], moving[n, k])
+                _whole_piece(pieces[k], moving[n, k])
         for k in range(still.shape[0]):
             pieces[several + k, PARTS] = 0.0
         least = FAR
@@ -275,21 +287,21 @@ def least_distances(
             radii = one[RADIUS] + other[RADIUS]
             nearest = nearest_out[n, p]
             if one[KIND] == BOX:
-                distance = least_of_boxes(one, other, pieces[COUNTER], nearest)
+                distance = _least_of_boxes(one, other, pieces[COUNTER], nearest)
                 distance_out[n, p] = distance - radii
                 low_out[n, p] = distance * (1.0 - ROUNDING) - radii
             else:
                 enough = least + radii if together else FAR
-                distance, low, s, t = least_of_pair(one, other, i, j, precision, enough, pieces, waiting)
+                distance, low, s, t = _least_of_pair(one, other, i, j, precision, enough, pieces, waiting)
                 distance_out[n, p] = distance - radii
                 low_out[n, p] = low - radii
-                set_nearest(one, other, s, t, nearest)
+                _set_nearest(one, other, s, t, nearest)
             if distance_out[n, p] < least:
                 least = distance_out[n, p]
 
 
 @entry
-def cut(row: Array, ranges: Array, pieces_out: Array) -> None:
+def cut_piece(row: Array, ranges: Array, pieces_out: Array) -> None:
     """Pieces of one cable or rod.
 
     Args:
@@ -301,4 +313,4 @@ def cut(row: Array, ranges: Array, pieces_out: Array) -> None:
         piece, first, last = pieces_out[k], ranges[k, 0], ranges[k, 1]
         piece[0], piece[1], piece[2] = point(row, first)
         piece[3], piece[4], piece[5] = point(row, last)
-        set_piece(piece, row, first, last)
+        _set_piece(piece, row, first, last)

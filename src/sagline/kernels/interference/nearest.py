@@ -22,7 +22,7 @@ def square_between(one: Array, other: Array, s: float, t: float) -> float:
 
 
 @kernel
-def newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
+def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
     """Squared distance at two shares and where a Newton step leads to, within both ranges."""
     ax, ay, az = point(one, s)
     bx, by, bz = point(other, t)
@@ -64,16 +64,16 @@ def newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, fl
 @kernel
 def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
     """Squared distance of two cables [m^2] where it is least around two points, and these points."""
-    square, new_s, new_t = newton_step(one, other, s, t)
+    square, new_s, new_t = _newton_step(one, other, s, t)
     for _ in range(STEPS):
         ds, dt = new_s - s, new_t - t
         done = abs(ds) <= SMALL and abs(dt) <= SMALL
-        found, next_s, next_t = newton_step(one, other, new_s, new_t)
+        found, next_s, next_t = _newton_step(one, other, new_s, new_t)
         for _ in range(HALVINGS):
             if found <= square:
                 break
             ds, dt = 0.25 * ds, 0.25 * dt
-            found, next_s, next_t = newton_step(one, other, s + ds, t + dt)
+            found, next_s, next_t = _newton_step(one, other, s + ds, t + dt)
         if not found < square:
             return square, s, t
         s, t, square = s + ds, t + dt, found
@@ -84,7 +84,7 @@ def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[flo
 
 
 @kernel
-def box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
+def _box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
     """Squared distance of a cable's point from a box [m^2] and where a Newton step leads to, within the range."""
     x, y, z = point(curve, s)
     px, py, pz = in_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
@@ -110,16 +110,16 @@ def box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
 @kernel
 def nearest_to_box(curve: Array, box: Array, s: float) -> tuple[float, float]:
     """Squared distance of a cable from a box [m^2] where it is least around a point, and this point."""
-    square, new = box_step(curve, box, s)
+    square, new = _box_step(curve, box, s)
     for _ in range(STEPS):
         step = new - s
         done = abs(step) <= SMALL
-        found, following = box_step(curve, box, new)
+        found, following = _box_step(curve, box, new)
         for _ in range(HALVINGS):
             if found <= square:
                 break
             step = 0.25 * step
-            found, following = box_step(curve, box, s + step)
+            found, following = _box_step(curve, box, s + step)
         if not found < square:
             return square, s
         s, square, new = s + step, found, following

@@ -111,6 +111,6 @@ def nearest_in_box(box: Array, x: float, y: float, z: float) -> tuple[float, flo
 
 
 @kernel
-def length_of(x: float, y: float, z: float) -> float:
+def _length(x: float, y: float, z: float) -> float:
     """Length of a vector."""
     return math.sqrt(x * x + y * y + z * z)

@@ -68,7 +68,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
 
 
 @kernel
-def turn(row: Array) -> float:
+def level_point(row: Array) -> float:
     """Position of the level tangent of a catenary as a fraction of its length, possibly beyond its ends."""
     if row[KIND] != HANGING:
         return -1.0

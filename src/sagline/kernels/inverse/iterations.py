@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Codes
-from sagline.kernels.balance.setting import Balance, Platform, need, start_from_minimum_norm
+from sagline.kernels.balance.setting import Balance, Platform, fill_needed_wrench, start_from_minimum_norm
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.states import NEAR, frame_end_tension, solve_cable_states
 from sagline.kernels.cable.terms import Model
@@ -23,7 +23,7 @@ from sagline.kernels.codes import (
 )
 from sagline.kernels.inverse.frame_end import STILL, linearize_ends
 from sagline.kernels.jit import glue
-from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nearest, refer, share_nearest
+from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nearest, set_reference, share_nearest
 from sagline.kernels.tension.other_methods import distribute_by_other_method
 from sagline.kernels.tension.work_arrays import WorkArrays, reset_work_arrays
 
@@ -52,9 +52,9 @@ def distribute_and_solve_cables(
     near.held.labels[0] = 0
     if room is not None:
         reset_work_arrays(room)
-    refer(distribution, balance.offset, balance.null, near)
+    set_reference(distribution, balance.offset, balance.null, near)
     hung = False
-    need(platform, cables, balance)
+    fill_needed_wrench(platform, cables, balance)
     possible = limits_admit_tensions(cables)
     status = POSE_NOT_CONVERGED if possible else POSE_INFEASIBLE
     for k in range(ROUNDS if possible else 0):
@@ -63,7 +63,7 @@ def distribute_and_solve_cables(
             status = share_nearest(balance.bounds, balance.null, near, balance.tension)
         elif is_nearest(distribution) or k >= FREE_ROUNDS:
             if k >= FREE_ROUNDS and not is_nearest(distribution):
-                stay(balance, near)
+                fix_reference(balance, near)
             status = share_nearest(balance.bounds, balance.null, near, balance.tension)
         else:
             status = distribute_by_other_method(
@@ -89,10 +89,10 @@ def distribute_and_solve_cables(
             if not linearize_ends(model, distribution, cables, balance):
                 status = POSE_SINGULAR
                 break
-            refer(distribution, balance.offset, balance.null, near)
+            set_reference(distribution, balance.offset, balance.null, near)
             reset_work_arrays(room)
         hung = True
-        need(platform, cables, balance)
+        fill_needed_wrench(platform, cables, balance)
     return status
 
 
@@ -106,7 +106,7 @@ def limits_admit_tensions(cables: Cables) -> bool:
 
 
 @glue
-def stay(balance: Balance, near: ReferencePoint) -> None:
+def fix_reference(balance: Balance, near: ReferencePoint) -> None:
     """Let the tensions to be near to be those just shared; the bound of a tie, which may be held, is gone."""
     near.held.labels[0] = 0
     for k in range(balance.null.shape[0]):
@@ -139,7 +139,7 @@ def sag_force_change(cables: Cables) -> float:
 
 
 @glue
-def remember(
+def store_tensions(
     model: Model, distribution: Distribution, cables: Cables, room: WorkArrays | None, near: ReferencePoint
 ) -> None:
     """Keep the tensions, in the variable they were shared in, for the pose that follows."""

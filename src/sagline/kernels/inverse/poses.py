@@ -11,17 +11,17 @@ import math
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.angle import angle
-from sagline.kernels.balance.freedom import turns
-from sagline.kernels.balance.setting import Balance, Limits, Platform, need, new_balance, set_pose
+from sagline.kernels.balance.freedom import is_rotation
+from sagline.kernels.balance.setting import Balance, Platform, TensionLimits, fill_needed_wrench, new_balance, set_pose
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
-from sagline.kernels.inverse.iterations import distribute_and_solve_cables, remember
+from sagline.kernels.inverse.iterations import distribute_and_solve_cables, store_tensions
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
-from sagline.kernels.tension.nearest import Distribution, new_nearness
+from sagline.kernels.tension.nearest import Distribution, new_reference_point
 from sagline.kernels.tension.work_arrays import new_work_arrays
 
 FORCE, MOMENT = 0, 1  # columns of the residuals
@@ -54,7 +54,7 @@ def inverse_poses(
     Args:
         model_terms: Cable model: code, k_h, k_p.
         distribution_terms: Tension distribution: `Distribution`.
-        limit_terms: What tensions must keep: `Limits`.
+        limit_terms: What tensions must keep: `TensionLimits`.
         robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or N,
             BODY_COLUMNS); cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
@@ -72,7 +72,7 @@ def inverse_poses(
         last: Pose to end before.
     """
     distribution = Distribution(*distribution_terms)
-    limits = Limits(*limit_terms)
+    limits = TensionLimits(*limit_terms)
     freedom, bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
     m = statuses.shape[1]
@@ -80,7 +80,7 @@ def inverse_poses(
     machine = robots_have_machine(robots)
     cables, rest = new_cables(Memory(*room), m, machine)
     balance, rest = new_balance(rest, m, n)
-    near, rest = new_nearness(rest, previous, m - n)
+    near, rest = new_reference_point(rest, previous, m - n)
     others = None if otherwise is None else new_work_arrays(distribution.method, rest, m, m - n)
     for p in range(first, last):
         body = bodies[min(p, bodies.shape[0] - 1)]
@@ -97,27 +97,27 @@ def inverse_poses(
         if status == POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
             if distribution.method == CLOSEST:
-                remember(model, distribution, cables, others, near)
+                store_tensions(model, distribution, cables, others, near)
         else:
             residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
         for k in range(n):
             supplied = status != POSE_NO_CHORD and status != POSE_SINGULAR
             needed[p, k] = balance.right[k] if supplied else math.nan
         pose_statuses[p] = status
-        write(status == POSE_SOLVED, model, cables, balance, results, p)
+        write_solution(status == POSE_SOLVED, model, cables, balance, results, p)
 
 
 @glue
 def measure_balance(platform: Platform, cables: Cables, balance: Balance, residuals: Array) -> None:
     """Fill the norms of the unbalanced force [N] and moment [N m] along the platform's free motions."""
-    need(platform, cables, balance)
+    fill_needed_wrench(platform, cables, balance)
     force = 0.0
     moment = 0.0
     for k in range(balance.right.size):
         total = -balance.right[k]
         for i in range(cables.tau.size):
             total += balance.matrix[k, i] * cables.tau[i]
-        if turns(platform.freedom, k):
+        if is_rotation(platform.freedom, k):
             moment += total * total
         else:
             force += total * total
@@ -126,7 +126,7 @@ def measure_balance(platform: Platform, cables: Cables, balance: Balance, residu
 
 
 @glue
-def write(solved: bool, model: Model, cables: Cables, balance: Balance, results: Array, p: int) -> None:
+def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance, results: Array, p: int) -> None:
     """Write one pose's answer; no plausible numbers where there is none: span and rise stay, the rest is NaN."""
     for i in range(cables.tau.size):
         tension = cables.tau[i] if solved else math.nan
@@ -137,11 +137,11 @@ def write(solved: bool, model: Model, cables: Cables, balance: Balance, results:
         results[tables.VERTICAL, p, i] = tension * cables.sine[i] + cables.pull[i]
         results[tables.TENSION, p, i] = tension
     if cables.machine:
-        write_behind(solved, model, cables, results, p)
+        _write_behind(solved, model, cables, results, p)
 
 
 @glue
-def write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
+def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
     """Write the free spans, and add to their lengths what is on the pulleys and behind them."""
     m = cables.tau.size
     for i in range(m):

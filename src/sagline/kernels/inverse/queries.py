@@ -7,11 +7,11 @@ import math
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.bounds import STRIP_ROWS
-from sagline.kernels.balance.freedom import translations_of
+from sagline.kernels.balance.freedom import translation_count
 from sagline.kernels.balance.setting import (
-    Limits,
     Platform,
-    need,
+    TensionLimits,
+    fill_needed_wrench,
     new_balance,
     set_pose,
     start_from_minimum_norm,
@@ -66,14 +66,14 @@ def polygon_of_pose(
     balance, rest = new_balance(rest, m, freedom.shape[0])
     platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
     model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY], None)
-    set_pose(model, Limits(*limit_terms), distribution.variable, distribution.weight, platform, cables, balance)
+    set_pose(model, TensionLimits(*limit_terms), distribution.variable, distribution.weight, platform, cables, balance)
     if not math.isnan(tensions[0]):
         for i in range(m):
             cables.tau[i] = tensions[i]
             cables.pull[i] = pulls[i]
         if distribution.variable == FRAME_END_TENSION:
             linearize_ends(model, distribution, cables, balance)
-    need(platform, cables, balance)
+    fill_needed_wrench(platform, cables, balance)
     start_from_minimum_norm(balance)
     for i in range(m):
         scale[i] = balance.scale[i]
@@ -103,7 +103,7 @@ def margins_of_poses(
     margins: Array,
 ) -> None:
     """Fill the capacity margins [N] (N,) of poses whose cables have given pulls (N, m); NaN where they have none."""
-    limits = Limits(*limit_terms)
+    limits = TensionLimits(*limit_terms)
     freedom, bodies, robots = robot_terms
     count, m = pulls.shape
     n = freedom.shape[0]
@@ -114,7 +114,7 @@ def margins_of_poses(
     rest = Memory(rest.numbers[at:], rest.counters)
     for i in range(m):
         weight[i] = 1.0
-    translations = translations_of(freedom)
+    translations = translation_count(freedom)
     for p in range(count):
         margins[p] = math.nan
         body = bodies[min(p, bodies.shape[0] - 1)]
@@ -125,5 +125,5 @@ def margins_of_poses(
         if placed and not math.isnan(pulls[p, 0]):
             for i in range(m):
                 cables.pull[i] = pulls[p, i]
-            need(platform, cables, balance)
+            fill_needed_wrench(platform, cables, balance)
             margins[p] = capacity_margin(balance.matrix, balance.right, cables.low, cables.high, translations, rest)

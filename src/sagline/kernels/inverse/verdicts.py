@@ -7,12 +7,12 @@ import math
 from sagline.core.arrays import Array, Codes, Flags, Indices
 from sagline.kernels import tables
 from sagline.kernels.algebra.bounds import START
-from sagline.kernels.balance.freedom import translations_of
+from sagline.kernels.balance.freedom import translation_count
 from sagline.kernels.balance.setting import (
     Balance,
-    Limits,
     Platform,
-    need,
+    TensionLimits,
+    fill_needed_wrench,
     new_balance,
     set_pose,
     start_from_minimum_norm,
@@ -36,11 +36,11 @@ from sagline.kernels.codes import (
     POSE_TOO_SLACK,
 )
 from sagline.kernels.inverse.iterations import limits_admit_tensions
-from sagline.kernels.inverse.poses import Answers, LimitTerms, ModelTerms, Robots, measure_balance, write
+from sagline.kernels.inverse.poses import Answers, LimitTerms, ModelTerms, Robots, measure_balance, write_solution
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.tension.bracket import along, decide
-from sagline.kernels.tension.least_change import Change, Demand, length_of
+from sagline.kernels.tension.bracket import component_along, decide_feasibility
+from sagline.kernels.tension.least_change import Demand, TensionChange, norm_of_part
 
 SUPPORT = 1e-9  # of the largest component along the proof: cables that count less do not stand against the wrench
 AT_LIMIT = 1e-9  # of a limit: what is this near stands at it
@@ -78,7 +78,7 @@ def decide_poses(
             (N, 2); that change, along the free motions, (N, n), and Farkas vectors, (N, n), NaN where there is none;
             whether a limit of a cable stands against the needed wrench, (N, m).
     """
-    limits = Limits(*limit_terms)
+    limits = TensionLimits(*limit_terms)
     freedom, bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
     brackets, reliefs, farkas, blocking = verdicts
@@ -89,10 +89,10 @@ def decide_poses(
     rows, at = block(rest.numbers, 0, 2 * n + 3, m)
     vectors, at = block(rest.numbers, at, 3, n)
     rest = Memory(rest.numbers[at:], rest.counters)
-    weight, change = rows[2 * n], Change(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
+    weight, change = rows[2 * n], TensionChange(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
     for i in range(m):
         weight[i] = 1.0
-    translations = translations_of(freedom)
+    translations = translation_count(freedom)
     for p in which:
         body = bodies[min(p, bodies.shape[0] - 1)]
         wrench = wrenches[min(p, wrenches.shape[0] - 1)]
@@ -104,25 +104,25 @@ def decide_poses(
             for i in range(m):
                 blocking[p, i] = not cables.low[i] <= cables.high[i]
             continue
-        need(platform, cables, balance)
+        fill_needed_wrench(platform, cables, balance)
         start_from_minimum_norm(balance)
         for i in range(m):
             change.tau[i] = balance.bounds[START, i]
-        demand, lever = demand_of(
+        demand, lever = _demand_of(
             platform, cables, balance, Demand(rows[:n], rows[n : 2 * n], vectors[2], translations, 0.0)
         )
         curves, left = new_curves(model, cables, statuses[p], rest)
-        status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide(curves, demand, change, left)
+        status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide_feasibility(curves, demand, change, left)
         sag_forces_at(curves, change.tau, change.pull)
         if status == POSE_SOLVED:
-            status = status_of(statuses[p])
+            status = _pose_status(statuses[p])
         if status == POSE_SOLVED and not covers:
             status = POSE_NOT_COVERED
         if status != POSE_SOLVED and status != POSE_INFEASIBLE and status != POSE_BORDERLINE:
             brackets[p, PROVED] = brackets[p, ENOUGH] = math.nan
         if status == POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
-            write(True, model, cables, balance, results, p)
+            write_solution(True, model, cables, balance, results, p)
         else:
             for i in range(m):
                 statuses[p, i] = CABLE_SOLVED
@@ -137,13 +137,13 @@ def decide_poses(
             if status != POSE_SOLVED and brackets[p, ENOUGH] < math.inf:
                 reliefs[p, k] = change.residual[k] if k < translations else 0.0
         if status == POSE_INFEASIBLE and proved:
-            write_proof(demand, change, lever, farkas[p])
+            _write_proof(demand, change, lever, farkas[p])
         if status == POSE_INFEASIBLE or status == POSE_BORDERLINE:
-            block_cables(cables, demand, change, blocking[p])
+            _block_cables(cables, demand, change, blocking[p])
 
 
 @glue
-def status_of(statuses: Codes) -> int:
+def _pose_status(statuses: Codes) -> int:
     """Status of a pose whose tensions balance, from those of its cables (m,)."""
     gravest = CABLE_SOLVED
     for i in range(statuses.size):
@@ -154,7 +154,7 @@ def status_of(statuses: Codes) -> int:
 
 
 @glue
-def demand_of(platform: Platform, cables: Cables, balance: Balance, room: Demand) -> tuple[Demand, float]:
+def _demand_of(platform: Platform, cables: Cables, balance: Balance, room: Demand) -> tuple[Demand, float]:
     """Fill what is asked of the cables of a pose, and the lever arm [m] its moments are divided by."""
     n, m = balance.matrix.shape
     lever = 0.0
@@ -188,24 +188,24 @@ def demand_of(platform: Platform, cables: Cables, balance: Balance, room: Demand
 
 
 @glue
-def write_proof(demand: Demand, change: Change, lever: float, farkas: Array) -> None:
+def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Array) -> None:
     """Fill the direction of the proof, its force part of length 1, or its moment part where it has no force."""
     n = farkas.size
     for k in range(n):
         farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
-    if length_of(farkas, 0, demand.soft) == 0.0:
-        size = length_of(farkas, demand.soft, n)
+    if norm_of_part(farkas, 0, demand.soft) == 0.0:
+        size = norm_of_part(farkas, demand.soft, n)
         for k in range(n):
             farkas[k] /= size
 
 
 @glue
-def block_cables(cables: Cables, demand: Demand, change: Change, blocking: Flags) -> None:
+def _block_cables(cables: Cables, demand: Demand, change: TensionChange, blocking: Flags) -> None:
     """Fill which cables (m,) stand at a limit that keeps them from giving more along the least change."""
     largest = 0.0
     for i in range(blocking.size):
-        largest = max(largest, abs(along(demand.matrix, change.direction, i)))
+        largest = max(largest, abs(component_along(demand.matrix, change.direction, i)))
     for i in range(blocking.size):
-        a = along(demand.matrix, change.direction, i)
+        a = component_along(demand.matrix, change.direction, i)
         limit = cables.high[i] if a > 0.0 else cables.low[i]
         blocking[i] = abs(a) > SUPPORT * largest and abs(cables.tau[i] - limit) <= AT_LIMIT * limit

@@ -28,7 +28,7 @@ from sagline.kernels.cable.sag_forces import (
 from sagline.kernels.codes import CATENARY, POSE_BORDERLINE, POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.tension.least_change import Change, Demand, least_change, length_of
+from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
 
 PLENTY = 1e6  # of the largest force at hand: more than any cable carries that has no limit
 FEASIBLE = 1e-9  # of the largest force at hand: what is left of the balance is taken for none
@@ -42,7 +42,7 @@ LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3
 RANGE_ROWS = 4
 
 
-class Search(NamedTuple):
+class _Search(NamedTuple):
     """State of the search.
 
     Attributes:
@@ -55,22 +55,22 @@ class Search(NamedTuple):
 
 
 @glue
-def new_search(memory: Memory, m: int) -> tuple[Search, Memory]:
+def _new_search(memory: Memory, m: int) -> tuple[_Search, Memory]:
     """Work arrays for m cables, and the memory that is left."""
     tops, at = block(memory.numbers, 0, 1, m)
     ranges, at = block(memory.numbers, at, DEPTH, RANGE_ROWS * m)
-    search = Search(tops[0], ranges.reshape((DEPTH, RANGE_ROWS, m)))
+    search = _Search(tops[0], ranges.reshape((DEPTH, RANGE_ROWS, m)))
     return search, Memory(memory.numbers[at:], memory.counters)
 
 
 @glue
-def section_of(range_: Array, i: int) -> Section:
+def _section_of(range_: Array, i: int) -> Section:
     """The tensions of cable i in a range."""
     return Section(range_[LEAST, i], range_[LARGEST, i], range_[AT_LEAST, i], range_[AT_LARGEST, i])
 
 
 @formula
-def along(columns: Array, direction: Array, i: int) -> float:
+def component_along(columns: Array, direction: Array, i: int) -> float:
     """Component of a column along a direction."""
     total = 0.0
     for k in range(direction.size):
@@ -79,7 +79,7 @@ def along(columns: Array, direction: Array, i: int) -> float:
 
 
 @kernel
-def spare_along(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
+def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
     """Capacity of the cables along a direction beyond the demand [N]; negative proves infeasibility.
 
     It is the upper end of what rounding leaves open. Fills the most each cable gives, (m,).
@@ -90,15 +90,15 @@ def spare_along(curves: Curves, demand: Demand, range_: Array, direction: Array,
         spare -= direction[k] * demand.right[k]
         size += abs(direction[k] * demand.right[k])
     for i in range(tops.size):
-        a, b = along(demand.matrix, direction, i), along(demand.hanging, direction, i)
-        tops[i] = most_along(curves, i, section_of(range_, i), a, b)
+        a, b = component_along(demand.matrix, direction, i), component_along(demand.hanging, direction, i)
+        tops[i] = most_along(curves, i, _section_of(range_, i), a, b)
         spare += tops[i]
         size += abs(a) * range_[LARGEST, i] + abs(b) * max(abs(range_[AT_LEAST, i]), abs(range_[AT_LARGEST, i]))
     return spare + CERTAIN * size
 
 
 @kernel
-def narrow(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
+def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
     """Take from a range the tensions with which a cable falls short of its best by more than is spare.
 
     Returns:
@@ -107,8 +107,8 @@ def narrow(curves: Curves, demand: Demand, range_: Array, direction: Array, spar
     if not spare < math.inf:
         return True
     for i in range(tops.size):
-        a, b = along(demand.matrix, direction, i), along(demand.hanging, direction, i)
-        least, most = sag_force_range(curves, i, section_of(range_, i))
+        a, b = component_along(demand.matrix, direction, i), component_along(demand.hanging, direction, i)
+        least, most = sag_force_range(curves, i, _section_of(range_, i))
         needed = tops[i] - spare + min(b * least, b * most)
         if a > 0.0 and needed / a > range_[LEAST, i]:
             if needed / a > range_[LARGEST, i]:
@@ -124,7 +124,9 @@ def narrow(curves: Curves, demand: Demand, range_: Array, direction: Array, spar
 
 
 @kernel
-def narrow_free(curves: Curves, demand: Demand, range_: Array, change: Change, tops: Array, memory: Memory) -> bool:
+def _narrow_free(
+    curves: Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
+) -> bool:
     """Narrow a range along the directions in which one cable between its limits counts and the others do not.
 
     Returns:
@@ -155,20 +157,20 @@ def narrow_free(curves: Curves, demand: Demand, range_: Array, change: Change, t
     for c in range(2 * count):
         for k in range(n):
             direction[k] = inverse[c // 2, k] if c % 2 == 0 else -inverse[c // 2, k]
-        spare = spare_along(curves, demand, range_, direction, tops)
-        if spare < 0.0 or not narrow(curves, demand, range_, direction, spare, tops):
+        spare = _spare_capacity(curves, demand, range_, direction, tops)
+        if spare < 0.0 or not _narrow_range(curves, demand, range_, direction, spare, tops):
             return False
     return True
 
 
 @glue
-def least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
+def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
     """The cable whose pull is least certain in a range, and by how much all pulls together are [N]."""
     worst = -1
     largest = 0.0
     total = 0.0
     for i in range(range_.shape[1]):
-        least, most = sag_force_range(curves, i, section_of(range_, i))
+        least, most = sag_force_range(curves, i, _section_of(range_, i))
         total += most - least
         if most - least > largest:
             worst, largest = i, most - least
@@ -176,7 +178,7 @@ def least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
 
 
 @glue
-def split(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
+def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
     """Split the tensions of one cable in two: what holds its present one comes last and so is next."""
     for row in range(RANGE_ROWS):
         for j in range(waiting.shape[2]):
@@ -192,7 +194,7 @@ def split(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
 
 
 @glue
-def first_range(curves: Curves, size: float, range_: Array) -> None:
+def _first_range(curves: Curves, size: float, range_: Array) -> None:
     """Fill the range that the limits allow, never a wider one, but for cables that are all but slack (LOOSEST).
 
     Where there is no upper limit, sagging cables are stretched to twice their length at most, and others carry a
@@ -213,7 +215,9 @@ def first_range(curves: Curves, size: float, range_: Array) -> None:
 
 
 @glue
-def come_near(curves: Curves, demand: Demand, range_: Array, trial: Change, memory: Memory) -> tuple[float, bool]:
+def _approach_demand(
+    curves: Curves, demand: Demand, range_: Array, trial: TensionChange, memory: Memory
+) -> tuple[float, bool]:
     """Let tensions in a range come as near to the demand as they can.
 
     Returns:
@@ -228,9 +232,9 @@ def come_near(curves: Curves, demand: Demand, range_: Array, trial: Change, memo
     if first > 0:
         left = least_change(curves, demand, range_, trial, memory)
     if left < math.inf or left != left:
-        return left, length_of(trial.residual, first, n) <= FEASIBLE * demand.size
+        return left, norm_of_part(trial.residual, first, n) <= FEASIBLE * demand.size
     moments = Demand(demand.matrix[first:], demand.hanging[first:], demand.right[first:], n - first, demand.size)
-    part = Change(trial.tau, trial.pull, trial.residual[first:], trial.direction[first:])
+    part = TensionChange(trial.tau, trial.pull, trial.residual[first:], trial.direction[first:])
     least_change(curves, moments, range_, part, memory)
     for k in range(first):
         trial.direction[k] = 0.0
@@ -238,7 +242,9 @@ def come_near(curves: Curves, demand: Demand, range_: Array, trial: Change, memo
 
 
 @glue
-def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tuple[int, float, float, bool]:
+def decide_feasibility(
+    curves: Curves, demand: Demand, change: TensionChange, memory: Memory
+) -> tuple[int, float, float, bool]:
     """Feasibility of a demand with tensions within the cables' limits.
 
     Args:
@@ -252,12 +258,12 @@ def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tu
         bracket of the shortfall [N]; whether the direction alone proves infeasibility, over the whole first range.
     """
     n, m = demand.matrix.shape
-    search, rest = new_search(memory, m)
+    search, rest = _new_search(memory, m)
     kept, at = block(rest.numbers, 0, 1, m)
     tau, at = block(rest.numbers, at, 3, max(m, n))
     rest = Memory(rest.numbers[at:], rest.counters)
-    trial = Change(tau[0, :m], kept[0], tau[1, :n], tau[2, :n])
-    first_range(curves, demand.size, search.ranges[0])
+    trial = TensionChange(tau[0, :m], kept[0], tau[1, :n], tau[2, :n])
+    _first_range(curves, demand.size, search.ranges[0])
     find_extrema(curves, search.ranges[0, LEAST], search.ranges[0, LARGEST], rest)
     for i in range(m):
         trial.tau[i] = change.tau[i]
@@ -265,7 +271,7 @@ def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tu
     top = 0
     for node in range(NODES):
         range_ = search.ranges[top]
-        left, balanced = come_near(curves, demand, range_, trial, rest)
+        left, balanced = _approach_demand(curves, demand, range_, trial, rest)
         if node == 0 and not (demand.size < math.inf and left == left):
             return POSE_NOT_CONVERGED, 0.0, math.inf, False
         if node == 0 or (balanced and left < enough):
@@ -277,21 +283,21 @@ def decide(curves: Curves, demand: Demand, change: Change, memory: Memory) -> tu
             enough = min(enough, left)
         if balanced and left <= FEASIBLE * demand.size:
             return POSE_SOLVED, 0.0, 0.0, False
-        spare = spare_along(curves, demand, range_, trial.direction, search.tops)
+        spare = _spare_capacity(curves, demand, range_, trial.direction, search.tops)
         if node == 0:
             for k in range(n):
                 change.direction[k] = trial.direction[k]
             if spare < 0.0:
                 return POSE_INFEASIBLE, -spare if left < math.inf else math.inf, enough, True
-        _, before = least_certain(curves, range_)
-        possible = spare >= 0.0 and narrow(curves, demand, range_, trial.direction, spare, search.tops)
-        possible = possible and narrow_free(curves, demand, range_, trial, search.tops, rest)
+        _, before = _least_certain(curves, range_)
+        possible = spare >= 0.0 and _narrow_range(curves, demand, range_, trial.direction, spare, search.tops)
+        possible = possible and _narrow_free(curves, demand, range_, trial, search.tops, rest)
         if possible:
-            worst, after = least_certain(curves, range_)
+            worst, after = _least_certain(curves, range_)
             if after > STANDSTILL * before or worst < 0:
                 if worst < 0 or top + 1 >= DEPTH:
                     break
-                split(curves, search.ranges, top, worst, trial.tau[worst])
+                _split_range(curves, search.ranges, top, worst, trial.tau[worst])
                 top += 1
         else:
             top -= 1

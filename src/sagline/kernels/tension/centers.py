@@ -12,7 +12,7 @@ from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLV
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.tension.on_polygon import centroid, feasible_corners
-from sagline.kernels.tension.programs import status_of
+from sagline.kernels.tension.programs import program_status
 from sagline.kernels.tension.work_arrays import WorkArrays
 
 THIN = 1e-9  # of the largest tension: a set thinner than this has no inside worth centering in
@@ -24,7 +24,7 @@ CENTERED = 1e-18  # square of the Newton decrement at which the center is found
 def share_at_center(bounds: Array, null: Array, point: Array, room: WorkArrays) -> int:
     """Move the point (r,) to the analytic center, from that of the round before if there was one."""
     corners, labels, known = room.corners, room.labels, room.known
-    if known[0] > 0 and is_inside(bounds, null, point) and analytic_center(bounds, null, room.rest, point):
+    if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, room.rest, point):
         return POSE_SOLVED
     known[0] = 0
     r, m = null.shape
@@ -43,14 +43,14 @@ def share_at_center(bounds: Array, null: Array, point: Array, room: WorkArrays) 
         point[0] = x
         if r == 2:
             point[1] = y
-    if not analytic_center(bounds, null, room.rest, point):
+    if not _analytic_center(bounds, null, room.rest, point):
         return POSE_NOT_CONVERGED
     known[0] = 1
     return POSE_SOLVED
 
 
 @kernel
-def is_inside(bounds: Array, null: Array, point: Array) -> bool:
+def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
     """True if a point keeps all limits by more than the smallest thickness."""
     slack = THIN * largest_bound(bounds)
     for i in range(null.shape[1]):
@@ -87,11 +87,11 @@ def deepest_point(bounds: Array, null: Array, room: WorkArrays, point: Array) ->
     outcome = lowest_point(rows, halves, cost, slack, room.basis, found)
     for k in range(r):
         point[k] = found[k]
-    return POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else status_of(outcome)
+    return POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else program_status(outcome)
 
 
 @kernel
-def analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -> bool:
+def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -> bool:
     """Move a point inside the feasible set (r,) to the one of largest product of distances to all limits.
 
     Newton's method with damped steps on the barrier, which is self-concordant; infinite limits do not count. A set

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
-from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.algebra.gram_schmidt import normalize_row, orthogonalize_row
 from sagline.kernels.codes import CLOSED_FORM, PUNCTURE
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
@@ -37,15 +37,15 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
             tension[i] += null[k, i] * share
     if method == CLOSED_FORM:
         return satisfies_limits(bounds, tension, slack)
-    if not hold_violated(bounds, null, slack, memory, tension):
+    if not _hold_violated(bounds, null, slack, memory, tension):
         return False
     if method == PUNCTURE:
-        puncture(bounds, tension)
+        _puncture(bounds, tension)
     return True
 
 
 @glue
-def hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
+def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
     """Hold the cable that misses its limit most at that limit, and share the rest again, until all keep theirs.
 
     Works on the tensions, by orthogonal steps in the null space; a cable once held stays there.
@@ -72,19 +72,19 @@ def hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tens
             return False
         for k in range(r):
             held[count, k] = null[k, cable]
-        square = take_out(held, count, triangle)
+        square = orthogonalize_row(held, count, triangle)
         if square < DEPENDENT:
             return False
         step = (limit - tension[cable]) / square
         for i in range(m):
             for k in range(r):
                 tension[i] += step * held[count, k] * null[k, i]
-        keep(held, count, triangle, square)
+        normalize_row(held, count, triangle, square)
     return False
 
 
 @glue
-def puncture(bounds: Array, tension: Array) -> None:
+def _puncture(bounds: Array, tension: Array) -> None:
     """Move the tensions back towards the minimum norm, START, as far as the limits let them."""
     m = tension.size
     share = 0.0  # 0 at the minimum norm, 1 where we are

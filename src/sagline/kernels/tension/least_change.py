@@ -14,7 +14,7 @@ from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, inward, largest_bound
 from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
-from sagline.kernels.algebra.nearest_point import Held, nearest_point, new_held
+from sagline.kernels.algebra.nearest_point import ActiveSet, nearest_point, new_active_set
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at, slopes_at
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
@@ -46,7 +46,7 @@ class Demand(NamedTuple):
     size: float
 
 
-class Change(NamedTuple):
+class TensionChange(NamedTuple):
     """A state of the search, for m cables and n rows.
 
     Attributes:
@@ -62,7 +62,7 @@ class Change(NamedTuple):
     direction: Array
 
 
-class Tangents(NamedTuple):
+class _Tangents(NamedTuple):
     """One Newton step, with h hard and k soft rows and d = m - h unknowns.
 
     Attributes:
@@ -93,7 +93,7 @@ class Tangents(NamedTuple):
     rows: Array
     bounds: Array
     unknowns: Array
-    held: Held
+    held: ActiveSet
     push: Array
     bend: Array
     multipliers: Array
@@ -101,7 +101,7 @@ class Tangents(NamedTuple):
 
 
 @glue
-def new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[Tangents, Memory]:
+def _new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[_Tangents, Memory]:
     """Work arrays for a step with so many hard rows, and the memory that is left."""
     d = m - hard
     numbers = memory.numbers
@@ -117,9 +117,9 @@ def new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[Tangents, M
     normal, at = block(numbers, at, d, d)
     unknowns, at = block(numbers, at, 3, d)
     left, at = block(numbers, at, 2, n)
-    held, rest = new_held(Memory(numbers[at:], memory.counters), d)
+    held, rest = new_active_set(Memory(numbers[at:], memory.counters), d)
     held.labels[0] = 0
-    tangents = Tangents(
+    tangents = _Tangents(
         wide[:n], reduced[:hard], diagonals, q[: m + 1], inverse[:hard], soft, normal, rows[:d], bounds[:STRIP_ROWS],
         unknowns, held, others[0], others[1], left[1], (others[2], others[3], left[0]),
     )  # fmt: skip
@@ -127,7 +127,7 @@ def new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[Tangents, M
 
 
 @glue
-def leave(curves: Curves, demand: Demand, tau: Array, pull: Array, residual: Array) -> None:
+def _fill_residual(curves: Curves, demand: Demand, tau: Array, pull: Array, residual: Array) -> None:
     """Fill the pulls (m,) of tensions (m,) and what they leave of the demand (n,)."""
     sag_forces_at(curves, tau, pull)
     for k in range(residual.size):
@@ -137,7 +137,7 @@ def leave(curves: Curves, demand: Demand, tau: Array, pull: Array, residual: Arr
 
 
 @formula
-def length_of(vector: Array, first: int, last: int) -> float:
+def norm_of_part(vector: Array, first: int, last: int) -> float:
     """Euclidean length of part of a vector."""
     total = 0.0
     for k in range(first, last):
@@ -146,7 +146,7 @@ def length_of(vector: Array, first: int, last: int) -> float:
 
 
 @glue
-def set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: Tangents) -> bool:
+def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: _Tangents) -> bool:
     """Fill the tangents at given tensions, and the normal matrix; False where the hard rows depend on each other.
 
     The curves' bend counts with the multipliers (n,) of the step before, where it is against going on: without it the
@@ -185,7 +185,7 @@ def set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array,
 
 
 @glue
-def find_step(demand: Demand, ranges: Array, change: Change, step: Tangents) -> bool:
+def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tangents) -> bool:
     """Fill the tensions of a full step, and what the limits push with; False where hard rows and limits contradict."""
     n, m = step.matrix.shape
     soft = demand.soft
@@ -235,7 +235,7 @@ def find_step(demand: Demand, ranges: Array, change: Change, step: Tangents) -> 
 
 
 @glue
-def point_along(soft: int, change: Change, step: Tangents) -> float:
+def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
     """Fill the direction along which the step leaves its rest, soft part of length 1; returns the rest's length [N].
 
     On the free cables it is perpendicular to the tangents; where a limit holds a cable, it points beyond that limit.
@@ -251,7 +251,7 @@ def point_along(soft: int, change: Change, step: Tangents) -> float:
         along[i] = step.push[i] - step.bend[i] * (trial[i] - change.tau[i])
         for k in range(soft):
             along[i] += y[k] * step.matrix[k, i]
-    rest = length_of(y, 0, soft)
+    rest = norm_of_part(y, 0, soft)
     for k in range(hard):
         y[soft + k] = 0.0
         for i in range(m):
@@ -262,7 +262,7 @@ def point_along(soft: int, change: Change, step: Tangents) -> float:
 
 
 @glue
-def take_step(curves: Curves, demand: Demand, rest: float, change: Change, step: Tangents) -> bool:
+def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
     """Go as far along a step as keeps its promise, halving it; False where there is nothing to gain.
 
     What hard rows leave counts by more than their multipliers, so that a step that pays for it elsewhere is none.
@@ -274,7 +274,7 @@ def take_step(curves: Curves, demand: Demand, rest: float, change: Change, step:
     price = 1.0
     for k in range(soft, n):
         price = max(price, 2.0 * abs(change.direction[k]))
-    before = length_of(change.residual, 0, soft) + price * length_of(change.residual, soft, n)
+    before = norm_of_part(change.residual, 0, soft) + price * norm_of_part(change.residual, soft, n)
     moved = 0.0
     for i in range(m):
         moved = max(moved, abs(trial[i] - change.tau[i]))
@@ -283,8 +283,8 @@ def take_step(curves: Curves, demand: Demand, rest: float, change: Change, step:
     share = 1.0
     after = math.inf
     for _ in range(HALVINGS):
-        leave(curves, demand, trial, trial_pull, left)
-        after = length_of(left, 0, soft) + price * length_of(left, soft, n)
+        _fill_residual(curves, demand, trial, trial_pull, left)
+        after = norm_of_part(left, 0, soft) + price * norm_of_part(left, soft, n)
         if after <= before - DECREASE * share * (before - rest) + known:
             break
         share *= 0.5
@@ -301,7 +301,7 @@ def take_step(curves: Curves, demand: Demand, rest: float, change: Change, step:
 
 
 @kernel
-def least_change(curves: Curves, demand: Demand, ranges: Array, change: Change, memory: Memory) -> float:
+def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionChange, memory: Memory) -> float:
     """Change tensions within their ranges until what they leave of the demand is least; returns its length [N].
 
     Args:
@@ -317,18 +317,18 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: Change, 
     """
     n, m = demand.matrix.shape
     soft = demand.soft
-    step, _ = new_tangents(memory, n, m, n - soft)
-    leave(curves, demand, change.tau, change.pull, change.residual)
+    step, _ = _new_tangents(memory, n, m, n - soft)
+    _fill_residual(curves, demand, change.tau, change.pull, change.residual)
     for k in range(n):
         step.multipliers[k] = 0.0
     for _ in range(NEWTON_STEPS):
-        if not set_tangents(curves, demand, change.tau, step.multipliers, step):
+        if not _set_tangents(curves, demand, change.tau, step.multipliers, step):
             return math.nan
-        if not find_step(demand, ranges, change, step):
+        if not _find_step(demand, ranges, change, step):
             return math.inf
-        rest = point_along(soft, change, step)
+        rest = _point_along(soft, change, step)
         for k in range(n):
             step.multipliers[k] = rest * change.direction[k]
-        if not take_step(curves, demand, rest, change, step):
+        if not _line_search(curves, demand, rest, change, step):
             break
-    return length_of(change.residual, 0, soft)
+    return norm_of_part(change.residual, 0, soft)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.algebra.gram_schmidt import keep, take_out
+from sagline.kernels.algebra.gram_schmidt import normalize_row, orthogonalize_row
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
@@ -40,7 +40,7 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 
 @glue
-def extend(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
+def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
     """Add the chosen columns from a place on to the orthonormal frame (n, n); returns how many it then has.
 
     Fewer than were chosen where a column depends on those before it.
@@ -52,16 +52,16 @@ def extend(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: A
         for k in range(n):
             frame[c, k] = matrix[k, chosen[c]]
             size += frame[c, k] * frame[c, k]
-        square = take_out(frame, c, triangle)
+        square = orthogonalize_row(frame, c, triangle)
         if not square > DEPENDENT * size:
             break
-        keep(frame, c, triangle, square)
+        normalize_row(frame, c, triangle, square)
         held = c + 1
     return held
 
 
 @glue
-def complete(frame: Array, triangle: Array) -> None:
+def complete_frame(frame: Array, triangle: Array) -> None:
     """Fill the last row of a frame (n, n): what is perpendicular to all others."""
     n = frame.shape[0]
     best = 0
@@ -74,11 +74,11 @@ def complete(frame: Array, triangle: Array) -> None:
             least, best = covered, k
     for k in range(n):
         frame[n - 1, k] = 1.0 if k == best else 0.0
-    keep(frame, n - 1, triangle, take_out(frame, n - 1, triangle))
+    normalize_row(frame, n - 1, triangle, orthogonalize_row(frame, n - 1, triangle))
 
 
 @formula
-def reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
+def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
     """Largest normal . J t, and largest -normal . J t, over all t within their limits; may be infinite."""
     n, m = matrix.shape
     forward = 0.0
@@ -116,9 +116,9 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
     least = math.inf
     held = 0  # columns of the choice in the frame
     for _ in range(MOST_FACES):
-        held = extend(matrix, chosen, held, frame, triangle)
+        held = extend_frame(matrix, chosen, held, frame, triangle)
         if held == n - 1:
-            complete(frame, triangle)
+            complete_frame(frame, triangle)
             force = 0.0
             along = 0.0
             for k in range(n):
@@ -127,7 +127,7 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
                     force += normal[k] * normal[k]
             if force > 1e-18:
                 force = math.sqrt(force)
-                forward, backward = reach(matrix, low, high, normal)
+                forward, backward = zonotope_reach(matrix, low, high, normal)
                 least = min(least, (forward - along) / force, (backward + along) / force)
         changed = next_choice(chosen, m)
         if changed < 0:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
-from sagline.kernels.algebra.nearest_point import Held, nearest_point, new_held
+from sagline.kernels.algebra.nearest_point import ActiveSet, nearest_point, new_active_set
 from sagline.kernels.codes import CLOSEST, POSE_INFEASIBLE, POSE_SOLVED, QUADRATIC_PROGRAM
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block
@@ -47,20 +47,20 @@ class ReferencePoint(NamedTuple):
 
     previous: Array
     reference: Array
-    held: Held
+    held: ActiveSet
     point: Array
 
 
 @glue
-def new_nearness(memory: Memory, previous: Array, r: int) -> tuple[ReferencePoint, Memory]:
+def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[ReferencePoint, Memory]:
     """Work arrays for r redundant cables, and the memory that is left."""
     rows, at = block(memory.numbers, 0, 2, r)
-    held, rest = new_held(Memory(memory.numbers[at:], memory.counters), r)
+    held, rest = new_active_set(Memory(memory.numbers[at:], memory.counters), r)
     return ReferencePoint(previous, rows[0], held, rows[1]), rest
 
 
 @glue
-def refer(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
+def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
     """Fill the point of the null space that the shared tensions shall be nearest to.
 
     offset: of the distribution's variable (m,).

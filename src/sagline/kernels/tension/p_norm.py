@@ -35,20 +35,20 @@ def share_by_norm(
         for k in range(point.size):
             last[k] = point[k]
         kept = nearest_point(null, bounds, last, slack, near.held, point)
-        if kept and lowest_p_norm(p, p, bounds, offset, null, near, memory):
+        if kept and _lowest_p_norm(p, p, bounds, offset, null, near, memory):
             return POSE_SOLVED
     known[0] = 0
     near.held.labels[0] = 0
     if not nearest_point(null, bounds, near.reference, slack, near.held, point):
         return POSE_INFEASIBLE
-    if not lowest_p_norm(min(4.0, p), p, bounds, offset, null, near, memory):
+    if not _lowest_p_norm(min(4.0, p), p, bounds, offset, null, near, memory):
         return POSE_NOT_CONVERGED
     known[0] = 1
     return POSE_SOLVED
 
 
 @formula
-def tension_at(bounds: Array, null: Array, point: Array, i: int) -> float:
+def _tension_at(bounds: Array, null: Array, point: Array, i: int) -> float:
     """Tension of cable i at a point of the null space, in the distribution's variable without its offset."""
     tension = bounds[START, i]
     for k in range(point.size):
@@ -57,16 +57,16 @@ def tension_at(bounds: Array, null: Array, point: Array, i: int) -> float:
 
 
 @formula
-def size_of(bounds: Array, offset: Array, null: Array, point: Array, p: float, scale: float) -> float:
+def _p_norm_power(bounds: Array, offset: Array, null: Array, point: Array, p: float, scale: float) -> float:
     """Sum of the p-th powers of the tensions over a scale."""
     total = 0.0
     for i in range(null.shape[1]):
-        total += abs((tension_at(bounds, null, point, i) + offset[i]) / scale) ** p
+        total += abs((_tension_at(bounds, null, point, i) + offset[i]) / scale) ** p
     return total
 
 
 @glue
-def newton_target(
+def _newton_target(
     bounds: Array, offset: Array, null: Array, point: Array, p: float, slope: Array, curve: Array, target: Array
 ) -> float:
     """Fill slope, Cholesky factor of the curvature, and the point that Newton's step leads to without limits.
@@ -76,13 +76,13 @@ def newton_target(
     r, m = null.shape
     scale = 0.0
     for i in range(m):
-        scale = max(scale, abs(tension_at(bounds, null, point, i) + offset[i]))
+        scale = max(scale, abs(_tension_at(bounds, null, point, i) + offset[i]))
     for k in range(r):
         slope[k] = 0.0
         for j in range(k + 1):
             curve[k, j] = 0.0
     for i in range(m):
-        size = abs(tension_at(bounds, null, point, i) + offset[i]) / scale
+        size = abs(_tension_at(bounds, null, point, i) + offset[i]) / scale
         power = max(size, 1e-9) ** (p - 2.0)
         for k in range(r):
             slope[k] += power * size * null[k, i] * scale
@@ -104,7 +104,7 @@ def newton_target(
 
 
 @glue
-def turn(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -> None:
+def _change_metric(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -> None:
     """Fill null space (r, m) and target (r,) in coordinates in which the metric L L^T is the ordinary one."""
     r, m = null.shape
     for k in range(r):
@@ -121,7 +121,7 @@ def turn(null: Array, curve: Array, target: Array, turned: Array, goal: Array) -
 
 
 @kernel
-def lowest_p_norm(
+def _lowest_p_norm(
     first: float, p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, memory: Memory
 ) -> bool:
     """Move the feasible point (r,) of near to that of least p-norm.
@@ -141,11 +141,11 @@ def lowest_p_norm(
     slack = TOLERANCE * largest
     exponent = first
     for _ in range(STEPS):
-        scale = newton_target(bounds, offset, null, point, exponent, slope, curve, target)
+        scale = _newton_target(bounds, offset, null, point, exponent, slope, curve, target)
         if scale == 0.0:
             return True
         if most_violated_bound(null, bounds, target, 0.0, True) >= 0:
-            turn(null, curve, target, turned, goal)
+            _change_metric(null, curve, target, turned, goal)
             if not nearest_point(turned, bounds, goal, slack * max(curve[0, 0], 1.0), near.held, target):
                 return False
             solve_upper(curve, target)
@@ -157,12 +157,12 @@ def lowest_p_norm(
         for k in range(r):
             length = max(length, abs(target[k] - point[k]))
             gain -= slope[k] * (target[k] - point[k])
-        before = size_of(bounds, offset, null, point, exponent, scale)
+        before = _p_norm_power(bounds, offset, null, point, exponent, scale)
         share = 1.0
         for _half in range(HALVINGS):
             for k in range(r):
                 trial[k] = point[k] + share * (target[k] - point[k])
-            after = size_of(bounds, offset, null, trial, exponent, scale)
+            after = _p_norm_power(bounds, offset, null, trial, exponent, scale)
             least_gain = 1e-4 * share * exponent * gain / (scale * scale)
             if after <= before - least_gain + 1e-15 * before:
                 break

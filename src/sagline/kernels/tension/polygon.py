@@ -18,7 +18,9 @@ SPARE_CORNERS = 6  # beyond two a cable: the box and the corner in the making
 
 
 @glue
-def cut(corners: Array, labels: Indices, count: int, x: float, y: float, side: float, label: int, slack: float) -> int:
+def _cut_polygon(
+    corners: Array, labels: Indices, count: int, x: float, y: float, side: float, label: int, slack: float
+) -> int:
     """Keep the part of the polygon where (x, y) . corner >= side; returns the number of corners left.
 
     Works in place. A half-plane cuts a convex polygon at most twice, where it enters and where it leaves.
@@ -38,17 +40,17 @@ def cut(corners: Array, labels: Indices, count: int, x: float, y: float, side: f
     if kept == count or kept == 0:
         return kept
     # the new side runs from where the polygon leaves the half-plane to where it enters it
-    ax, ay = crossing(corners, leaving, leaving + 1 if leaving + 1 < count else 0, x, y, side)
-    bx, by = crossing(corners, entering, entering - 1 if entering > 0 else count - 1, x, y, side)
+    ax, ay = _crossing(corners, leaving, leaving + 1 if leaving + 1 < count else 0, x, y, side)
+    bx, by = _crossing(corners, entering, entering - 1 if entering > 0 else count - 1, x, y, side)
     last_label = labels[entering - 1 if entering > 0 else count - 1]
-    place = make_room(corners, labels, count, leaving, entering, kept)
+    place = _shift_corners(corners, labels, count, leaving, entering, kept)
     corners[place, 0], corners[place, 1], labels[place] = ax, ay, label
     corners[place + 1, 0], corners[place + 1, 1], labels[place + 1] = bx, by, last_label
     return kept + 2
 
 
 @formula
-def crossing(corners: Array, inside: int, outside: int, x: float, y: float, side: float) -> tuple[float, float]:
+def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, side: float) -> tuple[float, float]:
     """Intersection of the line (x, y) . corner = side with the edge between two corners, one on each side of it."""
     px, py = corners[inside, 0], corners[inside, 1]
     qx, qy = corners[outside, 0], corners[outside, 1]
@@ -58,7 +60,7 @@ def crossing(corners: Array, inside: int, outside: int, x: float, y: float, side
 
 
 @kernel
-def make_room(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
+def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
     """Remove the corners outside and make room for the two ends of a new side; returns the place of the first."""
     if leaving >= entering:  # the corners inside lie between the two: move them to the front
         for k in range(kept):
@@ -98,7 +100,7 @@ def widest_pair(null: Array) -> tuple[int, int, float]:
 
 
 @glue
-def start_polygon(bounds: Array, null: Array, radius: float, corners: Array, labels: Indices) -> tuple[int, int]:
+def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, labels: Indices) -> tuple[int, int]:
     """Fill the four corners that two crossing bounds have in common; an infinite limit is as far out as a box.
 
     Returns the two bounds.
@@ -133,7 +135,7 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
     m = null.shape[1]
     largest = largest_bound(bounds)
     slack = TOLERANCE * largest
-    a, b = start_polygon(bounds, null, box_radius(largest, bounds), corners, labels)
+    a, b = _start_polygon(bounds, null, box_radius(largest, bounds), corners, labels)
     count = 4
     for i in range(m):
         x, y = null[0, i], null[1, i]
@@ -150,7 +152,7 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
             if least < below - slack if upper == 0 else most > above + slack:
                 sign = inward(upper)
                 label = 2 * i + upper
-                count = cut(corners, labels, count, sign * x, sign * y, side_of(bounds, label), label, slack)
+                count = _cut_polygon(corners, labels, count, sign * x, sign * y, side_of(bounds, label), label, slack)
                 if count == 0:
                     return 0
     return count

@@ -17,7 +17,7 @@ TIED = 1e-10  # of the largest tension: sums that differ by less are the same; o
 
 
 @formula
-def status_of(outcome: int) -> int:
+def program_status(outcome: int) -> int:
     """Status of the pose from a linear program's outcome."""
     if outcome == LP_SOLVED:
         return POSE_SOLVED
@@ -27,7 +27,7 @@ def status_of(outcome: int) -> int:
 
 
 @formula
-def is_tied(basis: Basis) -> bool:
+def _is_tied(basis: Basis) -> bool:
     """True if a program has more than one optimum: an active bound with zero multiplier."""
     largest = 0.0
     least = math.inf
@@ -50,8 +50,8 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
     outcome = lowest_point(null, bounds, cost, 0.0, basis, near.point)
     if outcome != LP_SOLVED:
         basis.labels[0] = -1
-        return status_of(outcome)
-    if not is_tied(basis):
+        return program_status(outcome)
+    if not _is_tied(basis):
         return POSE_SOLVED
     rows, at = block(memory.numbers, at, r, m + 1)
     tied, at = block(memory.numbers, at, STRIP_ROWS, m + 1)
@@ -104,10 +104,10 @@ def share_lowest_maximum(
     outcome = lowest_point(rows, wide, cost, TOLERANCE * largest, basis, found)
     if outcome != LP_SOLVED:
         basis.labels[0] = -1
-        return POSE_INFEASIBLE if status_of(outcome) == POSE_INFEASIBLE else POSE_NOT_CONVERGED
+        return POSE_INFEASIBLE if program_status(outcome) == POSE_INFEASIBLE else POSE_NOT_CONVERGED
     for k in range(r):
         near.point[k] = found[k]
-    if not is_tied(basis):
+    if not _is_tied(basis):
         return POSE_SOLVED
     for i in range(m):
         for row in range(STRIP_ROWS):

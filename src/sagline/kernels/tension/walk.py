@@ -22,7 +22,7 @@ PARALLEL = 1e-12
 
 
 @kernel
-def limit_lines(bounds: Array, null: Array, lines: Array) -> None:
+def _limit_lines(bounds: Array, null: Array, lines: Array) -> None:
     """Fill the limits 2i and 2i + 1 as rows gx, gy, offset of gx x + gy y + offset >= 0, (2m, 3)."""
     for i in range(null.shape[1]):
         lines[2 * i, 0] = null[0, i]
@@ -57,7 +57,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
     lines, _ = block(memory.numbers, 0, 2 * m, 3)
-    limit_lines(bounds, null, lines)
+    _limit_lines(bounds, null, lines)
     met, _ = counters(memory, 0, 2 * m)  # 1 for a limit that counts
     a, b = most_independent(null)
     line = 2 * a

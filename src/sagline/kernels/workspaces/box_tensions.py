@@ -11,9 +11,9 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.sag_forces import LOOSEST, Curves, sag_forces_at
 from sagline.kernels.codes import CATENARY, LIMITS_OF_CHORD
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.workspaces.centered import FARTHEST, Centered, find_center, leave
-from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place
-from sagline.kernels.workspaces.sag_force_bounds import most_pull, pull_slope, sags
+from sagline.kernels.workspaces.centered import FARTHEST, Centered, fill_imbalance, find_center
+from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
+from sagline.kernels.workspaces.sag_force_bounds import has_sag, most_pull, pull_slope
 
 SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
 SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the pull
@@ -41,24 +41,24 @@ class Ranges(NamedTuple):
 
 
 @kernel
-def set_ranges(quantity: int, place: Place, curves: Curves, ranges: Ranges) -> None:
+def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges) -> None:
     """Fill the limits that hold all over a box from those at its middle."""
     cables = curves.cables
     for i in range(place.way.size):
         low, high = cables.low[i], cables.high[i]
         ranges.low[i] = ranges.lowest[i] = low
         ranges.high[i] = ranges.highest[i] = high
-        if sags(curves, i):
+        if has_sag(curves, i):
             loosest = cables.half_weight[i] / LOOSEST
             if quantity != LIMITS_OF_CHORD:
-                move_limits(place, curves, i, ranges)
+                _move_limits(place, curves, i, ranges)
             ranges.lowest[i] = max(ranges.lowest[i], loosest)
             ranges.low[i] = max(ranges.low[i], loosest)
             ranges.high[i] = min(ranges.high[i], cables.stiffness[i])
 
 
 @kernel
-def move_limits(place: Place, curves: Curves, i: int, ranges: Ranges) -> None:
+def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> None:
     """Take the limits of a cable's frame end, as chord limits at the middle, apart by how far they move in a box.
 
     They move as its pull does where it is not slack. A limit that is, anywhere in the box, is the least of those that
@@ -77,7 +77,7 @@ def move_limits(place: Place, curves: Curves, i: int, ranges: Ranges) -> None:
 
 
 @kernel
-def tighten(freedom: Array, place: Place, curves: Curves, upward: float, ranges: Ranges) -> None:
+def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, ranges: Ranges) -> None:
     """Take from the largest tensions what no load on cables that all pull up could cause.
 
     Along the vertical they balance weight, load and pulls, of which each is at most the rest.
@@ -106,7 +106,7 @@ def tighten(freedom: Array, place: Place, curves: Curves, upward: float, ranges:
 
 
 @kernel
-def spread_of_slopes(place: Place, box: Box, centered: Centered, ranges: Ranges, slopes: Array) -> None:
+def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ranges: Ranges, slopes: Array) -> None:
     """Fill how the wrench that the centered tensions and their pulls give goes with each motion, (MOTIONS, 6)."""
     m = place.way.size
     for motion in range(MOTIONS):
@@ -129,7 +129,7 @@ def spread_of_slopes(place: Place, box: Box, centered: Centered, ranges: Ranges,
 
 
 @formula
-def lift(rows: Array, vector: Array, full: Array) -> None:
+def in_wrench_space(rows: Array, vector: Array, full: Array) -> None:
     """Fill a direction in wrenches (6,) from one along the free motions (n,)."""
     for a in range(6):
         full[a] = 0.0
@@ -138,7 +138,9 @@ def lift(rows: Array, vector: Array, full: Array) -> None:
 
 
 @kernel
-def weigh(curves: Curves, place: Place, center: Array, load: Array, centered: Centered, ranges: Ranges) -> None:
+def _fill_demand(
+    curves: Curves, place: CablesInBox, center: Array, load: Array, centered: Centered, ranges: Ranges
+) -> None:
     """Fill what the chord tensions have to supply, with the pulls at the present ones.
 
     Args:
@@ -165,7 +167,7 @@ def weigh(curves: Curves, place: Place, center: Array, load: Array, centered: Ce
 
 
 @glue
-def smoothing_of(place: Place, geometry: Array, tau: Array) -> float:
+def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
     """Smoothing for a box [N^2]: the square of a share of how far tensions' wrenches go in it."""
     square = 0.0
     for i in range(tau.size):
@@ -194,7 +196,7 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
 
 @kernel
 def center_tensions(
-    place: Place, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
+    place: CablesInBox, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
 ) -> tuple[float, float]:
     """Let tensions between the limits of the search balance a wrench (6,), with their own pulls.
 
@@ -207,9 +209,9 @@ def center_tensions(
         if not centered.low[i] < centered.tau[i] < centered.high[i]:
             centered.tau[i] = 0.5 * (centered.low[i] + centered.high[i])
     for _ in range(rounds):
-        weigh(curves, place, body, wrench, centered, ranges)
-        smoothing = smoothing_of(place, geometry, centered.tau)
+        _fill_demand(curves, place, body, wrench, centered, ranges)
+        smoothing = _smoothing_of(place, geometry, centered.tau)
         find_center(place.matrix, smoothing, centered)
-    weigh(curves, place, body, wrench, centered, ranges)
-    square = leave(place.matrix, centered)
+    _fill_demand(curves, place, body, wrench, centered, ranges)
+    square = fill_imbalance(place.matrix, centered)
     return square, smoothing

@@ -62,7 +62,7 @@ def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
 
 
 @kernel
-def leave(matrix: Array, centered: Centered) -> float:
+def fill_imbalance(matrix: Array, centered: Centered) -> float:
     """Fill what the tensions leave of the right side; returns the square of its length [N^2]."""
     n, m = matrix.shape
     square = 0.0
@@ -75,7 +75,7 @@ def leave(matrix: Array, centered: Centered) -> float:
 
 
 @kernel
-def begin(matrix: Array, smoothing: float, centered: Centered) -> None:
+def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> None:
     """Start from the tensions of the search before, where they fit between the limits, else from the middle."""
     m = centered.tau.size
     known = not math.isnan(centered.tau[0])
@@ -86,7 +86,7 @@ def begin(matrix: Array, smoothing: float, centered: Centered) -> None:
             centered.tau[i] = min(max(centered.tau[i], centered.low[i] + slack), centered.high[i] - slack)
             if not known:
                 centered.tau[i] = centered.low[i] + 0.5 * room
-    square = max(leave(matrix, centered) / m, smoothing)
+    square = max(fill_imbalance(matrix, centered) / m, smoothing)
     for i in range(m):
         centered.below[i] = square / (centered.tau[i] - centered.low[i])
         centered.above[i] = square / (centered.high[i] - centered.tau[i])
@@ -116,8 +116,8 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     """
     n, m = matrix.shape
     tau, low, high, below, above = centered.tau, centered.low, centered.high, centered.below, centered.above
-    begin(matrix, smoothing, centered)
-    square = leave(matrix, centered)
+    _start_centering(matrix, smoothing, centered)
+    square = fill_imbalance(matrix, centered)
     for _ in range(STEPS):
         present = 0.0
         worst = 0.0
@@ -169,5 +169,5 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
             below[i] += dual_share * (goal / down - below[i] * (1.0 + step / down))
             above[i] += dual_share * (goal / up - above[i] * (1.0 - step / up))
             tau[i] += share * step
-        square = leave(matrix, centered)
+        square = fill_imbalance(matrix, centered)
     return square

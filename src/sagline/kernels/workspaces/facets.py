@@ -81,12 +81,12 @@ def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
         first = max(first, largest)
         if not largest > RANK * first:
             return False
-        exchange(table, k, row)
+        _exchange_rows(table, k, row)
         basis[k] = column
-        scale(table[k], 1.0 / table[k, column])
+        _scale_row(table[k], 1.0 / table[k, column])
         for j in range(n):
             if j != k:
-                subtract(table[j], table[j, column], table[k])
+                _subtract_row(table[j], table[j, column], table[k])
                 table[j, column] = 0.0
     for k in range(n):
         for a in range(6):
@@ -107,21 +107,21 @@ def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
 
 
 @formula
-def exchange(table: Array, k: int, row: int) -> None:
+def _exchange_rows(table: Array, k: int, row: int) -> None:
     """Exchange two rows."""
     for j in range(table.shape[1]):
         table[k, j], table[row, j] = table[row, j], table[k, j]
 
 
 @formula
-def scale(row: Array, factor: float) -> None:
+def _scale_row(row: Array, factor: float) -> None:
     """Multiply a row."""
     for j in range(row.size):
         row[j] *= factor
 
 
 @formula
-def subtract(row: Array, factor: float, other: Array) -> None:
+def _subtract_row(row: Array, factor: float, other: Array) -> None:
     """Take a multiple of another row from a row."""
     for j in range(row.size):
         row[j] -= factor * other[j]

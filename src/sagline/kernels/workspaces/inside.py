@@ -8,10 +8,10 @@ from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
 from sagline.kernels.cable.sag_forces import Curves
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.workspaces.box_tensions import Ranges, lift, spread_of_slopes
+from sagline.kernels.workspaces.box_tensions import Ranges, in_wrench_space, spread_of_slopes
 from sagline.kernels.workspaces.centered import Centered, factor_normal
-from sagline.kernels.workspaces.loads import Loads, dot6, reach
-from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place, most_of_linear, norm3
+from sagline.kernels.workspaces.loads import Loads, dot6, reach_of_loads
+from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange, most_of_linear, norm3
 from sagline.kernels.workspaces.sag_force_bounds import fall_rate, pull_slope, rise_rate
 
 POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which nothing is proved: the place is all but singular
@@ -32,8 +32,8 @@ class Precision(NamedTuple):
 
 
 @kernel
-def is_inside(
-    place: Place, box: Box, curves: Curves, loads: Loads, centered: Centered, ranges: Ranges, precision: Precision,
+def proves_inside(
+    place: CablesInBox, box: PoseRange, curves: Curves, loads: Loads, centered: Centered, ranges: Ranges, precision: Precision,
     memory: Memory,
 ) -> bool:  # fmt: skip
     """True if the policy tau + J^+ z stays within the limits all over a box; z is the demand of box and loads.
@@ -90,7 +90,7 @@ def is_inside(
     error += precision.rounding
     possible = error < POOREST_INVERSE
     for i in range(m):
-        lift(place.rows, inverse[i], along)
+        in_wrench_space(place.rows, inverse[i], along)
         for motion in range(MOTIONS):
             coefficients[motion] = dot6(slopes[motion], along)
         first = most_of_linear(box, coefficients)
@@ -110,10 +110,10 @@ def is_inside(
             bends += abs(ranges.pull[j]) * arm * place.curled[j]
             change[i, j] = precision.bends * (length * place.turned[j] + arm * place.swung[j]) + inexact
             hanging[i, j] = abs(z) + arm * place.swung[j]
-        most = reach(loads, along)
+        most = reach_of_loads(loads, along)
         for a in range(6):
             along[a] = -along[a]
-        centered.give[i] = max(most, reach(loads, along))
+        centered.give[i] = max(most, reach_of_loads(loads, along))
         sum_[i] = (first + precision.bends * bends + centered.give[i]) * (1.0 + precision.rounding)
         possible = possible and sum_[i] < slack[i]
     if not possible:

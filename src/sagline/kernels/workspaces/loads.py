@@ -34,7 +34,7 @@ def dot6(a: Array, b: Array) -> float:
 
 
 @formula
-def along_axis(axes: Array, k: int, against: Array) -> float:
+def _along_axis(axes: Array, k: int, against: Array) -> float:
     """Inner product of column k of an ellipsoid's matrix (6, 6) and a direction (6,)."""
     along = 0.0
     for a in range(6):
@@ -43,23 +43,23 @@ def along_axis(axes: Array, k: int, against: Array) -> float:
 
 
 @formula
-def reach_of_ellipsoid(axes: Array, against: Array) -> float:
+def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
     """Extent of an ellipsoid to either side of its center."""
     square = 0.0
     for k in range(6):
-        along = along_axis(axes, k, against)
+        along = _along_axis(axes, k, against)
         square += along * along
     return math.sqrt(square)
 
 
 @kernel
-def reach(loads: Loads, against: Array) -> float:
+def reach_of_loads(loads: Loads, against: Array) -> float:
     """Largest -against . (w - center) over the set."""
     most = 0.0
     for s in range(loads.segments.shape[0]):
         most += abs(dot6(loads.segments[s], against))
     for e in range(loads.ellipsoids.shape[0]):
-        most += reach_of_ellipsoid(loads.ellipsoids[e], against)
+        most += _reach_of_ellipsoid(loads.ellipsoids[e], against)
     first = 0
     for p in range(loads.sizes.size):
         best = -math.inf
@@ -81,10 +81,10 @@ def farthest(loads: Loads, against: Array, wrench: Array) -> None:
             wrench[a] += sign * loads.segments[s, a]
     for e in range(loads.ellipsoids.shape[0]):
         axes = loads.ellipsoids[e]
-        length = reach_of_ellipsoid(axes, against)
+        length = _reach_of_ellipsoid(axes, against)
         if length > 0.0:
             for k in range(6):
-                share = along_axis(axes, k, against) / length
+                share = _along_axis(axes, k, against) / length
                 for a in range(6):
                     wrench[a] -= axes[a, k] * share
     first = 0

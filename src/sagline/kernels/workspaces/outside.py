@@ -9,11 +9,11 @@ from sagline.kernels.algebra.cholesky import solve_lower, solve_upper
 from sagline.kernels.cable.sag_forces import Curves
 from sagline.kernels.jit import formula, kernel
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.workspaces.box_tensions import Ranges, lift, spread_of_slopes
+from sagline.kernels.workspaces.box_tensions import Ranges, in_wrench_space, spread_of_slopes
 from sagline.kernels.workspaces.centered import Centered, factor_normal
 from sagline.kernels.workspaces.inside import Precision
 from sagline.kernels.workspaces.loads import dot6
-from sagline.kernels.workspaces.pose_box import MOTIONS, Box, Place, most_of_linear, norm3
+from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange, most_of_linear, norm3
 from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, pull_slope, rise, rise_rate
 
 BORNE = 0.3  # share of the gap that a free cable may take of it
@@ -24,8 +24,8 @@ VALUE, BENT, SPREAD, HANGING, HANGING_SPREAD, HANGING_BENT = 1, 2, 3, 4, 5, 6
 
 
 @kernel
-def is_outside(
-    place: Place, box: Box, curves: Curves, smoothing: float, centered: Centered, ranges: Ranges, precision: Precision,
+def proves_outside(
+    place: CablesInBox, box: PoseRange, curves: Curves, smoothing: float, centered: Centered, ranges: Ranges, precision: Precision,
     memory: Memory,
 ) -> bool:  # fmt: skip
     """True if a direction y, turning with the pose, separates the demand from the available wrenches all over a box.
@@ -58,7 +58,7 @@ def is_outside(
     if not factor_normal(place.matrix, give, 1.0, centered.normal):
         return False
     spread_of_slopes(place, box, centered, ranges, slopes)
-    lift(place.rows, y, direction)
+    in_wrench_space(place.rows, y, direction)
     for motion in range(motions):
         columns = place.slopes[motion].reshape((6, m))
         for i in range(m):
@@ -72,9 +72,9 @@ def is_outside(
                 turn[k] -= place.matrix[k, i] * give[i] * each[motion, i]
         solve_lower(centered.normal, turn)
         solve_upper(centered.normal, turn)
-        lift(place.rows, turn, slopes[MOTIONS + motion])
+        in_wrench_space(place.rows, turn, slopes[MOTIONS + motion])
     for attempt in range(2):
-        measure(place, box, direction, slopes[MOTIONS : 2 * MOTIONS], wide)
+        _measure_direction(place, box, direction, slopes[MOTIONS : 2 * MOTIONS], wide)
         for i in range(m):
             bend[i] *= precision.bends
         if attempt == 1:
@@ -97,7 +97,7 @@ def is_outside(
         solve_upper(centered.normal, push)
         for k in range(n):
             y[k] += push[k]
-        lift(place.rows, y, direction)
+        in_wrench_space(place.rows, y, direction)
     gap = 0.0
     size = 0.0
     for k in range(n):
@@ -114,14 +114,14 @@ def is_outside(
                 full[motion] += turns[motion, k] * centered.left[k]
     gap -= most_of_linear(box, full)
     for i in range(m):
-        gap -= most_of_cable(place, curves, ranges, tau[i], i, wide)
+        gap -= _most_of_cable(place, curves, ranges, tau[i], i, wide)
         tension = ranges.highest[i] if ranges.highest[i] < math.inf else tau[i]
         size += tension * (abs(value[i]) + spread[i] + bend[i])
     return gap > precision.rounding * size
 
 
 @kernel
-def measure(place: Place, box: Box, direction: Array, turning: Array, rows: Array) -> None:
+def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, turning: Array, rows: Array) -> None:
     """Fill what a newton of each cable and of its pull count along a direction, and how that goes in a box.
 
     Args:
@@ -197,7 +197,7 @@ def measure(place: Place, box: Box, direction: Array, turning: Array, rows: Arra
 
 
 @formula
-def most_of_run(slope: float, rate: float, most: float, room: float) -> float:
+def _most_of_run(slope: float, rate: float, most: float, room: float) -> float:
     """Largest t slope + min(t rate, most) for t from 0 to room; rate and most are >= 0."""
     if slope >= 0.0 or room == 0.0:
         return room * slope + min(rate * room, most) if room > 0.0 else 0.0
@@ -208,7 +208,7 @@ def most_of_run(slope: float, rate: float, most: float, room: float) -> float:
 
 
 @kernel
-def most_of_cable(place: Place, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
+def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
     """Most that a cable gives along y at any tension, anywhere in a box, beyond what one tension and its pull give."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
@@ -219,7 +219,7 @@ def most_of_cable(place: Place, curves: Curves, ranges: Ranges, tau: float, i: i
         return math.inf
     most = fall(curves, i, tau, high) if hanging > 0.0 else rise(curves, i, tau, high)
     rate = fall_rate(curves, i, tau) if hanging > 0.0 else rise_rate(curves, i, tau)
-    gain = most_of_run(slope, weight * rate, weight * most, max(high - tau, 0.0))
+    gain = _most_of_run(slope, weight * rate, weight * most, max(high - tau, 0.0))
     # below it: along one that counts least, piece by piece
     slope = -(rows[VALUE, i] - spread + bend)
     top = tau
@@ -232,7 +232,7 @@ def most_of_cable(place: Place, curves: Curves, ranges: Ranges, tau: float, i: i
         largest = max(largest, most)
         if piece == 0:
             rate = rise_rate(curves, i, bottom) if hanging > 0.0 else fall_rate(curves, i, bottom)
-            gain = max(gain, most_of_run(slope, weight * rate, weight * most, tau - bottom))
+            gain = max(gain, _most_of_run(slope, weight * rate, weight * most, tau - bottom))
         else:
             gain = max(gain, max((tau - top) * slope, (tau - bottom) * slope) + weight * most)
         top = bottom

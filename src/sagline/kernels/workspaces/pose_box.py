@@ -11,7 +11,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.balance.freedom import turns
+from sagline.kernels.balance.freedom import is_rotation
 from sagline.kernels.balance.wrench import fill_structure_matrix, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.jit import formula, glue, kernel
@@ -21,7 +21,7 @@ BEND = 0.57735027  # half of 2/sqrt(3), the largest second derivative of x/|x| t
 MOTIONS = 6  # three of translation, three of rotation
 
 
-class Box(NamedTuple):
+class PoseRange(NamedTuple):
     """A box of poses.
 
     Attributes:
@@ -33,7 +33,7 @@ class Box(NamedTuple):
     turn: float
 
 
-class Place(NamedTuple):
+class CablesInBox(NamedTuple):
     """The cables of one pose, the middle of a box, and how far from there they get in the box.
 
     Attributes:
@@ -62,21 +62,23 @@ class Place(NamedTuple):
 
 
 @glue
-def new_place(memory: Memory, m: int, n: int) -> tuple[Place, Memory]:
+def new_cables_in_box(memory: Memory, m: int, n: int) -> tuple[CablesInBox, Memory]:
     """Work arrays for m cables and n free motions, and the memory that is left."""
     numbers = memory.numbers
     rows, at = block(numbers, 0, n, 6)
     wide, at = block(numbers, at, 6 + n + 3 + 5, m)
     slopes, at = block(numbers, at, MOTIONS, 6 * m)
     spans = wide[9 + n :]
-    place = Place(
+    place = CablesInBox(
         rows, wide[:6], wide[6 : 6 + n], wide[6 + n : 9 + n], slopes, spans[0], spans[1], spans[2], spans[3], spans[4]
     )
     return place, Memory(numbers[at:], memory.counters)
 
 
 @kernel
-def set_place(freedom: Array, geometry: Array, rotation: Array, center: Array, box: Box, place: Place) -> bool:
+def set_cables_in_box(
+    freedom: Array, geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox
+) -> bool:
     """Fill a place from the geometry of its cables; False where a platform end may meet its frame end in the box.
 
     Args:
@@ -95,7 +97,7 @@ def set_place(freedom: Array, geometry: Array, rotation: Array, center: Array, b
             place.lever[k, i] = geometry[g.LEVER_X + k, i]
         mean += norm3(place.lever[0, i], place.lever[1, i], place.lever[2, i]) / m
     for k in range(n):
-        unit = 1.0 / mean if turns(freedom, k) and mean > 0.0 else 1.0
+        unit = 1.0 / mean if is_rotation(freedom, k) and mean > 0.0 else 1.0
         for a in range(6):
             place.rows[k, a] = freedom[k, a] * unit
     rows_along_freedom(place.rows, place.full, place.matrix)
@@ -124,12 +126,12 @@ def set_place(freedom: Array, geometry: Array, rotation: Array, center: Array, b
         place.swung[i] = box.turn * lever
         place.curled[i] = 0.5 * box.turn * box.turn * lever
     if possible:
-        set_slopes(geometry, rotation, center, box, place)
+        _set_slopes(geometry, rotation, center, box, place)
     return possible
 
 
 @kernel
-def set_slopes(geometry: Array, rotation: Array, center: Array, box: Box, place: Place) -> None:
+def _set_slopes(geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox) -> None:
     """Fill the slopes of the structure matrix."""
     m = place.way.size
     for motion in range(MOTIONS if box.turn > 0.0 else 3):
@@ -173,7 +175,7 @@ def norm3(x: float, y: float, z: float) -> float:
 
 
 @formula
-def most_of_linear(box: Box, slopes: Array) -> float:
+def most_of_linear(box: PoseRange, slopes: Array) -> float:
     """Largest value in a box of a function with these slopes along the motions, (MOTIONS,), zero at the middle."""
     most = abs(slopes[0]) * box.half[0] + abs(slopes[1]) * box.half[1] + abs(slopes[2]) * box.half[2]
     if box.turn > 0.0:

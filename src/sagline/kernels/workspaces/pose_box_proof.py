@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance.setting import Limits, place_cables
+from sagline.kernels.balance.setting import TensionLimits, place_cables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
@@ -19,12 +19,19 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.workspaces.box_tensions import Ranges, center_tensions, lift, search_limits, set_ranges, tighten
+from sagline.kernels.workspaces.box_tensions import (
+    Ranges,
+    center_tensions,
+    in_wrench_space,
+    search_limits,
+    set_ranges,
+    tighten,
+)
 from sagline.kernels.workspaces.centered import new_centered
-from sagline.kernels.workspaces.inside import Precision, is_inside
-from sagline.kernels.workspaces.loads import Loads, farthest, reach
-from sagline.kernels.workspaces.outside import is_outside
-from sagline.kernels.workspaces.pose_box import Box, new_place, set_place
+from sagline.kernels.workspaces.inside import Precision, proves_inside
+from sagline.kernels.workspaces.loads import Loads, farthest, reach_of_loads
+from sagline.kernels.workspaces.outside import proves_outside
+from sagline.kernels.workspaces.pose_box import PoseRange, new_cables_in_box, set_cables_in_box
 
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn
@@ -55,7 +62,7 @@ def prove_boxes(
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
-        limit_terms: What tensions must keep: `Limits`.
+        limit_terms: What tensions must keep: `TensionLimits`.
         robot_terms: Rows of the structure matrix that count, (n, 6); body_table (1, BODY_COLUMNS); cable_table,
             (1, m, CABLE_COLUMNS), without pulleys.
         load_terms: The wrenches to bear: `Loads`.
@@ -64,7 +71,7 @@ def prove_boxes(
         room: `room_for` as many cables.
         answers: Filled: OPEN, INSIDE or OUTSIDE, (N,); and statuses to work in, (m,).
     """
-    limits = Limits(*limit_terms)
+    limits = TensionLimits(*limit_terms)
     loads = Loads(*load_terms)
     precision = Precision(*precision_terms)
     freedom, bodies, robots = robot_terms
@@ -73,7 +80,7 @@ def prove_boxes(
     n, m = freedom.shape[0], robot.shape[0]
     model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
     cables, rest = new_cables(Memory(*room), m, False)
-    place, rest = new_place(rest, m, n)
+    place, rest = new_cables_in_box(rest, m, n)
     centered, rest = new_centered(rest, m, n)
     curves, rest = new_curves(model, cables, statuses, rest)
     rows, at = block(rest.numbers, 0, g.GEOMETRY_ROWS + 6, m)
@@ -87,17 +94,17 @@ def prove_boxes(
         center[k] = body[tables.CENTER_X + k]
     for p in range(boxes.shape[0]):
         verdicts[p] = OPEN
-        box = Box(boxes[p, 7:10], boxes[p, 10])
+        box = PoseRange(boxes[p, 7:10], boxes[p, 10])
         cable_geometry(robot, body, boxes[p], rotation, geometry)
         if not place_cables(model, limits, robot, geometry, cables):
             continue
-        if not set_place(freedom, geometry, rotation, center, box, place):
+        if not set_cables_in_box(freedom, geometry, rotation, center, box, place):
             continue
         set_ranges(limits.quantity, place, curves, ranges)
         for a in range(6):
             wrench[a] = loads.center[a]
             direction[a] = 1.0 if a == 2 else 0.0
-        upward = body[tables.MASS] * body[tables.GRAVITY] - wrench[2] + reach(loads, direction)
+        upward = body[tables.MASS] * body[tables.GRAVITY] - wrench[2] + reach_of_loads(loads, direction)
         tighten(freedom, place, curves, upward, ranges)
         size = abs(upward)
         for a in range(6):
@@ -112,7 +119,7 @@ def prove_boxes(
         for attempt in range(ROUNDS if several else 1):
             if outside:
                 break
-            if is_inside(place, box, curves, loads, centered, ranges, precision, rest):
+            if proves_inside(place, box, curves, loads, centered, ranges, precision, rest):
                 verdicts[p] = INSIDE
                 break
             if attempt > 0 and square > BEYOND * m * smoothing:
@@ -123,12 +130,12 @@ def prove_boxes(
                 search_limits(ranges, taken, size, centered)
                 square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
         if several and verdicts[p] == OPEN:
-            lift(place.rows, centered.left, direction)
+            in_wrench_space(place.rows, centered.left, direction)
             farthest(loads, direction, wrench)
             for i in range(m):
                 taken[i] = 0.0
             search_limits(ranges, taken, size, centered)
             square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
             outside = square > BEYOND * m * smoothing
-        if outside and is_outside(place, box, curves, smoothing, centered, ranges, precision, rest):
+        if outside and proves_outside(place, box, curves, smoothing, centered, ranges, precision, rest):
             verdicts[p] = OUTSIDE

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import turns
-from sagline.kernels.balance.setting import Limits, place_cables
+from sagline.kernels.balance.freedom import is_rotation
+from sagline.kernels.balance.setting import TensionLimits, place_cables
 from sagline.kernels.balance.wrench import fill_structure_matrix, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import new_cables
@@ -57,7 +57,7 @@ from sagline.kernels.workspaces.facets import (
     new_facets,
     next_subset,
 )
-from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSet, new_set, place_set, reach
+from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSetArrays, new_set, place_set, reach_of_set
 
 ALONG = 1e-13  # of the rows that a normal is made of: what a column in the facet itself gives along it by rounding
 PURE = 1e-9  # force part of a normal of length 1, moments times the lever arm, below which it is one of moments alone
@@ -97,7 +97,7 @@ Room = tuple[Array, Indices, Codes]
 Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 6), cables (N,), statuses (N,)
 
 
-class Count(NamedTuple):
+class _FacetWeights(NamedTuple):
     """Weights of the facets of one pose.
 
     Attributes:
@@ -134,7 +134,7 @@ def signed_margins(
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
-        limit_terms: What tensions must keep: `Limits`.
+        limit_terms: What tensions must keep: `TensionLimits`.
         robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or R,
             BODY_COLUMNS); cable_table, (1 or R, m, CABLE_COLUMNS); the first N/R poses are the first robot's and so on.
         set_terms: The set of loads.
@@ -147,7 +147,7 @@ def signed_margins(
         first: Pose to begin with.
         last: Pose to end before.
     """
-    limits = Limits(*limit_terms)
+    limits = TensionLimits(*limit_terms)
     freedom, bodies, robots = robot_terms
     values, directions, limiting, statuses = margins
     inertias = set_terms[7]
@@ -176,7 +176,7 @@ def signed_margins(
             continue
         fill_structure_matrix(geometry, counted[COLUMN:])
         lever = arms[1][p * arms[1].size // count]
-        first_table(freedom, counted[COLUMN:], lever, facets.table)
+        _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
         if not choose_basis(facets, n, m, lever):
             statuses[p] = MARGIN_SINGULAR
             continue
@@ -185,22 +185,22 @@ def signed_margins(
             statuses[p] = MARGIN_TOO_SLACK
             continue
         place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
-        endless = fill_count(body, set_terms[0], geometry, bands, counted, points)
-        counts = Count(counted, points, bands[HIGH], endless, arms[0][p * arms[0].size // count], lever)
-        walk(facets, n, m, counts, wrenches, measured[0], found[0], directions[p])
+        endless = _fill_weights(body, set_terms[0], geometry, bands, counted, points)
+        counts = _FacetWeights(counted, points, bands[HIGH], endless, arms[0][p * arms[0].size // count], lever)
+        _measure_all_facets(facets, n, m, counts, wrenches, measured[0], found[0], directions[p])
         for k in range(3):
             values[k, p] = found[0, k]
-        limiting[p] = steepest(counts, directions[p]) if found[0, VALUE] < math.inf else -1
-        statuses[p] = status_of(found[0])
+        limiting[p] = _limiting_cable(counts, directions[p]) if found[0, VALUE] < math.inf else -1
+        statuses[p] = _margin_status(found[0])
 
 
 @glue
-def first_table(freedom: Array, full: Array, lever: float, table: Array) -> None:
+def _fill_facet_table(freedom: Array, full: Array, lever: float, table: Array) -> None:
     """Fill the table to choose a basis from: a row for each free motion, moments over the mean lever arm."""
     m = full.shape[1]
     rows_along_freedom(freedom, full, table)
     for k in range(freedom.shape[0]):
-        unit = 1.0 / lever if turns(freedom, k) else 1.0
+        unit = 1.0 / lever if is_rotation(freedom, k) else 1.0
         for i in range(m):
             table[k, i] *= unit
         for a in range(6):
@@ -209,7 +209,7 @@ def first_table(freedom: Array, full: Array, lever: float, table: Array) -> None
 
 
 @glue
-def fill_count(body: Array, center: Array, geometry: Array, bands: Array, rows: Array, points: Array) -> bool:
+def _fill_weights(body: Array, center: Array, geometry: Array, bands: Array, rows: Array, points: Array) -> bool:
     """Fill what counts at every facet; returns whether a cable has no upper limit."""
     endless = False
     for a in range(6):
@@ -228,13 +228,13 @@ def fill_count(body: Array, center: Array, geometry: Array, bands: Array, rows: 
             given = rows[COLUMN + a, i] * (bands[LOW, i] + rows[WIDTH, i])
             points[ENDS, a] += given
             points[RANGES, a] += given
-        take_pull(points[ENDS], bands[PULL_LOW, i] + rows[SLOPE, i], x, y)
-        take_pull(points[RANGES], 0.5 * (bands[LEAST, i] + bands[MOST, i]), x, y)
+        _subtract_sag_force(points[ENDS], bands[PULL_LOW, i] + rows[SLOPE, i], x, y)
+        _subtract_sag_force(points[RANGES], 0.5 * (bands[LEAST, i] + bands[MOST, i]), x, y)
     return endless
 
 
 @glue
-def take_pull(point: Array, pull: float, x: float, y: float) -> None:
+def _subtract_sag_force(point: Array, pull: float, x: float, y: float) -> None:
     """Take what a cable's pull hangs on the platform at a lever from what the cables give, (6,)."""
     point[2] -= pull
     point[3] -= pull * y
@@ -242,12 +242,12 @@ def take_pull(point: Array, pull: float, x: float, y: float) -> None:
 
 
 @glue
-def walk(
+def _measure_all_facets(
     facets: Facets,
     n: int,
     m: int,
-    counts: Count,
-    wrenches: WrenchSet,
+    counts: _FacetWeights,
+    wrenches: WrenchSetArrays,
     measured: Array,
     margin: Array,
     direction: Array,
@@ -260,11 +260,11 @@ def walk(
     held = 0
     for _ in range(LIMIT):
         for s in range(START[n, depth + 1], START[n, depth + 2]):
-            if add_normal(facets, depth, ORDER[n, s], m, measured, held):
+            if _add_normal(facets, depth, ORDER[n, s], m, measured, held):
                 held += 1
         depth = next_subset(facets, n, depth)
         if depth < 0 or held > TOGETHER - OF_A_SUBSET:
-            measure(counts, wrenches, held, measured, margin, direction)
+            _measure_facets(counts, wrenches, held, measured, margin, direction)
             held = 0
         if depth < 0:
             break
@@ -276,7 +276,7 @@ def walk(
 
 
 @formula
-def add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
+def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
     """Fill the normal that a set of rows, one more than the present subset has columns, makes; False for none."""
     minors = facets.minors[depth]
     x = y = z = u = v = w = 0.0
@@ -307,19 +307,21 @@ def add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b
 
 
 @kernel
-def measure(counts: Count, wrenches: WrenchSet, held: int, measured: Array, margin: Array, direction: Array) -> None:
+def _measure_facets(
+    counts: _FacetWeights, wrenches: WrenchSetArrays, held: int, measured: Array, margin: Array, direction: Array
+) -> None:
     """Let both sides of the facets held lower the margin (3,), and its normal (6,)."""
-    sum_cables(counts, held, measured)
+    _sum_cables(counts, held, measured)
     normals, work = measured[: 6 * TOGETHER].reshape((6, TOGETHER)), measured[WORK : WORK + 2 * TOGETHER]
-    reach(wrenches, normals, held, work.reshape((2, TOGETHER)), measured[AGAINST:], measured[FOR:])
+    reach_of_set(wrenches, normals, held, work.reshape((2, TOGETHER)), measured[AGAINST:], measured[FOR:])
     if counts.endless:
         for b in range(held):
             if measured[UP + b] > ALONG * measured[ROUNDING + b]:
                 measured[AGAINST + b] = -math.inf
             if measured[DOWN + b] > ALONG * measured[ROUNDING + b]:
                 measured[FOR + b] = -math.inf
-    measure_lengths(counts, held, measured)
-    measure_sides(counts.points, held, measured)
+    _measure_lengths(counts, held, measured)
+    _measure_sides(counts.points, held, measured)
     best = -1
     for b in range(held):
         if measured[MARGINS + b] < margin[VALUE]:
@@ -328,11 +330,11 @@ def measure(counts: Count, wrenches: WrenchSet, held: int, measured: Array, marg
         margin[BELOW] = min(margin[BELOW], measured[MARGINS + TOGETHER + b])
         margin[ABOVE] = min(margin[ABOVE], measured[MARGINS + 2 * TOGETHER + b])
     if best >= 0:
-        write_normal(counts, measured, normals, best, direction)
+        _write_normal(counts, measured, normals, best, direction)
 
 
 @glue
-def sum_cables(counts: Count, held: int, measured: Array) -> None:
+def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
     """Fill what the cables give to either side of the points along the normals held."""
     rows = counts.rows
     for b in range(held):
@@ -367,7 +369,7 @@ def sum_cables(counts: Count, held: int, measured: Array) -> None:
 
 
 @glue
-def measure_lengths(counts: Count, held: int, measured: Array) -> None:
+def _measure_lengths(counts: _FacetWeights, held: int, measured: Array) -> None:
     """Fill the inverse lengths of the normals held."""
     arm, lever = counts.arm * counts.arm, counts.lever * counts.lever
     for b in range(held):
@@ -379,7 +381,7 @@ def measure_lengths(counts: Count, held: int, measured: Array) -> None:
 
 
 @glue
-def measure_sides(points: Array, held: int, measured: Array) -> None:
+def _measure_sides(points: Array, held: int, measured: Array) -> None:
     """Fill the margins to the nearer sides of the facets held."""
     e0, e1, e2 = points[ENDS, 0], points[ENDS, 1], points[ENDS, 2]
     e3, e4, e5 = points[ENDS, 3], points[ENDS, 4], points[ENDS, 5]
@@ -399,7 +401,7 @@ def measure_sides(points: Array, held: int, measured: Array) -> None:
 
 
 @glue
-def write_normal(counts: Count, measured: Array, normals: Array, b: int, direction: Array) -> None:
+def _write_normal(counts: _FacetWeights, measured: Array, normals: Array, b: int, direction: Array) -> None:
     """Fill the normal of one of the facets held, to its nearer side and of length 1, (6,)."""
     along = 0.0
     moment = 0.0
@@ -414,7 +416,7 @@ def write_normal(counts: Count, measured: Array, normals: Array, b: int, directi
 
 
 @glue
-def steepest(counts: Count, direction: Array) -> int:
+def _limiting_cable(counts: _FacetWeights, direction: Array) -> int:
     """The cable that counts most along a direction."""
     cable = -1
     most = 0.0
@@ -429,7 +431,7 @@ def steepest(counts: Count, direction: Array) -> int:
 
 
 @glue
-def status_of(margin: Array) -> int:
+def _margin_status(margin: Array) -> int:
     """Status of a bracket (3,)."""
     if margin[BELOW] >= 0.0:
         return MARGIN_FEASIBLE

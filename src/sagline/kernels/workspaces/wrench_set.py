@@ -15,7 +15,7 @@ from sagline.kernels.memory import Memory, block
 SetTerms = tuple[Array, Array, Array, Array, Array, Indices, Array, Array]
 
 
-class WrenchSet(NamedTuple):
+class WrenchSetArrays(NamedTuple):
     """A set of loads at one pose, in world axes about the center of mass.
 
     Attributes:
@@ -34,15 +34,15 @@ class WrenchSet(NamedTuple):
 
 
 @glue
-def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSet, Memory]:
+def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSetArrays, Memory]:
     """Work arrays for what differs from pose to pose, and the memory that is left."""
     own, at = block(memory.numbers, 0, 9, 6)
-    wrenches = WrenchSet(own, terms[2], terms[3], terms[4], terms[5])
+    wrenches = WrenchSetArrays(own, terms[2], terms[3], terms[4], terms[5])
     return wrenches, Memory(memory.numbers[at:], memory.counters)
 
 
 @glue
-def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wrenches: WrenchSet) -> None:
+def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wrenches: WrenchSetArrays) -> None:
     """Fill the box and the loads of accelerations, w = -M a and -Q I Q^T alpha, of a platform in its rotation."""
     own = wrenches.own
     for s in range(9):
@@ -61,7 +61,9 @@ def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wre
 
 
 @glue
-def reach(wrenches: WrenchSet, normals: Array, count: int, work: Array, against: Array, along: Array) -> None:
+def reach_of_set(
+    wrenches: WrenchSetArrays, normals: Array, count: int, work: Array, against: Array, along: Array
+) -> None:
     """Fill the largest -y . w and the largest y . w [N] of the first so many normals.
 
     Args:
@@ -74,34 +76,34 @@ def reach(wrenches: WrenchSet, normals: Array, count: int, work: Array, against:
     """
     for b in range(count):
         against[b] = 0.0
-    add_segments(wrenches.own, normals, count, work[0], against)
-    add_segments(wrenches.segments, normals, count, work[0], against)
+    _add_segments(wrenches.own, normals, count, work[0], against)
+    _add_segments(wrenches.segments, normals, count, work[0], against)
     if wrenches.ellipsoids.shape[0] > 0:
-        add_ellipsoids(wrenches.ellipsoids, normals, count, work, against)
+        _add_ellipsoids(wrenches.ellipsoids, normals, count, work, against)
     for b in range(count):
         along[b] = against[b]
     if wrenches.sizes.size > 0:
-        add_polytopes(wrenches.corners, wrenches.sizes, 1.0, normals, count, work, along)
-        add_polytopes(wrenches.corners, wrenches.sizes, -1.0, normals, count, work, against)
+        _add_polytopes(wrenches.corners, wrenches.sizes, 1.0, normals, count, work, along)
+        _add_polytopes(wrenches.corners, wrenches.sizes, -1.0, normals, count, work, against)
 
 
 @kernel
-def add_segments(segments: Array, normals: Array, count: int, work: Array, total: Array) -> None:
+def _add_segments(segments: Array, normals: Array, count: int, work: Array, total: Array) -> None:
     """Add how far segments (S, 6) reach to either side; those of no length cost nothing."""
     for s in range(segments.shape[0]):
-        if multiply(segments[s], normals, count, work):
+        if _multiply(segments[s], normals, count, work):
             for b in range(count):
                 total[b] += abs(work[b])
 
 
 @kernel
-def add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, total: Array) -> None:
+def _add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, total: Array) -> None:
     """Add how far ellipsoids (E, 6, 6) reach to either side."""
     for e in range(ellipsoids.shape[0]):
         for b in range(count):
             work[1, b] = 0.0
         for j in range(6):
-            if multiply(ellipsoids[e, j], normals, count, work[0]):
+            if _multiply(ellipsoids[e, j], normals, count, work[0]):
                 for b in range(count):
                     work[1, b] += work[0, b] * work[0, b]
         for b in range(count):
@@ -109,7 +111,7 @@ def add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, t
 
 
 @kernel
-def add_polytopes(
+def _add_polytopes(
     corners: Array, sizes: Indices, sign: float, normals: Array, count: int, work: Array, total: Array
 ) -> None:
     """Add how far polytopes reach along the normals, or against them."""
@@ -118,7 +120,7 @@ def add_polytopes(
         for b in range(count):
             work[1, b] = -math.inf
         for c in range(first, first + sizes[p]):
-            if not multiply(corners[c], normals, count, work[0]):
+            if not _multiply(corners[c], normals, count, work[0]):
                 for b in range(count):
                     work[0, b] = 0.0
             for b in range(count):
@@ -129,7 +131,7 @@ def add_polytopes(
 
 
 @kernel
-def multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
+def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
     """Fill the scalar products of a wrench (6,) and normals (6, B); False, and nothing filled, for no wrench."""
     some = False
     for k in range(6):
