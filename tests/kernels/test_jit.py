@@ -125,7 +125,7 @@ def test_an_entry_is_compiled_when_its_own_machine_code_is_there(
 
 
 def test_inner_kernels_have_no_wrapper_for_python_and_entries_have() -> None:
-    from sagline.kernels.algebra.cholesky import factor_positive
+    from sagline.kernels.algebra.factors import factor_positive
     from sagline.kernels.cable.batch import batch_end
 
     inner, entry = (cast("Any", kernel).targetoptions for kernel in (factor_positive, batch_end))

@@ -11,7 +11,7 @@ from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.codes import LOWEST_MAXIMUM, LOWEST_SUM
 from sagline.kernels.memory import Memory, block, memory_for
 from sagline.kernels.tension.nearest import new_reference_point
-from sagline.kernels.tension.work_arrays import new_work_arrays
+from sagline.kernels.tension.polygon import new_work_arrays
 from tests.kernels.compiled import from_python, memory
 
 take_block = from_python(block)

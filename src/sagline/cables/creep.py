@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from sagline.core.arrays import Array, broadcast_shape, checked, locked
 from sagline.core.errors import InvalidValueError
-from sagline.kernels.cable.creep import creep_strains
+from sagline.kernels.cable.batch import creep_strains
 
 MOST_ELEMENTS = 2
 

@@ -19,7 +19,7 @@ from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.status import Status
 from sagline.kernels import codes
-from sagline.kernels.cable import batch, shape
+from sagline.kernels.cable import batch
 from sagline.kernels.cable.terms import Terms
 
 
@@ -298,14 +298,14 @@ class CableState(Result):
     def sag(self) -> Array:
         """Largest vertical drop below the chord [m]; on a vertical chord, below the lower end."""
         out = np.empty(self.unstrained_length.size)
-        shape.largest_sags(self.model.terms(self.gravity), *self._columns(), out)
+        batch.largest_sags(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
 
     @property
     def closure_residual(self) -> Array:
         """Closure error of the state in its own model's equations [m]."""
         out = np.empty(self.unstrained_length.size)
-        shape.closures(self.model.terms(self.gravity), *self._columns(), out)
+        batch.closures(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
 
     def points(self, count: int) -> Array:
@@ -323,7 +323,7 @@ class CableState(Result):
         whole_number(count, "points", 2)
         check_memory("points", 16.0 * self.unstrained_length.size * count, "Ask for fewer points.")
         out = np.empty((self.unstrained_length.size, count, 2))
-        shape.shape_points(self.model.terms(self.gravity), *self._columns(), out)
+        batch.shape_points(self.model.terms(self.gravity), *self._columns(), out)
         return locked(out.reshape(*self.shape, count, 2))
 
     def _columns(self) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:

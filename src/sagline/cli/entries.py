@@ -237,14 +237,16 @@ ENTRIES = {
     for entry in (
         Entry(INVERSE, "inverse.poses.inverse_poses", 39, 18.0, _inverse),
         Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_methods, 2, INVERSE),
-        Entry(VERDICTS, "inverse.verdicts.decide_poses", 56, 40.0, _verdicts),
+        Entry(VERDICTS, "inverse.feasibility.decide_poses", 56, 40.0, _verdicts),
         Entry(FORWARD, "forward.forward.forward_poses", 82, 14.0, lambda sl: _forward(sl, sl.Catenary())),
         Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, 2, FORWARD),
         Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda sl: _forward(sl, sl.Straight())),
-        Entry(MARGINS, "inverse.queries.margins_of_poses", 33, 9.0, lambda sl: sl.capacity_margin(_unknown_state(sl))),
+        Entry(
+            MARGINS, "inverse.feasibility.margins_of_poses", 33, 9.0, lambda sl: sl.capacity_margin(_unknown_state(sl))
+        ),
         Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 48, 16.0, _signed_margins),
         Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 66, 17.0, _proofs),
-        Entry(POLYGON, "inverse.queries.polygon_of_pose", 38, 5.0, _polygon),
+        Entry(POLYGON, "inverse.feasibility.polygon_of_pose", 38, 5.0, _polygon),
         Entry(VIBRATION, DESCRIBE, 57, 6.0, lambda sl: sl.modes(_unknown_state(sl))),
         Entry(VIBRATION_OVER_PULLEYS, DESCRIBE, 39, 4.0, _vibration_over_pulleys, 2, VIBRATION),
         Entry(CLEARANCES, "interference.catenary_distance.least_distances", 33, 5.0, _clearances),

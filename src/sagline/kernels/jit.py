@@ -37,12 +37,7 @@ FOLDER = base_folder()
 
 
 def sources_of(module: str, sources: Path) -> frozenset[Path]:
-    """The files that a kernel's machine code is made of, below the folder of the kernels.
-
-    Args:
-        module: Name of its module, below `sagline.kernels`.
-        sources: That folder.
-    """
+    """The files that a kernel's machine code is made of, below the folder of the kernels."""
     waiting, found = {module}, set[Path]()
     while waiting:
         name = waiting.pop()
@@ -65,12 +60,7 @@ def _imported(source: str) -> frozenset[str]:
 
 
 def cache_folder(module: str, sources: Path = SOURCES) -> Path:
-    """Folder of the machine code of a module's kernels.
-
-    Args:
-        module: Name of the module, below `sagline.kernels`.
-        sources: Folder of the kernels.
-    """
+    """Folder of the machine code of a module's kernels."""
     digest = hashlib.sha256()
     # a kernel from elsewhere, a benchmark's, may call any
     for source in sorted(sources_of(module, sources) or sources.rglob("*.py")):

@@ -14,15 +14,10 @@ from sagline.kernels.jit import glue
 
 
 class Memory(NamedTuple):
-    """Memory of a kernel.
+    """Memory of a kernel."""
 
-    Attributes:
-        numbers: Flat.
-        counters: Flat.
-    """
-
-    numbers: Array
-    counters: Indices
+    numbers: Array  # flat
+    counters: Indices  # flat
 
 
 def memory_for(cables: int) -> tuple[Array, Indices]:

@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Codes, Flags, Indices, locked
 from sagline.core.progress import Progress, blocks, rows_of
 from sagline.core.results import Result
 from sagline.kernels import codes, tables
-from sagline.kernels.cable.rows import CABLE_ROWS
+from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.forward.fit import fit_poses
 from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import (

@@ -14,7 +14,7 @@ from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Flags, checked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS
-from sagline.kernels.cable.homing import lengths_at_frame_ends
+from sagline.kernels.cable.states import lengths_at_frame_ends
 from sagline.robot.checks import per_cable
 from sagline.robot.drum import warmth
 from sagline.robot.pose import Pose

@@ -9,8 +9,8 @@ import numpy as np
 from sagline.core.arrays import Array, Codes, Flags, locked
 from sagline.core.progress import Progress, blocks
 from sagline.kernels import codes, tables
+from sagline.kernels.inverse.feasibility import ENOUGH, PROVED, decide_poses
 from sagline.kernels.inverse.poses import Answers, inverse_poses
-from sagline.kernels.inverse.verdicts import ENOUGH, PROVED, decide_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import Robots, first_of, has_routing
 from sagline.statics.tables import robot_terms

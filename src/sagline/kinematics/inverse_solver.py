@@ -16,8 +16,8 @@ from sagline.core.arguments import instance, optional
 from sagline.core.arrays import Array, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
+from sagline.kernels.inverse.feasibility import decide_poses
 from sagline.kernels.inverse.poses import inverse_poses
-from sagline.kernels.inverse.verdicts import decide_poses
 from sagline.kernels.jit import machine_code
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import ARRAY, FLOAT, WHOLE, copy_in, copy_out

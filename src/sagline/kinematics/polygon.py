@@ -11,7 +11,7 @@ from sagline.core.arguments import instance
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.kernels.algebra import bounds
-from sagline.kernels.inverse.queries import polygon_of_pose
+from sagline.kernels.inverse.feasibility import polygon_of_pose
 from sagline.kernels.memory import memory_for
 from sagline.kernels.tension.polygon import SPARE_CORNERS
 from sagline.kinematics.inverse import inverse

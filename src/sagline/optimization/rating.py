@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Flags, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import blocks
 from sagline.kernels import codes, tables
-from sagline.kernels.cable.shape import largest_sags
+from sagline.kernels.cable.batch import largest_sags
 from sagline.kernels.forward.sensitivity import DATA, describe_states
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.memory import memory_for

@@ -74,8 +74,8 @@ def _(robot: Robot) -> Summary:
 
 def plan_of(robot: Robot) -> Plan | None:
     """Plan of the middle of a robot's test box; None without a box, or if compiling would take long."""
+    from sagline.kernels.inverse.feasibility import decide_poses
     from sagline.kernels.inverse.poses import inverse_poses
-    from sagline.kernels.inverse.verdicts import decide_poses
 
     box = robot.test_box
     if box is None or not (is_compiled(inverse_poses) and is_compiled(decide_poses)):

@@ -8,11 +8,11 @@ import numpy as np
 
 from sagline.core.arrays import Array, Flags, Indices
 from sagline.kernels import codes
-from sagline.kernels.cable.rows import CABLE_ROWS
+from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics import string as columns
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
-from sagline.kernels.dynamics.routing import fill_routing_compliance
+from sagline.kernels.dynamics.string import fill_routing_compliance
 from sagline.robot.batch import anchors_of, cables_of, first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import cable_table

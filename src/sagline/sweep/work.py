@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import FileError
 from sagline.kernels import tables
-from sagline.kernels.inverse.verdicts import PROVED
+from sagline.kernels.inverse.feasibility import PROVED
 from sagline.kinematics.inverse_rows import decide_rows, solve_inverse_rows
 from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose

@@ -10,9 +10,9 @@ from sagline.core.arrays import Array
 from sagline.dynamics.simulation.simulate import CableMass, Integrator
 from sagline.dynamics.simulation.winches import Winding
 from sagline.kernels import tables
-from sagline.kernels.cable.rows import CABLE_ROWS, LENGTH
+from sagline.kernels.cable.geometry import CABLE_ROWS, LENGTH
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.winding import BIN
+from sagline.kernels.dynamics.drives import BIN
 from tests.dynamics.let_go import LIFT
 from tests.dynamics.machines import prototype
 from tests.kernels.compiled import from_python

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from sagline.kernels.algebra import cholesky
+from sagline.kernels.algebra import factors
 from tests.kernels.compiled import from_python
 
-factor_positive = from_python(cholesky.factor_positive)
-solve_lower = from_python(cholesky.solve_lower)
-solve_upper = from_python(cholesky.solve_upper)
+factor_positive = from_python(factors.factor_positive)
+solve_lower = from_python(factors.solve_lower)
+solve_upper = from_python(factors.solve_upper)
 
 
 @pytest.mark.parametrize("r", [1, 2, 5, 15])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra.gram_schmidt import normalize_row, orthogonalize_row
+from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
 from tests.kernels.compiled import from_python
 
 take, hold = from_python(orthogonalize_row), from_python(normalize_row)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra import householder
+from sagline.kernels.algebra import factors
 from tests.kernels.compiled import from_python
 
-factorize = from_python(householder.factorize)
-orthogonal_factor = from_python(householder.orthogonal_factor)
-pseudo_inverse = from_python(householder.pseudo_inverse)
-minimum_norm = from_python(householder.minimum_norm)
+factorize = from_python(factors.factorize)
+orthogonal_factor = from_python(factors.orthogonal_factor)
+pseudo_inverse = from_python(factors.pseudo_inverse)
+minimum_norm = from_python(factors.minimum_norm)
 
 SHAPES = [(6, 8), (6, 7), (6, 6), (2, 4), (3, 9), (1, 1), (1, 5), (6, 24)]
 

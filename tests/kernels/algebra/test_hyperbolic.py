@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from sagline.kernels.algebra import hyperbolic
+from sagline.kernels.algebra import functions
 from tests.kernels.compiled import from_python
 
-sinhc = from_python(hyperbolic.sinhc)
-cosh = from_python(hyperbolic.cosh)
-sinh_excess = from_python(hyperbolic.sinh_excess)
-atanhc = from_python(hyperbolic.atanhc)
+sinhc = from_python(functions.sinhc)
+cosh = from_python(functions.cosh)
+sinh_excess = from_python(functions.sinh_excess)
+atanhc = from_python(functions.atanhc)
 
 ARGUMENTS = np.concatenate((np.geomspace(1e-9, 2.0, 400), np.linspace(1.99, 2.01, 41), np.linspace(2.0, 300.0, 200)))
 

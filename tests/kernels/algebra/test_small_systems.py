@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra import cholesky, eigenvalues, elimination
-from sagline.kernels.algebra import trust_step as trust
+from sagline.kernels.algebra import eigenvalues, factors
+from sagline.kernels.forward import newton as trust
 from tests.kernels.compiled import from_python
 
 RNG = np.random.default_rng(5)
-factor_positive = from_python(cholesky.factor_positive)
-solve_lower = from_python(cholesky.solve_lower)
-solve_upper = from_python(cholesky.solve_upper)
-solve_general = from_python(elimination.solve_general)
+factor_positive = from_python(factors.factor_positive)
+solve_lower = from_python(factors.solve_lower)
+solve_upper = from_python(factors.solve_upper)
+solve_general = from_python(factors.solve_general)
 extreme_eigenvalues = from_python(eigenvalues.extreme_eigenvalues)
 trust_step = from_python(trust.trust_step)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.core.arrays import Array
-from sagline.kernels.cable import models, sag_force_extrema, sag_forces
+from sagline.kernels.cable import models, sag_forces
 from sagline.kernels.cable.sag_forces import TURN_ROWS, Curves
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CATENARY
@@ -14,7 +14,7 @@ from tests.kernels.compiled import compiled, from_python, memory
 
 GRAVITY = 9.81
 
-find_extrema = from_python(sag_force_extrema.find_extrema)
+find_extrema = from_python(sag_forces.find_extrema)
 sag_force_range = from_python(sag_forces.sag_force_range)
 
 

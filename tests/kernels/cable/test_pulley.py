@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.cable import forces, geometry, models, over_pulleys, pulley, states
-from sagline.kernels.cable import rows as t
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulley import Pulley, Wrap
 from sagline.kernels.cable.terms import Chord, Material, Model
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY
@@ -123,7 +123,7 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
     half_weight = 0.5 * cables[:, tables.DENSITY] * GRAVITY * chord
     tension = half_weight / 10 ** rng.uniform(-3, 0.0, count)  # X up to 1
     cables[:, tables.STIFFNESS] = tension / 10 ** rng.uniform(-5, -1.3, count)
-    rows = np.full((t.CABLE_ROWS, count), np.nan)
+    rows = np.full((g.CABLE_ROWS, count), np.nan)
     rows[geometry.CHORD], rows[geometry.SINE], rows[geometry.COSINE] = chord, np.sin(slope), np.cos(slope)
     rows[geometry.SPAN], rows[geometry.RISE] = chord * np.cos(slope), chord * np.sin(slope)
     for i in range(count):
@@ -142,13 +142,13 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
             free, pull, status = from_tension(model, Chord(own, rise / own, span / own), material, taut)
             vertical = taut * rise / own + pull
         leaving = math.hypot(horizontal, vertical - weight * free)
-        rows[t.LENGTH, i] = free + sum(behind_cable(model, material, over, leaving, wrap(angle)))
+        rows[g.LENGTH, i] = free + sum(behind_cable(model, material, over, leaving, wrap(angle)))
     for _ in range(8):  # from where the last pose left it, as the platform's own steps do
         cable_forces(model, cables, rows, True)
     # one rounding of the length moves the tension by its stiffness along the chord, of the free span in series
     stiff = 1.0 / (chord / cables[:, tables.STIFFNESS] + chord * (half_weight * np.cos(slope) / tension) ** 2 / tension)
-    expected = np.finfo(float).eps * (stiff * rows[t.LENGTH] + tension)
-    return tension, rows[t.TENSION], expected, rows[t.STATUS]
+    expected = np.finfo(float).eps * (stiff * rows[g.LENGTH] + tension)
+    return tension, rows[g.TENSION], expected, rows[g.STATUS]
 
 
 def test_lengths_of_cables_over_pulleys_lead_back_to_their_tensions() -> None:

@@ -27,9 +27,8 @@ from sagline.kernels.codes import (
     POSE_SINGULAR,
     POSE_SOLVED,
 )
+from sagline.kernels.inverse.feasibility import decide_poses, margins_of_poses, polygon_of_pose
 from sagline.kernels.inverse.poses import inverse_poses
-from sagline.kernels.inverse.queries import margins_of_poses, polygon_of_pose
-from sagline.kernels.inverse.verdicts import decide_poses
 from sagline.kernels.memory import memory_for
 from sagline.kernels.tension.polygon import SPARE_CORNERS
 from tests.kernels.balance.robots import A_POINT, EVERY_MOTION, GRAVITY, IN_A_PLANE, TO_AND_FRO, Case, random_case

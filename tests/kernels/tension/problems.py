@@ -14,8 +14,7 @@ from sagline.kernels.algebra.bounds import HIGH, LOW, START
 from sagline.kernels.algebra.linear_program import Basis
 from sagline.kernels.algebra.nearest_point import ActiveSet
 from sagline.kernels.tension.nearest import ReferencePoint
-from sagline.kernels.tension.polygon import SPARE_CORNERS
-from sagline.kernels.tension.work_arrays import WorkArrays
+from sagline.kernels.tension.polygon import SPARE_CORNERS, WorkArrays
 from tests.kernels.compiled import memory
 
 

@@ -8,8 +8,8 @@ from scipy.optimize import linprog
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import HIGH, LOW, START
+from sagline.kernels.tension import on_polygon
 from sagline.kernels.tension import polygon as p
-from sagline.kernels.tension import walk
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import Problem, area_of, brute_corners, corner_room, random_problem
 from tests.tiers import extended, wide
@@ -19,7 +19,7 @@ polygon_again = from_python(p.polygon_again)
 nearest_corner_point = from_python(p.nearest_corner_point)
 nearest_on_side = from_python(p.nearest_on_side)
 widest_pair = from_python(p.widest_pair)
-walk_polygon = from_python(walk.walk_polygon)
+walk_polygon = from_python(on_polygon.walk_polygon)
 
 
 def polygon_of(problem: Problem) -> tuple[Array, Indices]:

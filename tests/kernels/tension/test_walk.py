@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.kernels.tension.walk import most_independent, walk_polygon
+from sagline.kernels.tension.on_polygon import most_independent, walk_polygon
 from tests.kernels.compiled import from_python, memory
 from tests.kernels.tension.problems import area_of, brute_corners, corner_room, random_problem
 from tests.tiers import wide

@@ -8,11 +8,11 @@ import pytest
 
 import sagline as sl
 from sagline.core.arrays import Array
-from sagline.kernels.workspaces import bands
+from sagline.kernels.workspaces import sag_force_bounds
 from tests.kernels.cable.plain import plain_cables
 
 GRID = 300
-between_ends = cast("Any", bands.range_between_ends).py_func
+between_ends = cast("Any", sag_force_bounds.range_between_ends).py_func
 
 
 def cables_and_pulls(rng: np.random.Generator, count: int) -> tuple[Any, Array, Array]:
@@ -30,9 +30,9 @@ def cables_and_pulls(rng: np.random.Generator, count: int) -> tuple[Any, Array, 
     cable = sl.Cable(np.full((count, 1), 2.0), stiffness[:, None])
     hung = sl.Catenary().from_tension(cable, cosine[:, None], sine[:, None], tension, 1.0)
     pull = hung.vertical_force - tension * sine[:, None]
-    rows = np.zeros((bands.BAND_ROWS, count))
-    rows[bands.LOW], rows[bands.TAUT] = low, high
-    rows[bands.PULL_LOW], rows[bands.PULL_HIGH] = pull[:, 0], pull[:, -1]
+    rows = np.zeros((sag_force_bounds.BAND_ROWS, count))
+    rows[sag_force_bounds.LOW], rows[sag_force_bounds.TAUT] = low, high
+    rows[sag_force_bounds.PULL_LOW], rows[sag_force_bounds.PULL_HIGH] = pull[:, 0], pull[:, -1]
     cables = plain_cables(count, np.nan, half_weight=np.ones(count), sine=sine, cosine=cosine, stiffness=stiffness)
     return cables, rows, pull
 
@@ -42,7 +42,7 @@ def check(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
     cables, rows, pull = cables_and_pulls(rng, count)
     found = np.array([between_ends(cables, i, rows) for i in range(count)])
     told = ~np.isnan(found[:, 0])
-    rounding = 1e-14 * rows[bands.TAUT]
+    rounding = 1e-14 * rows[sag_force_bounds.TAUT]
     assert (found[told, 0] <= (pull.min(axis=1) + rounding)[told]).all()
     assert (found[told, 1] >= (pull.max(axis=1) - rounding)[told]).all()
     turns = (pull.max(axis=1) > np.maximum(pull[:, 0], pull[:, -1]) + 1e-9) | (
@@ -68,8 +68,13 @@ def test_no_pull_of_a_million_cables_is_outside_its_range() -> None:
 
 
 def test_cables_above_their_frame_ends_or_with_pulleys() -> None:
-    rows = np.zeros((bands.BAND_ROWS, 1))
-    rows[[bands.LOW, bands.TAUT, bands.PULL_LOW, bands.PULL_HIGH], 0] = 5.0, 50.0, 1.2, 0.9
+    rows = np.zeros((sag_force_bounds.BAND_ROWS, 1))
+    rows[[sag_force_bounds.LOW, sag_force_bounds.TAUT, sag_force_bounds.PULL_LOW, sag_force_bounds.PULL_HIGH], 0] = (
+        5.0,
+        50.0,
+        1.2,
+        0.9,
+    )
     given = {"half_weight": np.ones(1), "cosine": np.array([0.8]), "stiffness": np.array([1e5])}
     above = plain_cables(1, np.nan, sine=np.array([0.6]), **given)
     assert between_ends(above, 0, rows) == (0.9, 1.2)

@@ -8,11 +8,11 @@ import numpy as np
 from scipy.optimize import minimize
 
 from sagline.core.arrays import Array
-from sagline.kernels.workspaces import centered
-from sagline.kernels.workspaces.centered import Centered
+from sagline.kernels.workspaces import box_tensions
+from sagline.kernels.workspaces.box_tensions import Centered
 from tests.kernels.compiled import from_python
 
-find_center = from_python(centered.find_center)
+find_center = from_python(box_tensions.find_center)
 SMOOTHING = 0.01
 
 

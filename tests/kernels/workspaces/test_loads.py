@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.kernels.workspaces import loads as kernels
-from sagline.kernels.workspaces.loads import Loads
+from sagline.kernels.workspaces import wrench_set as kernels
+from sagline.kernels.workspaces.wrench_set import Loads
 from tests.kernels.compiled import from_python
 
 reach, farthest = from_python(kernels.reach_of_loads), from_python(kernels.farthest)

@@ -18,8 +18,8 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
-from sagline.kernels.dynamics import chain_records as ends
 from sagline.kernels.dynamics import chain_run, chains
+from sagline.kernels.dynamics import chains as ends
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import rigid_body as body
 from sagline.kernels.dynamics.progress import COUNTERS, FAILED

@@ -13,7 +13,7 @@ from sagline.core.arguments import brief
 from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kernels.dynamics.tables_in_time import TimeTableArrays
+from sagline.kernels.dynamics.progress import TimeTableArrays
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides

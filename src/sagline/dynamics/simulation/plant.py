@@ -12,13 +12,13 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.initial_conditions import TimeTable
 from sagline.kernels import tables
-from sagline.kernels.cable.rows import CABLE_ROWS
-from sagline.kernels.cable.rows import LENGTH as LENGTH_ROW
+from sagline.kernels.cable.geometry import CABLE_ROWS
+from sagline.kernels.cable.geometry import LENGTH as LENGTH_ROW
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
-from sagline.kernels.dynamics.winding import BIN
+from sagline.kernels.dynamics.drives import BIN
 from sagline.robot.batch import has_routing
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot

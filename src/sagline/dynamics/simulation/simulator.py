@@ -28,7 +28,7 @@ from sagline.dynamics.simulation.simulate import (
 )
 from sagline.dynamics.simulation.winches import Encoders, LoadCells, Winches, Winding, check_winding, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.kernels.cable.rows import LENGTH
+from sagline.kernels.cable.geometry import LENGTH
 from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import motion
 from sagline.kernels.dynamics import progress as k

@@ -11,8 +11,14 @@ from scipy.special import roots_jacobi
 
 from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.dynamics import string as columns
-from sagline.kernels.dynamics.spectral import interpolate, node_counts, spectral_matrices, stretch_matrices
-from sagline.kernels.dynamics.spectral_elements import LARGEST_DEGREE, Lobatto
+from sagline.kernels.dynamics.spectral import (
+    LARGEST_DEGREE,
+    Lobatto,
+    interpolate,
+    node_counts,
+    spectral_matrices,
+    stretch_matrices,
+)
 from sagline.statics.strings import Strings
 
 

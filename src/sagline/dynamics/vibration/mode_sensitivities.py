@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sagline.core.arrays import Array
+from sagline.kernels.dynamics.collocation import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.kernels.dynamics.string import SMOOTH, TINY
-from sagline.kernels.dynamics.transfer import INTEGRALS, NODES, STAGES, WEIGHTS
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, motions_of_ends
 from sagline.statics.stiffness import mass_matrix, stiffness

@@ -26,17 +26,13 @@ class Basis(NamedTuple):
     """The sides an optimal point stands on; good for the next program with the same rows and cost.
 
     A limit that was finite must then still be so: a side at infinity is no side to stand on.
-
-    Attributes:
-        labels: Of the sides, and of the one that contradicts them if the bounds have nothing in common, (d + 1,);
-            labels[0] is -1 for no basis. From 2k on they name the sides of a box that stands in for infinity.
-        weights: What each of them weighs in the combination that proves the answer, (d + 1,), >= 0.
-        inverse: Inverse of their normals, (d, d).
     """
 
+    # of the sides, and of the one that contradicts them if the bounds have nothing in common, (d + 1,); labels[0] is -1
+    # for no basis. From 2k on they name the sides of a box that stands in for infinity.
     labels: Indices
-    weights: Array
-    inverse: Array
+    weights: Array  # what each of them weighs in the combination that proves the answer, (d + 1,), >= 0
+    inverse: Array  # inverse of their normals, (d, d)
 
 
 @glue

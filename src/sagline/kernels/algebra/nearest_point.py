@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import inward, most_violated_bound, side_of
-from sagline.kernels.algebra.gram_schmidt import normalize_row, orthogonalize_row
+from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
@@ -28,19 +28,12 @@ PUSH, SHARE = 0, 1  # how hard each held side pushes; how the one that enters is
 
 
 class ActiveSet(NamedTuple):
-    """The sides a nearest point stands on, and the memory to find them in.
+    """The sides a nearest point stands on, and the memory to find them in."""
 
-    Attributes:
-        labels: How many, then their labels, (d + 2,).
-        frame: Their orthonormal frame, and a row for the one that enters, (d + 1, d).
-        triangle: What makes them of it, (d + 1, d + 1).
-        pushes: Rows PUSH and SHARE, (2, d + 1).
-    """
-
-    labels: Indices
-    frame: Array
-    triangle: Array
-    pushes: Array
+    labels: Indices  # how many, then their labels, (d + 2,)
+    frame: Array  # their orthonormal frame, and a row for the one that enters, (d + 1, d)
+    triangle: Array  # what makes them of it, (d + 1, d + 1)
+    pushes: Array  # rows PUSH and SHARE, (2, d + 1)
 
 
 @glue

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array
 from sagline.kernels import tables
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS
-from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
+from sagline.kernels.algebra.factors import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
@@ -36,71 +36,40 @@ SHORTEST_CHORD = 1e-9  # [m]
 
 
 class Platform(NamedTuple):
-    """Platform and loads at one pose.
+    """Platform and loads at one pose."""
 
-    Attributes:
-        freedom: Rows that pick the platform's free motions, translations first, (n, 6).
-        body: Row of the body_table, (BODY_COLUMNS,).
-        robot: Rows of the cable_table, (m, CABLE_COLUMNS).
-        pose: Row of the poses, (POSE_COLUMNS,).
-        wrench: External plus inertial, about the center of mass, (6,).
-    """
-
-    freedom: Array
-    body: Array
-    robot: Array
-    pose: Array
-    wrench: Array
+    freedom: Array  # rows that pick the platform's free motions, translations first, (n, 6)
+    body: Array  # row of the body_table, (BODY_COLUMNS,)
+    robot: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
+    pose: Array  # row of the poses, (POSE_COLUMNS,)
+    wrench: Array  # external plus inertial, about the center of mass, (6,)
 
 
 class TensionLimits(NamedTuple):
-    """Limits of the tensions.
+    """Limits of the tensions."""
 
-    Attributes:
-        quantity: Which tension the robot's limits name.
-        validity: The article's T_adj of (54) [N], T_x > w D/(2 |tan phi|) + T_adj; NaN leaves the bound out.
-    """
-
-    quantity: int
-    validity: float
+    quantity: int  # which tension the robot's limits name
+    validity: float  # the article's T_adj of (54) [N], T_x > w D/(2 |tan phi|) + T_adj; NaN leaves the bound out
 
 
 class Balance(NamedTuple):
-    """The balance of one pose, for m cables, n free motions and r = m - n redundant cables.
+    """The balance of one pose, for m cables, n free motions and r = m - n redundant cables."""
 
-    Attributes:
-        rotation: Platform -> world, (3, 3).
-        geometry: Rows of `cable_geometry`, (GEOMETRY_ROWS, m).
-        full: Structure matrix, (6, m).
-        matrix: Along the free motions, (n, m).
-        reduced: In the distribution's variable, then its reflections, (n, m).
-        diagonals: Of its factors, (2, n).
-        q: Orthogonal factor, and a row to work in, (m + 1, m).
-        inverse: Transposed pseudo-inverse in the distribution's variable, (n, m).
-        null: Orthonormal null-space basis in the distribution's variable, one vector a row, (r, m).
-        needed: Wrench that the chord tensions must supply, (6,).
-        right: Its components along the free motions, (n,).
-        scale: Of the distribution's variable, (m,).
-        offset: Of the distribution's variable [N], (m,).
-        bounds: The minimum norm as START, and the limits, in the distribution's variable, (3, m).
-        tension: Shared tensions, in the distribution's variable less its offset [N], (m,).
-    """
-
-    rotation: Array
-    geometry: Array
-    full: Array
-    matrix: Array
-    reduced: Array
-    diagonals: Array
-    q: Array
-    inverse: Array
-    null: Array
-    needed: Array
-    right: Array
-    scale: Array
-    offset: Array
-    bounds: Array
-    tension: Array
+    rotation: Array  # platform -> world, (3, 3)
+    geometry: Array  # rows of `cable_geometry`, (GEOMETRY_ROWS, m)
+    full: Array  # structure matrix, (6, m)
+    matrix: Array  # along the free motions, (n, m)
+    reduced: Array  # in the distribution's variable, then its reflections, (n, m)
+    diagonals: Array  # of its factors, (2, n)
+    q: Array  # orthogonal factor, and a row to work in, (m + 1, m)
+    inverse: Array  # transposed pseudo-inverse in the distribution's variable, (n, m)
+    null: Array  # orthonormal null-space basis in the distribution's variable, one vector a row, (r, m)
+    needed: Array  # wrench that the chord tensions must supply, (6,)
+    right: Array  # its components along the free motions, (n,)
+    scale: Array  # of the distribution's variable, (m,)
+    offset: Array  # of the distribution's variable [N], (m,)
+    bounds: Array  # the minimum norm as START, and the limits, in the distribution's variable, (3, m)
+    tension: Array  # shared tensions, in the distribution's variable less its offset [N], (m,)
 
 
 @glue

@@ -16,64 +16,35 @@ class Cables(NamedTuple):
 
     The free span of a cable runs from where it leaves its pulley to its platform end. Where nothing is behind any
     cable the free spans are the cables themselves, and the words for them name the same memory.
-
-    Attributes:
-        machine: Whether anything is behind a cable, for all of them.
-        density: [kg/m].
-        stiffness: EA [N].
-        half_weight: wD/2 [N].
-        chord: D [m]; over a pulley that of the tangent from the platform end.
-        sine: sin phi.
-        cosine: cos phi.
-        low: Lower limit of the chord tension [N].
-        high: Upper limit of the chord tension [N], may be infinite.
-        tau: Chord tension [N].
-        ratio: L/D of the free span.
-        pull: T_z - tau sin phi [N].
-        last_pull: The same in the round before [N].
-        slackness: X = wD/(2 tau) of the free span.
-        strain: e = tau/EA of the free span.
-        free_half_weight: wD/2 of the free span [N].
-        free_chord: D of the free span [m].
-        free_sine: sin phi of the free span.
-        free_cosine: cos phi of the free span.
-        free_tau: Chord tension of the free span [N].
-        free_pull: T_z - tau sin phi of the free span [N].
-        wrap_sine: Sine of the wrap angle psi.
-        wrap_cosine: Cosine of psi.
-        radius: Of the pulley [m].
-        entry: +1 where a cable enters its pulley from below, -1 from above.
-        dead: Length of dead cable [m].
-        rise: Height of the frame anchor above the drum [m].
     """
 
-    machine: bool
-    density: Array
-    stiffness: Array
-    half_weight: Array
-    chord: Array
-    sine: Array
-    cosine: Array
-    low: Array
-    high: Array
-    tau: Array
-    ratio: Array
-    pull: Array
-    last_pull: Array
-    slackness: Array
-    strain: Array
-    free_half_weight: Array
-    free_chord: Array
-    free_sine: Array
-    free_cosine: Array
-    free_tau: Array
-    free_pull: Array
-    wrap_sine: Array
-    wrap_cosine: Array
-    radius: Array
-    entry: Array
-    dead: Array
-    rise: Array
+    machine: bool  # whether anything is behind a cable, for all of them
+    density: Array  # [kg/m]
+    stiffness: Array  # EA [N]
+    half_weight: Array  # wD/2 [N]
+    chord: Array  # D [m]; over a pulley that of the tangent from the platform end
+    sine: Array  # sin phi
+    cosine: Array  # cos phi
+    low: Array  # lower limit of the chord tension [N]
+    high: Array  # upper limit of the chord tension [N], may be infinite
+    tau: Array  # chord tension [N]
+    ratio: Array  # L/D of the free span
+    pull: Array  # T_z - tau sin phi [N]
+    last_pull: Array  # the same in the round before [N]
+    slackness: Array  # X = wD/(2 tau) of the free span
+    strain: Array  # e = tau/EA of the free span
+    free_half_weight: Array  # wD/2 of the free span [N]
+    free_chord: Array  # D of the free span [m]
+    free_sine: Array  # sin phi of the free span
+    free_cosine: Array  # cos phi of the free span
+    free_tau: Array  # chord tension of the free span [N]
+    free_pull: Array  # T_z - tau sin phi of the free span [N]
+    wrap_sine: Array  # sine of the wrap angle psi
+    wrap_cosine: Array  # cosine of psi
+    radius: Array  # of the pulley [m]
+    entry: Array  # +1 where a cable enters its pulley from below, -1 from above
+    dead: Array  # length of dead cable [m]
+    rise: Array  # height of the frame anchor above the drum [m]
 
 
 @glue

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from sagline.kernels.algebra.hyperbolic import (
+from sagline.kernels.algebra.functions import (
     POLYNOMIAL_LIMIT,
     atanhc,
     cosh,

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.algebra.hyperbolic import cosh_polynomial, sinh_excess_polynomial, sinhc_polynomial
+from sagline.kernels.algebra.functions import cosh_polynomial, sinh_excess_polynomial, sinhc_polynomial
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
 from sagline.kernels.cable.over_pulleys import fill_equivalent_cables, start_passes, update_from_equivalent_cables
@@ -71,24 +70,24 @@ def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, r
     """Two Halley steps for every cable from the remembered parameter; one result a loop, so that each vectorizes."""
     m = cables.shape[0]
     for i in range(m):
-        rows[t.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
+        rows[g.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
     for i in range(m):
-        rows[t.EXCESS, i] = relative_excess(asked.span[i], asked.rise[i], asked.length[i])
-    for i in range(m):
-        xi2 = _square_share(asked.span[i], asked.length[i])
-        zeta2 = _square_share(asked.rise[i], asked.length[i])
-        rows[t.FIRST, i] = _halley_step(rows[t.PARAMETER, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
+        rows[g.EXCESS, i] = relative_excess(asked.span[i], asked.rise[i], asked.length[i])
     for i in range(m):
         xi2 = _square_share(asked.span[i], asked.length[i])
         zeta2 = _square_share(asked.rise[i], asked.length[i])
-        rows[t.SECOND, i] = _halley_step(rows[t.FIRST, i], xi2, zeta2, rows[t.KAPPA, i], rows[t.EXCESS, i])
+        rows[g.FIRST, i] = _halley_step(rows[g.PARAMETER, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
+    for i in range(m):
+        xi2 = _square_share(asked.span[i], asked.length[i])
+        zeta2 = _square_share(asked.rise[i], asked.length[i])
+        rows[g.SECOND, i] = _halley_step(rows[g.FIRST, i], xi2, zeta2, rows[g.KAPPA, i], rows[g.EXCESS, i])
 
 
 @formula
 def _has_converged(rows: Array, i: int) -> bool:
     """True if the second step is exact; false for NaN."""
-    first, second, kappa = rows[t.FIRST, i], rows[t.SECOND, i], rows[t.KAPPA, i]
-    near = abs(first - rows[t.PARAMETER, i]) <= CLOSE * (first + kappa)
+    first, second, kappa = rows[g.FIRST, i], rows[g.SECOND, i], rows[g.KAPPA, i]
+    near = abs(first - rows[g.PARAMETER, i]) <= CLOSE * (first + kappa)
     return near and abs(second - first) <= SMALL_HALLEY_STEP * (second + kappa) and 0.0 < second < ORDINARY
 
 
@@ -98,17 +97,14 @@ def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) 
 
     Cables over pulleys are solved in passes, as cables that start where the chord touches; docs/model.md, section 10.
 
-    Args:
-        model: Cable model.
-        cables: Rows of the cable_table, (m, CABLE_COLUMNS).
-        rows: As in `sagline.kernels.cable.rows`, (CABLE_ROWS, m).
-        behind: That of the model, by itself, so that what it rules out is not compiled.
+    cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m);
+    behind: that of the model, by itself, so that what it rules out is not compiled.
     """
     if behind is None:
-        bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[t.LENGTH], cables[:, tables.STIFFNESS])
+        bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])
         _solve_equivalent_cables(model, cables, bare, rows)
     else:
-        asked = _EquivalentCables(rows[t.ASKED_SPAN], rows[t.ASKED_RISE], rows[t.ASKED_LENGTH], rows[t.SOFT])
+        asked = _EquivalentCables(rows[g.ASKED_SPAN], rows[g.ASKED_RISE], rows[g.ASKED_LENGTH], rows[g.SOFT])
         start_passes(cables, rows)
         missed = math.inf
         for _ in range(PASSES):
@@ -119,7 +115,7 @@ def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) 
                 break
         if not missed <= MISSED:
             for i in range(cables.shape[0]):
-                rows[t.STATUS, i] = CABLE_NOT_CONVERGED
+                rows[g.STATUS, i] = CABLE_NOT_CONVERGED
 
 
 @glue
@@ -134,21 +130,21 @@ def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCabl
         density = cables[i, tables.DENSITY]
         weight = density * model.gravity
         if exact and _has_converged(rows, i):
-            h, kappa = rows[t.SECOND, i], rows[t.KAPPA, i]
+            h, kappa = rows[g.SECOND, i], rows[g.KAPPA, i]
             half = 0.5 * weight / (h + kappa)
             y = h * h
             tangent = h * sinhc_polynomial(y) / cosh_polynomial(y)
-            rows[t.HORIZONTAL, i] = half * span
-            rows[t.VERTICAL, i] = 0.5 * weight * (length + rise / (tangent + kappa))
-            rows[t.TENSION, i] = half * chord
-            rows[t.STATUS, i] = CABLE_SOLVED
-            rows[t.PARAMETER, i] = h
+            rows[g.HORIZONTAL, i] = half * span
+            rows[g.VERTICAL, i] = 0.5 * weight * (length + rise / (tangent + kappa))
+            rows[g.TENSION, i] = half * chord
+            rows[g.STATUS, i] = CABLE_SOLVED
+            rows[g.PARAMETER, i] = h
             continue
         force, status = from_length(model, span, rise, Material(density, asked.stiffness[i]), length)
-        rows[t.HORIZONTAL, i] = force.horizontal
-        rows[t.VERTICAL, i] = force.vertical
-        rows[t.TENSION, i] = force.tension
-        rows[t.STATUS, i] = status
+        rows[g.HORIZONTAL, i] = force.horizontal
+        rows[g.VERTICAL, i] = force.vertical
+        rows[g.TENSION, i] = force.tension
+        rows[g.STATUS, i] = status
         # h back from tau = wD/(2 (h + kappa)), for the next pose
-        h = 0.5 * weight * chord / force.tension - rows[t.KAPPA, i] if force.tension > 0.0 else math.nan
-        rows[t.PARAMETER, i] = h
+        h = 0.5 * weight * chord / force.tension - rows[g.KAPPA, i] if force.tension > 0.0 else math.nan
+        rows[g.PARAMETER, i] = h

@@ -11,10 +11,8 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.algebra.angle import angle
-from sagline.kernels.algebra.hyperbolic import EXCESS_LIMIT, atanhc_excess_polynomial
+from sagline.kernels.algebra.functions import EXCESS_LIMIT, angle, atanhc_excess_polynomial
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import catenary_end
 from sagline.kernels.cable.models import from_tension
 from sagline.kernels.cable.pulley import (
@@ -53,17 +51,17 @@ def chord_at(rows: Array, i: int) -> Chord:
 @formula
 def _wrap_at(rows: Array, i: int) -> Wrap:
     """Wrap of one cable of a pose on its pulley, after `update_from_equivalent_cables`."""
-    return Wrap(rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], rows[t.WRAP, i])
+    return Wrap(rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i], rows[g.WRAP, i])
 
 
 @glue
 def start_passes(cables: Array, rows: Array) -> None:
     """Fill what is behind the chords, and forget what was missed where the pose before left no parameter."""
     for i in range(rows.shape[1]):
-        rows[t.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
+        rows[g.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
     for i in range(rows.shape[1]):
-        if math.isnan(rows[t.PARAMETER, i]) or math.isnan(rows[t.OFF_X, i] + rows[t.OFF_Z, i] + rows[t.OFF_LENGTH, i]):
-            rows[t.OFF_X, i] = rows[t.OFF_Z, i] = rows[t.OFF_LENGTH, i] = 0.0
+        if math.isnan(rows[g.PARAMETER, i]) or math.isnan(rows[g.OFF_X, i] + rows[g.OFF_Z, i] + rows[g.OFF_LENGTH, i]):
+            rows[g.OFF_X, i] = rows[g.OFF_Z, i] = rows[g.OFF_LENGTH, i] = 0.0
 
 
 @glue
@@ -71,24 +69,24 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
     """Fill the cables that are solved in the stead of those over pulleys."""
     m = rows.shape[1]
     for i in range(m):
-        length = rows[t.LENGTH, i]
-        rows[t.ASKED_LENGTH, i] = max(length - rows[t.BEHIND, i], LEAST_FREE * length)
+        length = rows[g.LENGTH, i]
+        rows[g.ASKED_LENGTH, i] = max(length - rows[g.BEHIND, i], LEAST_FREE * length)
     for i in range(m):
-        rows[t.SOFT, i] = cables[i, tables.STIFFNESS] / (1.0 + rows[t.BEHIND, i] / rows[t.ASKED_LENGTH, i])
+        rows[g.SOFT, i] = cables[i, tables.STIFFNESS] / (1.0 + rows[g.BEHIND, i] / rows[g.ASKED_LENGTH, i])
     if model.code == CATENARY:
         for i in range(m):
-            rows[t.ASKED_SPAN, i] = rows[g.SPAN, i] + rows[t.OFF_X, i]
+            rows[g.ASKED_SPAN, i] = rows[g.SPAN, i] + rows[g.OFF_X, i]
         for i in range(m):
-            half = 0.5 * cables[i, tables.DENSITY] * model.gravity * rows[t.ASKED_LENGTH, i]
-            lift = rows[t.BEHIND, i] * half / cables[i, tables.STIFFNESS]
-            rows[t.ASKED_RISE, i] = rows[g.RISE, i] + (lift + rows[t.OFF_Z, i])
+            half = 0.5 * cables[i, tables.DENSITY] * model.gravity * rows[g.ASKED_LENGTH, i]
+            lift = rows[g.BEHIND, i] * half / cables[i, tables.STIFFNESS]
+            rows[g.ASKED_RISE, i] = rows[g.RISE, i] + (lift + rows[g.OFF_Z, i])
     else:
         for i in range(m):
-            rows[t.ASKED_SPAN, i] = rows[g.SPAN, i]
+            rows[g.ASKED_SPAN, i] = rows[g.SPAN, i]
         for i in range(m):
-            rows[t.ASKED_RISE, i] = rows[g.RISE, i]
+            rows[g.ASKED_RISE, i] = rows[g.RISE, i]
         for i in range(m):
-            rows[t.ASKED_LENGTH, i] += rows[t.OFF_LENGTH, i]
+            rows[g.ASKED_LENGTH, i] += rows[g.OFF_LENGTH, i]
 
 
 @glue
@@ -110,29 +108,29 @@ def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
     """Fill where exact cables leave their pulleys, from T_x and T_zA, and their free spans and lengths."""
     m = rows.shape[1]
     for i in range(m):  # T_zA
-        rows[t.VERTICAL, i] -= cables[i, tables.DENSITY] * model.gravity * rows[t.ASKED_LENGTH, i]
+        rows[g.VERTICAL, i] -= cables[i, tables.DENSITY] * model.gravity * rows[g.ASKED_LENGTH, i]
     for i in range(m):
-        x, z = rows[t.HORIZONTAL, i], rows[t.VERTICAL, i]
-        rows[t.LEAVING, i] = math.sqrt(x * x + z * z)
+        x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
+        rows[g.LEAVING, i] = math.sqrt(x * x + z * z)
     for i in range(m):
-        rows[t.WRAP_SINE, i] = rows[t.HORIZONTAL, i] / (rows[t.LEAVING, i] + TINY)
+        rows[g.WRAP_SINE, i] = rows[g.HORIZONTAL, i] / (rows[g.LEAVING, i] + TINY)
     for i in range(m):
-        rows[t.WRAP_COSINE, i] = pulley_at(cables, i).entry * rows[t.VERTICAL, i] / (rows[t.LEAVING, i] + TINY)
+        rows[g.WRAP_COSINE, i] = pulley_at(cables, i).entry * rows[g.VERTICAL, i] / (rows[g.LEAVING, i] + TINY)
     for i in range(m):
-        rows[t.WRAP, i] = angle(rows[t.WRAP_SINE, i] + TINY, rows[t.WRAP_COSINE, i])
+        rows[g.WRAP, i] = angle(rows[g.WRAP_SINE, i] + TINY, rows[g.WRAP_COSINE, i])
     for i in range(m):
         material = material_at(cables, i)
-        wrapped, dead = behind_cable(model, material, pulley_at(cables, i), rows[t.LEAVING, i], _wrap_at(rows, i))
-        rows[t.FREE_LENGTH, i] = rows[t.LENGTH, i] - (wrapped + dead)
+        wrapped, dead = behind_cable(model, material, pulley_at(cables, i), rows[g.LEAVING, i], _wrap_at(rows, i))
+        rows[g.FREE_LENGTH, i] = rows[g.LENGTH, i] - (wrapped + dead)
     for i in range(m):  # T_z
-        rows[t.VERTICAL, i] += cables[i, tables.DENSITY] * model.gravity * rows[t.FREE_LENGTH, i]
+        rows[g.VERTICAL, i] += cables[i, tables.DENSITY] * model.gravity * rows[g.FREE_LENGTH, i]
     for i in range(m):
-        rows[t.FREE_SPAN, i] = free_span(pulley_at(cables, i), chord_at(rows, i), rows[t.WRAP_COSINE, i])
+        rows[g.FREE_SPAN, i] = free_span(pulley_at(cables, i), chord_at(rows, i), rows[g.WRAP_COSINE, i])
     for i in range(m):
-        rows[t.FREE_RISE, i] = free_rise(pulley_at(cables, i), chord_at(rows, i), rows[t.WRAP_SINE, i])
+        rows[g.FREE_RISE, i] = free_rise(pulley_at(cables, i), chord_at(rows, i), rows[g.WRAP_SINE, i])
     for i in range(m):
         if rows[g.SPAN, i] > 0.0:
-            rows[t.TENSION, i] = rows[t.HORIZONTAL, i] / rows[g.COSINE, i]
+            rows[g.TENSION, i] = rows[g.HORIZONTAL, i] / rows[g.COSINE, i]
 
 
 @glue
@@ -140,22 +138,22 @@ def _fill_free_span_ends(model: Model, cables: Array, rows: Array) -> None:
     """Fill where the free spans of exact cables end; `catenary_end`, its ordinary cases in loops that vectorize."""
     m = rows.shape[1]
     for i in range(m):
-        x, z = rows[t.HORIZONTAL, i], rows[t.VERTICAL, i]
-        rows[t.TOTAL, i] = rows[t.LEAVING, i] + math.sqrt(x * x + z * z)
+        x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
+        rows[g.TOTAL, i] = rows[g.LEAVING, i] + math.sqrt(x * x + z * z)
     for i in range(m):
-        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[t.FREE_LENGTH, i]
-        u = weight_length / rows[t.TOTAL, i]
-        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[t.TOTAL, i] * (1.0 + atanhc_excess_polynomial(u * u))
-        rows[t.END_X, i] = rows[t.HORIZONTAL, i] * rows[t.FREE_LENGTH, i] * gives
+        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[g.FREE_LENGTH, i]
+        u = weight_length / rows[g.TOTAL, i]
+        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[g.TOTAL, i] * (1.0 + atanhc_excess_polynomial(u * u))
+        rows[g.END_X, i] = rows[g.HORIZONTAL, i] * rows[g.FREE_LENGTH, i] * gives
     for i in range(m):
-        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[t.FREE_LENGTH, i]
-        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[t.TOTAL, i]
-        rows[t.END_Z, i] = (rows[t.VERTICAL, i] - 0.5 * weight_length) * rows[t.FREE_LENGTH, i] * gives
+        weight_length = cables[i, tables.DENSITY] * model.gravity * rows[g.FREE_LENGTH, i]
+        gives = 1.0 / cables[i, tables.STIFFNESS] + 2.0 / rows[g.TOTAL, i]
+        rows[g.END_Z, i] = (rows[g.VERTICAL, i] - 0.5 * weight_length) * rows[g.FREE_LENGTH, i] * gives
     for i in range(m):
-        weight, free = cables[i, tables.DENSITY] * model.gravity, rows[t.FREE_LENGTH, i]
-        if not weight * free <= ORDINARY_END * rows[t.TOTAL, i]:
-            rows[t.END_X, i], rows[t.END_Z, i] = catenary_end(
-                rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], free, weight, cables[i, tables.STIFFNESS]
+        weight, free = cables[i, tables.DENSITY] * model.gravity, rows[g.FREE_LENGTH, i]
+        if not weight * free <= ORDINARY_END * rows[g.TOTAL, i]:
+            rows[g.END_X, i], rows[g.END_Z, i] = catenary_end(
+                rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], free, weight, cables[i, tables.STIFFNESS]
             )
 
 
@@ -170,10 +168,10 @@ def _end_errors(rows: Array) -> float:
     """Add by how much the platform ends are missed to what is asked for; returns the most, of a cable's length."""
     largest = 0.0
     for i in range(rows.shape[1]):
-        x, z = rows[t.FREE_SPAN, i] - rows[t.END_X, i], rows[t.FREE_RISE, i] - rows[t.END_Z, i]
-        rows[t.OFF_X, i] += x
-        rows[t.OFF_Z, i] += z
-        largest = _larger(largest, (abs(x) + abs(z)) / rows[t.LENGTH, i])
+        x, z = rows[g.FREE_SPAN, i] - rows[g.END_X, i], rows[g.FREE_RISE, i] - rows[g.END_Z, i]
+        rows[g.OFF_X, i] += x
+        rows[g.OFF_Z, i] += z
+        largest = _larger(largest, (abs(x) + abs(z)) / rows[g.LENGTH, i])
     return largest
 
 
@@ -183,21 +181,21 @@ def _length_errors(model: Model, cables: Array, rows: Array) -> float:
     largest = 0.0
     for i in range(rows.shape[1]):
         material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
-        tension = rows[t.TENSION, i]
+        tension = rows[g.TENSION, i]
         sine, cosine = chord.cosine, pulley.entry * chord.sine
-        rows[t.LEAVING, i] = tension
-        rows[t.WRAP_SINE, i] = sine
-        rows[t.WRAP_COSINE, i] = cosine
-        rows[t.WRAP, i] = angle(sine, cosine)
-        rows[t.FREE_SPAN, i] = rows[g.SPAN, i]
-        rows[t.FREE_RISE, i] = rows[g.RISE, i]
+        rows[g.LEAVING, i] = tension
+        rows[g.WRAP_SINE, i] = sine
+        rows[g.WRAP_COSINE, i] = cosine
+        rows[g.WRAP, i] = angle(sine, cosine)
+        rows[g.FREE_SPAN, i] = rows[g.SPAN, i]
+        rows[g.FREE_RISE, i] = rows[g.RISE, i]
         wrapped, dead = behind_cable(model, material, pulley, tension, _wrap_at(rows, i))
-        free = rows[t.LENGTH, i] - (wrapped + dead)
-        rows[t.FREE_LENGTH, i] = free
+        free = rows[g.LENGTH, i] - (wrapped + dead)
+        rows[g.FREE_LENGTH, i] = free
         if model.code != ELASTIC and tension > 0.0:
             miss = free - from_tension(model, chord, material, tension)[0]
-            rows[t.OFF_LENGTH, i] += miss
-            largest = _larger(largest, abs(miss) / rows[t.LENGTH, i])
+            rows[g.OFF_LENGTH, i] += miss
+            largest = _larger(largest, abs(miss) / rows[g.LENGTH, i])
     return largest
 
 
@@ -210,7 +208,7 @@ def _weight_per_length(model: Model, material: Material) -> float:
 @formula
 def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
     """Unstrained cable behind P, after `update_from_equivalent_cables`."""
-    return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[t.LEAVING, i], _wrap_at(rows, i))
+    return behind_cable(model, material_at(cables, i), pulley_at(cables, i), rows[g.LEAVING, i], _wrap_at(rows, i))
 
 
 @formula
@@ -223,7 +221,7 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
         material_at(cables, i),
         pulley_at(cables, i),
         _wrap_at(rows, i),
-        rows[t.LEAVING, i],
+        rows[g.LEAVING, i],
     )
     weight = _weight_per_length(model, material)
     strained = 1.0 + tension / material.stiffness
@@ -236,7 +234,7 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
 @formula
 def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
     """In-plane stiffness of a cable, whose free span's is given, with the part behind P that gives way along it."""
-    if not rows[t.LEAVING, i] > 0.0:
+    if not rows[g.LEAVING, i] > 0.0:
         return plane
     x, z, gives = end_motion_per_length(model, cables, rows, i)
     left_x, left_z = plane.xx * x + plane.xz * z, plane.zx * x + plane.zz * z
@@ -255,13 +253,13 @@ def across_pulley(cables: Array, rows: Array, i: int) -> float:
     """Stiffness of a cable normal to its plane [N/m]: the whole plane turns about the swivel axis."""
     pulley = pulley_at(cables, i)
     if pulley.radius == 0.0:
-        return rows[t.TENSION, i] / rows[g.CHORD, i]
-    return rows[t.HORIZONTAL, i] / from_axis(pulley, chord_at(rows, i))
+        return rows[g.TENSION, i] / rows[g.CHORD, i]
+    return rows[g.HORIZONTAL, i] / from_axis(pulley, chord_at(rows, i))
 
 
 @formula
 def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
     """Energy [J] that the part behind P adds to that of the free span."""
-    material, tension = material_at(cables, i), rows[t.LEAVING, i]
-    weight, free = _weight_per_length(model, material), rows[t.FREE_LENGTH, i]
+    material, tension = material_at(cables, i), rows[g.LEAVING, i]
+    weight, free = _weight_per_length(model, material), rows[g.FREE_LENGTH, i]
     return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, _wrap_at(rows, i), free)

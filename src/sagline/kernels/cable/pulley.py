@@ -13,26 +13,19 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.algebra.angle import angle
+from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model
 from sagline.kernels.codes import CATENARY, STRAIGHT
 from sagline.kernels.jit import formula, kernel
 
 
 class Pulley(NamedTuple):
-    """Pulley and dead length behind one frame anchor.
+    """Pulley and dead length behind one frame anchor."""
 
-    Attributes:
-        radius: R [m]; 0 for an eyelet.
-        entry: s, +1 where the cable enters from below, -1 from above.
-        dead: Length of the straight run from drum to anchor [m].
-        rise: Height of the anchor above the drum [m].
-    """
-
-    radius: float
-    entry: float
-    dead: float
-    rise: float
+    radius: float  # R [m]; 0 for an eyelet
+    entry: float  # s, +1 where the cable enters from below, -1 from above
+    dead: float  # length of the straight run from drum to anchor [m]
+    rise: float  # height of the anchor above the drum [m]
 
 
 class Wrap(NamedTuple):
@@ -186,17 +179,9 @@ def _length_behind_by(
 ) -> tuple[float, float]:
     """Derivatives of wrap angle and unstrained length behind P at a fixed force on the platform end.
 
-    Args:
-        pulley: What stands behind.
-        weight: Weight per length [N/m].
-        stiffness: EA [N].
-        force: On the platform end, which stays.
-        free: Unstrained length of the free span [m].
-        change: What changes; its length plays no part here.
-        grown: By how much the free span's unstrained length grows.
-
-    Returns:
-        Changes of psi, and of the length behind P.
+    weight: weight per length [N/m]; stiffness: EA [N]; free: unstrained length of the free span [m]; change: what
+    changes; its length plays no part here; grown: by how much the free span's unstrained length grows. Returns changes
+    of psi, and of the length behind P.
     """
     radius, entry, dead, rise = pulley
     vertical_a = force.vertical - weight * free

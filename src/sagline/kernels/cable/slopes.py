@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from sagline.kernels.algebra.hyperbolic import atanhc_excess
+from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import pull_of_shallow
 from sagline.kernels.cable.pulley import Change, Motion, Pulley, end_by
@@ -135,13 +135,7 @@ def slopes_over(
 ) -> tuple[_ForceSlopes, _MachineSlopes]:
     """The five of a cable that may have something behind it; of the shallow models as of the exact one.
 
-    Args:
-        model: Cable model.
-        material: What the cable is made of.
-        pulley: What is behind it.
-        free: Unstrained length of the free span [m].
-        force: On the platform end.
-        plane: Stiffness of the whole cable.
+    free: unstrained length of the free span [m].
     """
     weight = 0.0 if model.code == ELASTIC else material.density * model.gravity
     by_weight = Motion(0.0, 0.0)

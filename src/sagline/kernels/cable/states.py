@@ -1,10 +1,13 @@
-"""All cables of one pose at once: ratios and pulls at given chord tensions, and limits as chord tensions."""
+"""All cables of one pose: ratios and sag forces at chord tensions, limits as chord tensions, lengths off drums."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from sagline.core.arrays import Codes
+from sagline.core.arrays import Array, Codes
+from sagline.kernels import tables
+from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.cables import Cables, chord_of, free_chord_of, material_of, pulley_of
 from sagline.kernels.cable.catenary import (
     TAUT_STRAIN,
@@ -13,11 +16,12 @@ from sagline.kernels.cable.catenary import (
     ordinary_length_ratio_near,
     ordinary_sag_force_ratio,
 )
+from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry
 from sagline.kernels.cable.models import from_tension
-from sagline.kernels.cable.pulley import Pulley, free_rise, free_span
-from sagline.kernels.cable.terms import Chord, Material, Model
+from sagline.kernels.cable.pulley import Pulley, Wrap, behind_cable, free_rise, free_span, pulley_at
+from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
-from sagline.kernels.jit import glue, kernel
+from sagline.kernels.jit import entry, glue, kernel
 
 # Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
 # X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that rounds which stand still end in the last digit.
@@ -70,15 +74,8 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
     Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one. Cables leave
     their pulleys where the lengths and pulls before said.
 
-    Args:
-        model: Cable model.
-        cables: The cables of one pose.
-        fresh: Whether there are no lengths and pulls yet.
-        near: Whether their ratios are the answer at tensions less than NEAR away.
-        statuses: Filled.
-
-    Returns:
-        The gravest status.
+    fresh: whether there are no lengths and pulls yet; near: whether their ratios are the answer at tensions less than
+    NEAR away; statuses: filled. Returns the gravest status.
     """
     m = cables.tau.size
     if cables.machine:
@@ -174,13 +171,7 @@ def taut_at_frame_end(
     with a slope of at most 1 + wD/EA: from the taut side steps by secants come down to the root, or to where the slope
     is none.
 
-    Args:
-        model: Cable model.
-        chord: Chord.
-        material: Material.
-        pulley: What stands behind.
-        tension: At the frame end [N].
-        otherwise: The answer where no cable hangs with so little.
+    tension: at the frame end [N]; otherwise: the answer where no cable hangs with so little.
     """
     weight = material.density * model.gravity
     if model.code == STRAIGHT or model.code == ELASTIC or weight == 0.0 or tension == math.inf:
@@ -201,3 +192,63 @@ def taut_at_frame_end(
         if abs(tau - before) <= LIMIT_PRECISION * tau:
             break
     return before if abs(miss) <= LIMIT_MISS * tension else otherwise
+
+
+class _CableAtTension(NamedTuple):
+    """A cable that is held at a pose: all of it off the drum [m], what it pulls with [N], and at its frame end [N]."""
+
+    length: float
+    pull: float
+    tension: float
+
+
+@kernel
+def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
+    """A cable at a chord tension, with what is on its pulley and behind it; pull: T_z - tau sin phi."""
+    weightless = model.code == STRAIGHT or model.code == ELASTIC
+    weight = 0.0 if weightless else material.density * model.gravity
+    length, pull, _status = solve_cable_state(model, chord, material, pulley, tau)
+    horizontal, vertical = tau * chord.cosine, tau * chord.sine + pull - weight * length
+    tension = math.sqrt(horizontal * horizontal + vertical * vertical)
+    # cables of the shallow models leave along their chord, and have its tension behind it
+    sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
+    if model.code == CATENARY:
+        there = tension
+        sine, cosine = horizontal / there, pulley.entry * vertical / there
+    rest = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))
+    return _CableAtTension(length + (rest.wrapped + rest.dead), pull, tension)
+
+
+@entry
+def lengths_at_frame_ends(
+    terms: Terms,
+    cables: Array,
+    body: Array,
+    pose: Array,
+    tension: Array,
+    tension_out: Array,
+    length_out: Array,
+    rotation: Array,
+    geometry: Array,
+) -> None:
+    """Unstrained lengths off the drums [m] of cables that are held at a pose, each by itself.
+
+    Args:
+        terms: Of the cable model.
+        cables: Row of the cable_table, (m, CABLE_COLUMNS).
+        body: Row of the body_table.
+        pose: Pose row.
+        tension: At the frame ends [N], (m,).
+        tension_out: What they are at these lengths: others, where no cable hangs with so little [N], (m,).
+        length_out: (m,).
+        rotation: Work array, (3, 3).
+        geometry: Work array, (GEOMETRY_ROWS, m).
+    """
+    model = model_of(terms)
+    cable_geometry(cables, body, pose, rotation, geometry)
+    for i in range(tension.size):
+        chord = Chord(geometry[CHORD, i], geometry[SINE, i], geometry[COSINE, i])
+        material, pulley = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS]), pulley_at(cables, i)
+        tau = chord_tension_at_frame_end(model, chord, material, pulley, tension[i])
+        held = hold_cable(model, chord, material, pulley, tau)
+        tension_out[i], length_out[i] = held.tension, held.length

@@ -1,7 +1,9 @@
-"""Stiffness dT/dB of one cable at fixed unstrained length, for every cable model.
+"""Stiffness dT/dB of one cable at fixed unstrained length, and its potential energy; docs/model.md, section 6.
 
-In the vertical plane of the cable it is a 2 x 2 matrix; normal to that plane it is T_x/x_B = tau/D, regular on a
-vertical chord.
+In the vertical plane of the cable the stiffness is a 2 x 2 matrix; normal to that plane it is T_x/x_B = tau/D, regular
+on a vertical chord. The weightless and the exact cable have an energy, whose gradient is the force on the platform end.
+The shallow models have none: their forces are not the gradient of anything (the curl of the parabolic one is of the
+order of its own error), and their equilibria are reached from the exact cable's.
 """
 
 from __future__ import annotations
@@ -10,13 +12,11 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra.hyperbolic import atanhc_excess
+from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.catenary import slack_series
-from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow
-from sagline.kernels.cable.over_pulleys import across_pulley, material_at, stiffness_in_series
-from sagline.kernels.cable.shallow import stretching_tension
+from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow, stretching_tension
+from sagline.kernels.cable.over_pulleys import across_pulley, energy_over, material_at, stiffness_in_series
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import formula, kernel
@@ -35,7 +35,7 @@ class _ShallowSlopes(NamedTuple):
 @formula
 def force_of(rows: Array, i: int) -> Force:
     """Force on the platform end of one cable of a pose."""
-    return Force(rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], rows[t.TENSION, i])
+    return Force(rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], rows[g.TENSION, i])
 
 
 @formula
@@ -171,23 +171,82 @@ def cable_stiffness(
 @formula
 def stiffnesses_in_plane(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill the stiffness of every cable of a pose in its plane and normal to it, after `cable_forces`."""
-    x = g.SPAN if behind is None else t.FREE_SPAN
-    z = g.RISE if behind is None else t.FREE_RISE
-    whole = t.LENGTH if behind is None else t.FREE_LENGTH
+    x = g.SPAN if behind is None else g.FREE_SPAN
+    z = g.RISE if behind is None else g.FREE_RISE
+    whole = g.LENGTH if behind is None else g.FREE_LENGTH
     for i in range(cables.shape[0]):
         span, rise, length = rows[x, i], rows[z, i], rows[whole, i]
         plane = cable_stiffness(model, span, rise, material_at(cables, i), length, force_of(rows, i))
-        rows[t.ACROSS, i] = rows[t.TENSION, i] / rows[g.CHORD, i]
+        rows[g.ACROSS, i] = rows[g.TENSION, i] / rows[g.CHORD, i]
         if behind is not None:
             plane = stiffness_in_series(model, cables, rows, i, plane)
-            rows[t.ACROSS, i] = across_pulley(cables, rows, i)
-        rows[t.XX, i] = plane.xx
-        rows[t.XZ, i] = plane.xz
-        rows[t.ZX, i] = plane.zx
-        rows[t.ZZ, i] = plane.zz
+            rows[g.ACROSS, i] = across_pulley(cables, rows, i)
+        rows[g.XX, i] = plane.xx
+        rows[g.XZ, i] = plane.xz
+        rows[g.ZX, i] = plane.zx
+        rows[g.ZZ, i] = plane.zz
 
 
 @formula
 def plane_of(rows: Array, i: int) -> PlaneStiffness:
     """In-plane stiffness of one cable of a pose."""
-    return PlaneStiffness(rows[t.XX, i], rows[t.XZ, i], rows[t.ZX, i], rows[t.ZZ, i])
+    return PlaneStiffness(rows[g.XX, i], rows[g.XZ, i], rows[g.ZX, i], rows[g.ZZ, i])
+
+
+@formula
+def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
+    """V = T.B - C(T) [J] of the exact cable, strain and height of its mass included, frame end at height 0."""
+    horizontal, vertical, _ = force
+    weight_length = weight * length
+    vertical_a = vertical - weight_length
+    square = horizontal * horizontal
+    tension_a = math.sqrt(square + vertical_a * vertical_a)
+    tension_b = math.sqrt(square + vertical * vertical)
+    total = tension_a + tension_b
+    half_mean = tension_a + vertical * (2.0 * vertical - weight_length) / total
+    if horizontal != 0.0:
+        excess = series_excess(horizontal, vertical_a, vertical, tension_a, tension_b, weight_length)
+        half_mean += 2.0 * square / total * (1.0 + excess)
+    strain = square + vertical * (vertical - weight_length) + weight_length * weight_length / 3.0
+    return horizontal * span + vertical * rise - 0.5 * length * (strain / stiffness + half_mean)
+
+
+@formula
+def elastic_energy(chord: float, length: float, tension: float, stiffness: float) -> float:
+    """Strain energy [J] of the weightless cable; zero where it is slack."""
+    return 0.5 * tension * (chord - length) if tension > 0.0 else 0.0
+
+
+@formula
+def _cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
+    """Energy [J] of a cable of the exact or the weightless model; NaN for the others."""
+    weight = material.density * model.gravity
+    if model.code == CATENARY and weight > 0.0:
+        return catenary_energy(span, rise, length, force, weight, material.stiffness)
+    if model.code in (CATENARY, ELASTIC) or weight == 0.0:
+        return elastic_energy(math.sqrt(span * span + rise * rise), length, force.tension, material.stiffness)
+    return math.nan
+
+
+@formula
+def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | None) -> tuple[float, float]:
+    """Energy [J] of all cables of a pose, and the sum of the parts that cancel in it.
+
+    cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m),
+    after `cable_forces`; behind: that of the model, by itself, so that what it rules out is not compiled.
+    """
+    x = g.SPAN if behind is None else g.FREE_SPAN
+    z = g.RISE if behind is None else g.FREE_RISE
+    whole = g.LENGTH if behind is None else g.FREE_LENGTH
+    energy = 0.0
+    size = 0.0
+    for i in range(cables.shape[0]):
+        span, rise, length = rows[x, i], rows[z, i], rows[whole, i]
+        force = force_of(rows, i)
+        energy += _cable_energy(model, span, rise, material_at(cables, i), length, force)
+        size += abs(force.horizontal * span) + abs(force.vertical * rise)
+        if behind is not None:
+            more = energy_over(model, cables, rows, i)
+            energy += more
+            size += abs(more)
+    return energy, size

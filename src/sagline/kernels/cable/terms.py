@@ -13,21 +13,14 @@ Terms = tuple[int, float, float, float]  # a Model as it comes from Python: numb
 
 
 class Model(NamedTuple):
-    """A cable model where it stands.
+    """A cable model where it stands."""
 
-    Attributes:
-        code: Which equations.
-        k_h: The empirical model's constant of the pull.
-        k_p: The empirical model's constant of the sag.
-        gravity: [m/s^2].
-        behind: Whether cables of given lengths may have something behind them; None leaves that out of the machine
-            code, which then is that of bare cables.
-    """
-
-    code: int
-    k_h: float
-    k_p: float
-    gravity: float
+    code: int  # which equations
+    k_h: float  # the empirical model's constant of the pull
+    k_p: float  # the empirical model's constant of the sag
+    gravity: float  # [m/s^2]
+    # whether cables of given lengths may have something behind them; None leaves that out of the machine code, which
+    # then is that of bare cables
     behind: bool | None = None
 
 
@@ -38,43 +31,26 @@ def model_of(terms: Terms) -> Model:
 
 
 class Material(NamedTuple):
-    """Material of a cable.
+    """Material of a cable."""
 
-    Attributes:
-        density: Mass per length [kg/m].
-        stiffness: EA [N].
-    """
-
-    density: float
-    stiffness: float
+    density: float  # mass per length [kg/m]
+    stiffness: float  # EA [N]
 
 
 class Chord(NamedTuple):
-    """The straight line from a cable's frame end to its platform end.
+    """The straight line from a cable's frame end to its platform end."""
 
-    Attributes:
-        length: D [m].
-        sine: sin phi.
-        cosine: cos phi.
-    """
-
-    length: float
-    sine: float
-    cosine: float
+    length: float  # D [m]
+    sine: float  # sin phi
+    cosine: float  # cos phi
 
 
 class Force(NamedTuple):
-    """Force on a cable at its platform end.
+    """Force on a cable at its platform end."""
 
-    Attributes:
-        horizontal: T_x [N].
-        vertical: T_z [N], up positive.
-        tension: tau, the chord tension [N].
-    """
-
-    horizontal: float
-    vertical: float
-    tension: float
+    horizontal: float  # T_x [N]
+    vertical: float  # T_z [N], up positive
+    tension: float  # tau, the chord tension [N]
 
 
 class PlaneStiffness(NamedTuple):

@@ -3,21 +3,109 @@
 from __future__ import annotations
 
 from sagline.core.arrays import Array
-from sagline.kernels.balance.freedom import is_rotation
+from sagline.kernels.algebra.factors import solve_lower, solve_upper
+from sagline.kernels.balance.wrench import components_along, is_rotation, motion_along
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import material_at
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.motion import fill_length, fill_motion_by_wrench
 from sagline.kernels.calibration.tension_slopes import frame_end_slopes, in_world_axes
 from sagline.kernels.calibration.terms import CalibrationArrays, Sensing, Slopes, Unknowns
-from sagline.kernels.calibration.vectors import column_of, cross, in_axes, opposite, plus, scaled, unit_vector
 from sagline.kernels.forward.platform import Triple, end_stiffness
 from sagline.kernels.jit import formula, glue, kernel
+
+
+@formula
+def cross(a: Triple, b: Triple) -> Triple:
+    """A x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@formula
+def unit_vector(axis: int) -> Triple:
+    """Of an axis."""
+    return 1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0
+
+
+@formula
+def column_of(matrix: Array, k: int) -> Triple:
+    """Column of a (3, 3)."""
+    return matrix[0, k], matrix[1, k], matrix[2, k]
+
+
+@formula
+def in_axes(axes: Array, vector: Triple) -> Triple:
+    """A world vector in the axes that are the columns of a (3, 3)."""
+    return (
+        axes[0, 0] * vector[0] + axes[1, 0] * vector[1] + axes[2, 0] * vector[2],
+        axes[0, 1] * vector[0] + axes[1, 1] * vector[1] + axes[2, 1] * vector[2],
+        axes[0, 2] * vector[0] + axes[1, 2] * vector[1] + axes[2, 2] * vector[2],
+    )
+
+
+@formula
+def opposite(vector: Triple) -> Triple:
+    """The vector the other way."""
+    return -vector[0], -vector[1], -vector[2]
+
+
+@formula
+def plus(a: Triple, b: Triple) -> Triple:
+    """A + b."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@formula
+def scaled(factor: float, vector: Triple) -> Triple:
+    """A multiple of a vector."""
+    return factor * vector[0], factor * vector[1], factor * vector[2]
+
+
+@glue
+def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, motion: Array) -> None:
+    """Fill the motion of the platform that a wrench on it causes; needs the factor."""
+    components_along(free, wrench, space.part)
+    solve_lower(space.factor, space.part)
+    solve_upper(space.factor, space.part)
+    motion_along(free, space.part, motion)
+
+
+@formula
+def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple, direct: float) -> None:
+    """Fill what the length of cable i changes: the wrench on the platform, and all readings."""
+    for k in range(3):
+        space.by_wrench[i, k], space.by_wrench[i, 3 + k] = force[k], moment[k]
+    for j in range(space.moved.shape[0]):
+        total = 0.0
+        for k in range(6):
+            total -= space.moved[j, k] * space.by_wrench[i, k]
+        space.by_length[i, j] = total
+    space.by_length[i, i] += direct
+
+
+@glue
+def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
+    """Add to the columns what the changes of the wrench do to the readings, by the platform's motion."""
+    for j in range(slopes.work.shape[0]):
+        for k in range(6):
+            share = space.moved[j, k]
+            for q in range(slopes.work.shape[1]):
+                slopes.work[j, q] -= share * slopes.pull[k, q]
+
+
+@glue
+def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: Array) -> None:
+    """Fill how the platform moves by each length, and in the last row by the first of the columns."""
+    m = space.by_wrench.shape[0]
+    for k in range(6):
+        space.six[k] = slopes.pull[k, 0]
+    for i in range(m + 1):
+        fill_motion_by_wrench(free, space.by_wrench[i] if i < m else space.six, space, motion[i])
+        for k in range(6):
+            motion[i, k] = -motion[i, k]
 
 
 @formula
@@ -29,8 +117,8 @@ def _lever_of(rows: Array, i: int) -> Triple:
 @formula
 def _force_at(rows: Array, i: int) -> Triple:
     """T of a cable, on its platform end, world axes."""
-    x = rows[t.HORIZONTAL, i]
-    return x * rows[g.AZIMUTH_X, i], x * rows[g.AZIMUTH_Y, i], rows[t.VERTICAL, i]
+    x = rows[g.HORIZONTAL, i]
+    return x * rows[g.AZIMUTH_X, i], x * rows[g.AZIMUTH_Y, i], rows[g.VERTICAL, i]
 
 
 @formula
@@ -151,12 +239,12 @@ def fill_cable(
             direct = gain * (_tension_by_force(shares, i, change) + shares[i, 3] * moved[2])
             slopes.work[i, at] += scale[kinds.PLATFORM + axis, i] * direct
     by = frame_end_slopes(model, cables, rows, i)
-    span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
+    span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, pulled, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
     if model.behind is None:
         own = force_slopes(model, span, rise, material, length, pulled, plane)
     else:
-        free = rows[t.FREE_LENGTH, i]
+        free = rows[g.FREE_LENGTH, i]
         own, machine = slopes_over(model, material, pulley_at(cables, i), free, pulled, plane)
         _add_parameter_change(sought, kinds.RADIUS, i, gain, machine.by_radius, by.by_radius, space, slopes)
         _add_parameter_change(sought, kinds.DEAD, i, gain, machine.by_dead, by.by_dead, space, slopes)

@@ -10,12 +10,22 @@ import math
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.cholesky import factor_positive
-from sagline.kernels.balance.freedom import symmetric_part
-from sagline.kernels.cable import rows as t
+from sagline.kernels.algebra.factors import factor_positive
+from sagline.kernels.balance.wrench import symmetric_part
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.calibration.columns import fill_cable, fill_ends, fill_platform, fill_readings_by_wrench
-from sagline.kernels.calibration.motion import add_motion, fill_motion
+from sagline.kernels.calibration.columns import (
+    add_motion,
+    fill_cable,
+    fill_ends,
+    fill_motion,
+    fill_platform,
+    fill_readings_by_wrench,
+    in_axes,
+    opposite,
+    plus,
+    unit_vector,
+)
 from sagline.kernels.calibration.terms import (
     BESIDE,
     CalibrationArrays,
@@ -30,12 +40,74 @@ from sagline.kernels.calibration.terms import (
     Unknowns,
     new_calibration_arrays,
 )
-from sagline.kernels.calibration.vectors import in_axes, opposite, plus, unit_vector
-from sagline.kernels.calibration.whitening import store_linearization, whiten
 from sagline.kernels.forward.platform import Triple, platform_stiffness, turned, unbalance
 from sagline.kernels.forward.problem import ForwardTerms, SampleArrays, Samples, row_of
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory
+
+
+@glue
+def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Array) -> None:
+    """Leave out what was not read, and fill W with W^T W the inverse of the covariance: the inverse of its factor."""
+    readings, m = work.shape[0], residual.size - BESIDE
+    for j in range(residual.size):
+        if not (abs(residual[j]) < math.inf and space.deviation[j] < math.inf):
+            residual[j] = math.nan
+            if j >= readings:
+                continue
+            for i in range(m):
+                space.by_length[i, j] = 0.0
+            for q in range(work.shape[1]):
+                work[j, q] = 0.0
+            space.deviation[j] = 1.0
+    for j in range(readings):
+        for k in range(j + 1):
+            total = space.deviation[j] * space.deviation[j] if k == j else 0.0
+            for i in range(m):
+                deviation = sensing.length_deviation[i]
+                total += space.by_length[i, j] * space.by_length[i, k] * deviation * deviation
+            space.whole[j, k] = total
+            space.whole[k, j] = total
+    factor_positive(space.whole, 0.0, space.own)
+    for k in range(readings):  # W into whole, column by column
+        for j in range(readings):
+            space.whole[j, k] = 0.0
+        space.whole[k, k] = 1.0 / space.own[k, k]
+        for j in range(k + 1, readings):
+            total = 0.0
+            for q in range(k, j):
+                total += space.own[j, q] * space.whole[q, k]
+            space.whole[j, k] = -total / space.own[j, j]
+
+
+@glue
+def store_linearization(
+    sensing: Sensing, answer: Linearization, p: int, read: Array, lengths: Array, space: CalibrationArrays
+) -> None:
+    """Write what one pose says."""
+    residual, matrix, whole = answer.residual[p], answer.matrix[p], space.whole
+    readings, m = matrix.shape[0], lengths.size
+    for j in range(readings):
+        total = residual[j]
+        for i in range(m):
+            total -= space.by_length[i, j] * (read[i] - lengths[i])
+        space.deviation[j] = 0.0 if math.isnan(residual[j]) else total
+    for j in range(readings):
+        total = 0.0
+        for q in range(matrix.shape[1]):
+            matrix[j, q] = 0.0
+        for k in range(j + 1):
+            total += whole[j, k] * space.deviation[k]
+            for q in range(matrix.shape[1]):
+                matrix[j, q] += whole[j, k] * answer.work[k, q]
+        answer.misfit[p, j] = total
+    for i in range(m):
+        square = sensing.length_deviation[i] * sensing.length_deviation[i]
+        for j in range(readings):
+            total = 0.0
+            for k in range(j + 1):
+                total += whole[j, k] * space.by_length[i, k]
+            answer.back[p, i, j] = square * total
 
 
 @formula
@@ -120,8 +192,8 @@ def observe(
         body, cables, pose = row_of(batch.bodies, p), row_of(batch.robots, p), batch.starts[p]
         placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         for i in range(m):
-            space.rows[t.LENGTH, i] = batch.lengths[p, i]
-            space.rows[t.PARAMETER, i] = math.nan  # an answer must not depend on the sample before
+            space.rows[g.LENGTH, i] = batch.lengths[p, i]
+            space.rows[g.PARAMETER, i] = math.nan  # an answer must not depend on the sample before
         unbalance(placed, cables, body, row_of(batch.wrenches, p), pose, space.rotation, space.rows, space.six)
         platform_stiffness(placed, cables, space.rows, space.stiffness)
         symmetric_part(free, space.stiffness, space.matrix)

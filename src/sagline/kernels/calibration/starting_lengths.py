@@ -6,13 +6,12 @@ import math
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
-from sagline.kernels.balance.freedom import components_along
+from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
+from sagline.kernels.balance.wrench import components_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import GEOMETRY_ROWS, cable_geometry
-from sagline.kernels.cable.homing import hold_cable
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.states import chord_tension_at_frame_end
+from sagline.kernels.cable.states import chord_tension_at_frame_end, hold_cable
 from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import block

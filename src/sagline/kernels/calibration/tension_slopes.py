@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import material_at
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
@@ -16,29 +15,17 @@ from sagline.kernels.jit import formula
 
 
 class _FrameEndSlopes(NamedTuple):
-    """The tension at the frame end, and its derivatives while the force on the platform end stays, unless named.
+    """The tension at the frame end, and its derivatives while the force on the platform end stays, unless named."""
 
-    Attributes:
-        tension: T_A [N].
-        along: By the horizontal part of the force on the platform end, in the cable's plane.
-        up: By its vertical part.
-        by_height: By the height of the platform end over the frame anchor [N/m].
-        by_length: By the length [N/m].
-        by_density: [N m/kg].
-        by_stiffness: By EA.
-        by_radius: By that of the pulley [N/m].
-        by_dead: By the dead cable [N/m].
-    """
-
-    tension: float
-    along: float
-    up: float
-    by_height: float
-    by_length: float
-    by_density: float
-    by_stiffness: float
-    by_radius: float
-    by_dead: float
+    tension: float  # T_A [N]
+    along: float  # by the horizontal part of the force on the platform end, in the cable's plane
+    up: float  # by its vertical part
+    by_height: float  # by the height of the platform end over the frame anchor [N/m]
+    by_length: float  # by the length [N/m]
+    by_density: float  # [N m/kg]
+    by_stiffness: float  # by EA
+    by_radius: float  # by that of the pulley [N/m]
+    by_dead: float  # by the dead cable [N/m]
 
 
 @formula
@@ -47,9 +34,9 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
     material = material_at(cables, i)
     gravity = model.gravity if model.code == CATENARY else 0.0
     weight = material.density * gravity
-    x, z = rows[t.HORIZONTAL, i], rows[t.VERTICAL, i]
+    x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
     if model.behind is None:
-        length = rows[t.LENGTH, i]
+        length = rows[g.LENGTH, i]
         at_frame = z - weight * length
         tension = math.sqrt(x * x + at_frame * at_frame)
         share = 1.0 / tension if tension > 0.0 else 0.0
@@ -57,17 +44,17 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
         return _FrameEndSlopes(tension, along, up, 0.0, -up * weight, -up * gravity * length, 0.0, 0.0, 0.0)
     # T + T^2/(2 EA) - w z is one number from the platform end to the pulley's exit P, which moves on the pulley
     stiffness, pulley = material.stiffness, pulley_at(cables, i)
-    leaving, free = rows[t.LEAVING, i], rows[t.FREE_LENGTH, i]
+    leaving, free = rows[g.LEAVING, i], rows[g.FREE_LENGTH, i]
     end = math.sqrt(x * x + z * z)
     if not (leaving > 0.0 and end > 0.0):
         return _FrameEndSlopes(leaving, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    sine, cosine, entry = rows[t.WRAP_SINE, i], rows[t.WRAP_COSINE, i], pulley.entry
+    sine, cosine, entry = rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i], pulley.entry
     strained = 1.0 + leaving / stiffness
     share = 1.0 / strained
     grown = (1.0 + end / stiffness) / end * share
     lifted = weight * pulley.radius * entry * cosine * share  # by the wrap angle
     turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # the wrap angle by the force at P
-    rise = rows[t.FREE_RISE, i]
+    rise = rows[g.FREE_RISE, i]
     return _FrameEndSlopes(
         leaving,
         grown * x + lifted * turned_x,
@@ -76,7 +63,7 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
         -lifted * turned_z * weight,
         -(rise * share + lifted * turned_z * free) * gravity,
         0.5 * (leaving * leaving - end * end) / (stiffness * stiffness) * share,
-        weight * entry * sine * share + lifted * turned_z * weight * rows[t.WRAP, i] / strained,
+        weight * entry * sine * share + lifted * turned_z * weight * rows[g.WRAP, i] / strained,
         lifted * turned_z * weight / strained,
     )
 

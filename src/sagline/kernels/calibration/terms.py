@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.cable.rows import CABLE_ROWS
+from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block
 
@@ -18,92 +18,56 @@ LinearizationArrays = tuple[Array, Array, Array, Array, Array, Array]
 
 
 class Sensing(NamedTuple):
-    """The sensors.
+    """The sensors."""
 
-    Attributes:
-        gain: Of the load cells, (m,).
-        bias: [N], (m,).
-        tension_deviation: [N], (m,); infinite for no cell.
-        length_deviation: [m], (m,).
-        position_deviation: [m], (3,); infinite for none.
-        rotation_deviation: [rad], (3,); infinite for none.
-        frame: Pose row of the measuring system in the world.
-        target: Platform frame [m], (3,).
-    """
-
-    gain: Array
-    bias: Array
-    tension_deviation: Array
-    length_deviation: Array
-    position_deviation: Array
-    rotation_deviation: Array
-    frame: Array
-    target: Array
+    gain: Array  # of the load cells, (m,)
+    bias: Array  # [N], (m,)
+    tension_deviation: Array  # [N], (m,); infinite for no cell
+    length_deviation: Array  # [m], (m,)
+    position_deviation: Array  # [m], (3,); infinite for none
+    rotation_deviation: Array  # [rad], (3,); infinite for none
+    frame: Array  # pose row of the measuring system in the world
+    target: Array  # platform frame [m], (3,)
 
 
 class Readings(NamedTuple):
-    """Readings at N poses; without readings a residual is zero; NaN where a sensor gave none.
+    """Readings at N poses; without readings a residual is zero; NaN where a sensor gave none."""
 
-    Attributes:
-        lengths: That the winches say [m], (N, m).
-        cells: Of the load cells [N], (N, m).
-        positions: [m], (N, 3).
-        rotations: Unit quaternions, scalar last, (N, 4).
-    """
-
-    lengths: Array
-    cells: Array
-    positions: Array
-    rotations: Array
+    lengths: Array  # that the winches say [m], (N, m)
+    cells: Array  # of the load cells [N], (N, m)
+    positions: Array  # [m], (N, 3)
+    rotations: Array  # unit quaternions, scalar last, (N, 4)
 
 
 class Unknowns(NamedTuple):
-    """The P numbers that are looked for.
+    """The P numbers that are looked for."""
 
-    Attributes:
-        where: Which number each row of `kinds` is, (KIND_ROWS, m), -1 for none.
-        scale: What one of it changes of that row, (KIND_ROWS, m).
-        paid: Slopes of the lengths that the winches say, by zero, drum radius and EA, (3, N, m).
-    """
-
-    where: Indices
-    scale: Array
-    paid: Array
+    where: Indices  # which number each row of `kinds` is, (KIND_ROWS, m), -1 for none
+    scale: Array  # what one of it changes of that row, (KIND_ROWS, m)
+    paid: Array  # slopes of the lengths that the winches say, by zero, drum radius and EA, (3, N, m)
 
 
 class Linearization(NamedTuple):
     """Output arrays; rows of a pose are its load cells, three of its position and three of its rotation.
 
     R is m + 6, or m where no system measures positions or rotations.
-
-    Attributes:
-        matrix: Whitened slopes, (N, R, P); rows without a reading are zero.
-        misfit: Whitened residuals, (N, R).
-        residual: As they are, readings less predictions at the lengths given [N, m, rad], (N, m + 6); NaN for none.
-        back: What a whitened residual changes of the true lengths [m], (N, m, R).
-        motion: Of the platform about its center of mass [m, rad], world axes: by each cable's length, and in the last
-            row by the first of the P, (N, m + 1, 6); (0, m + 1, 6) where it is not wanted.
-        work: To work in, slopes of the readings and of the wrench on the platform, (R + 6, P).
     """
 
-    matrix: Array
-    misfit: Array
-    residual: Array
-    back: Array
+    matrix: Array  # whitened slopes, (N, R, P); rows without a reading are zero
+    misfit: Array  # whitened residuals, (N, R)
+    residual: Array  # as they are, readings less predictions at the lengths given [N, m, rad], (N, m + 6); NaN for none
+    back: Array  # what a whitened residual changes of the true lengths [m], (N, m, R)
+    # of the platform about its center of mass [m, rad], world axes: by each cable's length, and in the last row by the
+    # first of the P, (N, m + 1, 6); (0, m + 1, 6) where it is not wanted
     motion: Array
-    work: Array
+    work: Array  # to work in, slopes of the readings and of the wrench on the platform, (R + 6, P)
 
 
 class Slopes(NamedTuple):
-    """Derivatives by the P numbers at one pose.
+    """Derivatives by the P numbers at one pose."""
 
-    Attributes:
-        work: Of the readings, first with the platform held, (R, P).
-        pull: Of the wrench on the held platform about its center of mass, (6, P).
-    """
-
-    work: Array
-    pull: Array
+    work: Array  # of the readings, first with the platform held, (R, P)
+    pull: Array  # of the wrench on the held platform about its center of mass, (6, P)
 
 
 class CalibrationArrays(NamedTuple):

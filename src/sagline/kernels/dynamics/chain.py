@@ -10,8 +10,20 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
-from sagline.kernels.dynamics.wind import wind_across
 from sagline.kernels.jit import formula, kernel
+
+
+@formula
+def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
+    """Force of a wind (3,) across a line [N].
+
+    wind: velocity of the air [m/s], (3,); along: what of it is along the line, by the length of (x, y, z); drag: force
+    by the square of the speed across [N s^2/m^2].
+    """
+    nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
+    size = drag * math.sqrt(nx * nx + ny * ny + nz * nz)
+    return size * nx, size * ny, size * nz
+
 
 # columns of the chain table, a row for each cable
 EXIT_X, EXIT_Y, EXIT_Z = 0, 1, 2  # where the chain leaves the frame, world axes [m]
@@ -34,12 +46,8 @@ TINY = 1e-300
 def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
     """Fill the force of every element divided by its length [N/m]; returns the power that they lose [W].
 
-    Args:
-        place: Of the nodes [m], (3, nodes): node 0 is the platform's, node count + 1 the frame's.
-        speed: Of the nodes [m/s]; used where the elements lose energy.
-        count: Number of free nodes.
-        row: Of the chain table.
-        pulls: To be filled, (elements,).
+    place: of the nodes [m], (3, nodes): node 0 is the platform's, node count + 1 the frame's; speed: of the nodes
+    [m/s]; used where the elements lose energy; pulls: to be filled, (elements,).
     """
     element, stiffness = row[ELEMENT], row[STIFFNESS]
     inverse = 1.0 / element
@@ -124,13 +132,8 @@ def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array,
 def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
     """Move the nodes for h [s]; the one next to the frame keeps its momentum while its mass changes.
 
-    Args:
-        place: Of the nodes [m].
-        speed: Of the nodes [m/s].
-        count: Number of free nodes.
-        row: Of the chain table.
-        before: Unstrained length of the element at the frame before [m]; the row knows it as it is afterwards.
-        h: Time [s].
+    place: of the nodes [m]; speed: of the nodes [m/s]; before: unstrained length of the element at the frame before
+    [m]; the row knows it as it is afterwards; h: time [s].
     """
     old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
     middle = 0.5 * (old + new)

@@ -1,4 +1,4 @@
-"""Drives: a winch that keeps its set points, one that lags behind them, or motor, loops and friction.
+"""Drives: a winch that keeps its set points, one that lags, or motor, loops and friction; cable on its drum.
 
 Lengths s count along the path of winding, outward; docs/model.md, sections 10 and 11.
 """
@@ -10,9 +10,62 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.cable import rows as t
-from sagline.kernels.dynamics.winding import pay_out, wind_in
-from sagline.kernels.jit import formula, glue
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.jit import formula, glue, kernel
+
+BIN = 0.005  # m of cable on the drum that lie at one tension
+
+
+@kernel
+def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
+    """Put cable of a strain on a drum; returns the energy [J] that is lost where it is shared with what lies there.
+
+    What lies in a bin has one strain, that with which it is as long as it was, strained and unstrained.
+
+    layer: strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's; place:
+    what is let out before [m]; step: how much of it is wound in [m], > 0; stiffness: EA [N].
+    """
+    lost = 0.0
+    first, last = _bin_of(layer, place - step), _bin_of(layer, place)
+    for k in range(first, last + 1):
+        begin = max(place - step, k * BIN) if k > first else place - step
+        middle = min(place, (k + 1) * BIN) if k < last else place
+        if k == layer.shape[0] - 1:  # endless, it takes the winding strain
+            lost += 0.5 * stiffness * (strain - layer[k]) ** 2 * (middle - begin) / (1.0 + strain)
+            continue
+        new, old = (middle - begin) / (1.0 + strain), max((k + 1) * BIN - middle, 0.0) / (1.0 + layer[k])
+        if new + old > 0.0:
+            shared = new / (new + old)
+            lost += 0.5 * stiffness * (1.0 - shared) * new * (strain - layer[k]) ** 2
+            layer[k] += shared * (strain - layer[k])
+    return lost
+
+
+@kernel
+def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
+    """Strain of the cable that a drum lets out, as one, and the energy [J] that is lost by this.
+
+    layer: strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's; place:
+    what is let out before [m]; step: how much more [m], > 0; stiffness: EA [N].
+    """
+    first, last = _bin_of(layer, place), _bin_of(layer, place + step)
+    if first == last:
+        return layer[first], 0.0
+    length, strained, squares = 0.0, 0.0, 0.0
+    for k in range(first, last + 1):
+        begin = max(place, k * BIN) if k > first else place
+        end = min(place + step, (k + 1) * BIN) if k < last else place + step
+        part = (end - begin) / (1.0 + layer[k])
+        length, strained, squares = length + part, strained + part * layer[k], squares + part * layer[k] * layer[k]
+    mean = strained / length
+    return mean, 0.5 * stiffness * (squares - mean * strained)
+
+
+@formula
+def _bin_of(layer: Array, place: float) -> int:
+    """The bin of a place [m] along the cable."""
+    return min(max(int(place / BIN), 0), layer.shape[0] - 1)
+
 
 # kinds of winches
 IDEAL, SECOND_ORDER, DRUMS = 0, 1, 2
@@ -54,23 +107,14 @@ LOOP_PERIOD = 1e-3  # s
 
 
 class Drives(NamedTuple):
-    """The drives of m cables.
+    """The drives of m cables."""
 
-    Attributes:
-        kind: IDEAL, SECOND_ORDER or DRUMS.
-        remembered: Whether the drum remembers at which tension it was wound.
-        data: What they are, (DATA_ROWS, m).
-        now: What they do, (DRIVE_ROWS, m).
-        layers: Strain of the cable on the drums, bin by bin, (m, B).
-        audit: What is added up, (AUDIT_SIZE,).
-    """
-
-    kind: int
-    remembered: bool
-    data: Array
-    now: Array
-    layers: Array
-    audit: Array
+    kind: int  # IDEAL, SECOND_ORDER or DRUMS
+    remembered: bool  # whether the drum remembers at which tension it was wound
+    data: Array  # what they are, (DATA_ROWS, m)
+    now: Array  # what they do, (DRIVE_ROWS, m)
+    layers: Array  # strain of the cable on the drums, bin by bin, (m, B)
+    audit: Array  # what is added up, (AUDIT_SIZE,)
 
 
 @formula
@@ -78,7 +122,7 @@ def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begi
     """Change the rates of winches that lag: explicitly where a step begins, its adjoint where it ends."""
     for i in range(rows.shape[1]):
         omega, ratio = drives.data[BANDWIDTH, i], drives.data[RATIO, i]
-        push = omega * omega * (targets[i] - rows[t.LENGTH, i])
+        push = omega * omega * (targets[i] - rows[g.LENGTH, i])
         if begins:
             drives.now[RATE, i] += time * (push - 2.0 * ratio * omega * drives.now[RATE, i])
         else:
@@ -133,7 +177,7 @@ def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time:
         lifted = -cables[i, tables.DENSITY] * gravity * drives.data[BEHIND_RISE, i]
         drives.now[WOUND, i] += step
         drives.now[RATE, i] = rate
-        rows[t.LENGTH, i] += time * rate
+        rows[g.LENGTH, i] += time * rate
         held = 0.5 * cables[i, tables.STIFFNESS] * strain * strain + lifted
         drives.audit[ON_DRUMS] -= held * time * rate
 
@@ -185,7 +229,7 @@ def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -
             held = drives.now[HELD, i] > 0.0
             drives.now[RATE, i] = 0.0 if held else rates[i]
             if not held:
-                rows[t.LENGTH, i] = targets[i]
+                rows[g.LENGTH, i] = targets[i]
 
 
 @glue
@@ -201,7 +245,7 @@ def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begin
 def store_step_start(drives: Drives, rows: Array) -> None:
     """Keep what `add_winch_energy` needs to know of a step's begin."""
     for i in range(rows.shape[1]):
-        drives.now[BEFORE, i] = rows[t.LENGTH, i]
+        drives.now[BEFORE, i] = rows[g.LENGTH, i]
         drives.now[BEFORE_WHOLE, i] = drives.now[WHOLE, i]
         drives.now[BEFORE_DRUM, i] = drives.now[AT_DRUM, i]
 
@@ -213,7 +257,7 @@ def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, tim
         turn_drums(drives, cables, rows, gravity, time)
     elif drives.kind == SECOND_ORDER:
         for i in range(rows.shape[1]):
-            rows[t.LENGTH, i] += time * drives.now[RATE, i]
+            rows[g.LENGTH, i] += time * drives.now[RATE, i]
 
 
 @glue
@@ -223,7 +267,7 @@ def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) ->
         _add_slip_energy(drives, cables, time)
     else:
         for i in range(rows.shape[1]):
-            wound = rows[t.LENGTH, i] - drives.now[BEFORE, i]
+            wound = rows[g.LENGTH, i] - drives.now[BEFORE, i]
             drives.audit[SUPPLIED] -= 0.5 * (drives.now[BEFORE_WHOLE, i] + drives.now[WHOLE, i]) * wound
 
 

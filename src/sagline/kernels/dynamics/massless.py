@@ -1,16 +1,32 @@
-"""A run of a platform on cables without mass: all that its steps work on."""
+"""A run of a platform on cables without mass: its arrays, loads of the cables, forces and powers at a time."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
+from sagline.kernels import tables
+from sagline.kernels.balance.wrench import components_along, motion_along
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY
-from sagline.kernels.dynamics.drives import Drives
-from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS
-from sagline.kernels.dynamics.tables_in_time import TimeTable, TimeTableArrays
-from sagline.kernels.jit import glue
+from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics.chain import wind_across
+from sagline.kernels.dynamics.drives import Drives, keep_set_points
+from sagline.kernels.dynamics.progress import (
+    LENGTH_AT,
+    MOMENT,
+    WIND_AT,
+    WRENCH_AT,
+    TimeTable,
+    TimeTableArrays,
+    interpolate_table,
+)
+from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, VELOCITY, power_of, spin
+from sagline.kernels.forward.platform import unbalance
+from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import block
 
 SPLITTING, RUNGE_KUTTA = 0, 1
@@ -109,3 +125,157 @@ def massless_run_of(
 def cable_gravity(run: MasslessRun) -> float:
     """Gravity where cables weigh, else 0 [m/s^2]."""
     return run.model.gravity if run.model.code == CATENARY else 0.0
+
+
+@kernel
+def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
+    """Add half of the wind's force on every cable, as it hangs along its chord, to a wrench (6,)."""
+    for i in range(cables.shape[0]):
+        x = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i]
+        y = rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
+        z = rows[g.SINE, i]
+        along = wind[0] * x + wind[1] * y + wind[2] * z
+        fx, fy, fz = wind_across(wind, along, x, y, z, 0.5 * drag[i] * rows[g.CHORD, i])
+        _add_at_end(rows, i, fx, fy, fz, given)
+
+
+@kernel
+def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array) -> None:
+    """Add a force at the platform end of a cable to a wrench (6,)."""
+    rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
+    wrench[0] += x
+    wrench[1] += y
+    wrench[2] += z
+    wrench[3] += ry * z - rz * y
+    wrench[4] += rz * x - rx * z
+    wrench[5] += rx * y - ry * x
+
+
+@glue
+def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
+    """Take from a wrench what the platform's guides carry."""
+    if freedom.shape[0] < 6:
+        components_along(freedom, wrench, part)
+        motion_along(freedom, part, wrench)
+
+
+@kernel
+def fill_frame_end_tensions(
+    weight_of: float, cables: Array, rows: Array, data: Array, now: Array, behind: bool | None
+) -> None:
+    """Fill the tensions at frame ends and drums, and H = T + T^2/(2 EA) - w z, which is one number a cable."""
+    for i in range(cables.shape[0]):
+        weight, stiffness = cables[i, tables.DENSITY] * weight_of, cables[i, tables.STIFFNESS]
+        if behind is None:
+            x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i] - weight * rows[g.LENGTH, i]
+            tension, height = math.sqrt(x * x + z * z), 0.0
+        else:
+            tension, pulley = rows[g.LEAVING, i], pulley_at(cables, i)
+            height = pulley.radius * pulley.entry * rows[g.WRAP_SINE, i]
+        whole = tension + 0.5 * tension * tension / stiffness - weight * height
+        now[d.AT_FRAME, i] = now[d.PULL, i] = tension
+        now[d.WHOLE, i] = whole
+        now[d.AT_DRUM, i] = d.tension_at_drum(whole, weight * data[d.BEHIND_RISE, i], stiffness)
+
+
+@kernel
+def damp_cables(
+    losses: Losses,
+    weight_of: float,
+    cables: Array,
+    rows: Array,
+    turning: Array,
+    now: Array,
+    wrench: Array,
+    behind: bool | None,
+) -> float:
+    """Fill the wrench (6,) of what damps the cables; returns the power that is lost.
+
+    All of a cable stretches alike, what lies behind the free span with it, and what is let out lengthens the span by
+    what it is strained: EA/L times the chord's rate less that. Of this the stretch has the share of its compliance, 1
+    in a taut cable, 0 in a slack one. A cable moves in the air as its chord does.
+
+    losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity where cables weigh, else 0 [m/s^2]; turning:
+    velocity of the center of mass, and angular velocity, (6,); now: of the drives; what damping adds to the tensions is
+    filled; wrench: filled.
+    """
+    lost = 0.0
+    for k in range(6):
+        wrench[k] = 0.0
+    vx, vy, vz = turning[0], turning[1], turning[2]
+    wx, wy, wz = turning[3], turning[4], turning[5]
+    for i in range(cables.shape[0]):
+        rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
+        ux, uy, uz = vx + wy * rz - wz * ry, vy + wz * rx - wx * rz, vz + wx * ry - wy * rx
+        x, y = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i], rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
+        z, chord, length = rows[g.SINE, i], rows[g.CHORD, i], rows[g.LENGTH, i]
+        stiffness, tension = cables[i, tables.STIFFNESS], rows[g.TENSION, i]
+        weight = cables[i, tables.DENSITY] * weight_of * chord * rows[g.COSINE, i]
+        share = 0.0
+        if tension > 0.0:
+            share = 1.0 / (1.0 + stiffness * weight * weight * chord / (12.0 * length * tension * tension * tension))
+        strained = chord / rows[g.LENGTH if behind is None else g.FREE_LENGTH, i]
+        rate = ux * x + uy * y + uz * z - now[d.RATE, i] * strained
+        more = max(losses[0] * stiffness / length * share * share * rate, -tension)
+        slow = losses[1] * chord / 3.0
+        now[d.STRETCHING, i] = more * strained
+        now[d.AT_FRAME, i] = max(now[d.PULL, i] + more, 0.0)
+        lost += more * rate + slow * (ux * ux + uy * uy + uz * uz)
+        _add_at_end(rows, i, -more * x - slow * ux, -more * y - slow * uy, -more * z - slow * uz, wrench)
+    return lost
+
+
+@kernel
+def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
+    """Fill the set points at a time, and the lengths of winches that keep them."""
+    at = run.at
+    at[LENGTH_AT] = interpolate_table(run.lengths, at[LENGTH_AT], now, shift, run.targets, run.target_rates)
+    keep_set_points(run.drives, run.rows, run.targets, run.target_rates)
+
+
+@kernel
+def fill_forces(run: MasslessRun, now: float) -> None:
+    """Fill the force on the platform, -gradient, what is given of it, and the cables' tensions, at a time."""
+    at, drives, rows, state = run.at, run.drives, run.rows, run.state
+    fill_set_points(run, now, -MOMENT * run.step)
+    if run.work & LOADED:
+        at[WRENCH_AT] = interpolate_table(run.wrenches, at[WRENCH_AT], now, 0.0, run.given, run.spare)
+    unbalance(run.model, run.cables, run.body, run.given, state, run.rotation, rows, run.gradient)
+    if run.work & BLOWN:
+        at[WIND_AT] = interpolate_table(run.winds, at[WIND_AT], now, 0.0, run.before[:3], run.spare)
+        for k in range(6):
+            run.gradient[k] += run.given[k]
+        add_wind_on_cables(run.cables, drives.data[d.DRAG], rows, run.before, run.given)
+        for k in range(6):
+            run.gradient[k] -= run.given[k]
+    for k in range(6):
+        run.gradient[k] = -run.gradient[k]
+    project_on_freedom(run.freedom, run.gradient, run.spare)
+    fill_frame_end_tensions(cable_gravity(run), run.cables, rows, drives.data, drives.now, run.model.behind)
+
+
+@kernel
+def fill_damping(run: MasslessRun) -> None:
+    """Fill what damping does at the present velocities, and the powers that damping takes and given forces bring."""
+    if run.work:
+        spinning = spin(run.state, run.inertia)
+        drives, motion = run.drives, run.spare
+        for k in range(3):
+            motion[k], motion[3 + k] = run.state[VELOCITY + k], spinning[k]
+        if run.work & DAMPED:
+            drives.audit[d.LOST_POWER] = damp_cables(
+                run.losses, cable_gravity(run), run.cables, run.rows, motion, drives.now, run.damping, run.model.behind
+            )
+            project_on_freedom(run.freedom, run.damping, motion)
+        drives.audit[d.GIVEN_POWER] = power_of(run.given, run.state, spinning)
+
+
+@glue
+def add_powers(drives: Drives, time: float) -> None:
+    """Add what the powers do in a time to the audit; winches that keep their lengths feel the damping of cables."""
+    power = drives.audit[d.GIVEN_POWER]
+    if drives.kind != d.DRUMS:
+        for i in range(drives.now.shape[1]):
+            power -= drives.now[d.STRETCHING, i] * drives.now[d.RATE, i]
+    drives.audit[d.SUPPLIED] += time * power
+    drives.audit[d.LOST] += time * drives.audit[d.LOST_POWER]

@@ -6,11 +6,21 @@ energy has no trend), and the classical Runge-Kutta method (four evaluations, or
 
 from __future__ import annotations
 
+import math
+
 from sagline.core.arrays import Array
+from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import drives as d
-from sagline.kernels.dynamics.drives import close_loops, filter_tensions
-from sagline.kernels.dynamics.forces import fill_damping, fill_forces, fill_set_points
+from sagline.kernels.dynamics.drives import (
+    add_winch_energy,
+    close_loops,
+    filter_tensions,
+    kick_winches,
+    store_step_start,
+    turn_winches,
+)
 from sagline.kernels.dynamics.massless import (
+    DAMPED,
     SPLITTING,
     Courses,
     Kept,
@@ -20,15 +30,163 @@ from sagline.kernels.dynamics.massless import (
     Records,
     Robot,
     Rules,
+    add_powers,
     cable_gravity,
+    fill_damping,
+    fill_forces,
+    fill_set_points,
     massless_run_of,
 )
-from sagline.kernels.dynamics.progress import FAILED, LENGTH_AT, READY, RENEWED, STEPS, has_room, note_events
-from sagline.kernels.dynamics.records import record_step
-from sagline.kernels.dynamics.runge_kutta import runge_kutta_step
-from sagline.kernels.dynamics.splitting import splitting_step
-from sagline.kernels.dynamics.tables_in_time import MOMENT, interval_ends
-from sagline.kernels.jit import entry, glue
+from sagline.kernels.dynamics.progress import (
+    FAILED,
+    KINETIC,
+    LENGTH_AT,
+    LOST,
+    MOMENT,
+    POTENTIAL,
+    READY,
+    RECORDS,
+    RENEWED,
+    ROUNDING,
+    STEPS,
+    SUPPLIED,
+    has_room,
+    interval_ends,
+    note_events,
+)
+from sagline.kernels.dynamics.rigid_body import (
+    CENTER,
+    MOMENTUM,
+    STATE_COLUMNS,
+    TURN,
+    drift_body,
+    free_turn,
+    kick_body,
+    kinetic_energy,
+    rates_of,
+    spin,
+)
+from sagline.kernels.forward.platform import platform_energy
+from sagline.kernels.jit import entry, glue, kernel
+
+GROWTH = 0.1  # of all energy that moves: an integrator that invents or loses more has too long a step
+
+
+@kernel
+def record_step(run: MasslessRun, records: Records) -> None:
+    """Write down a step, and look whether energy has grown by itself."""
+    states, tensions, lengths, energies, _notes = records
+    state, drives, rows, at = run.state, run.drives, run.rows, run.at
+    audit, row = drives.audit, at[RECORDS]
+    stored, size = platform_energy(run.model, run.cables, run.body, run.none, state, run.rotation, rows)
+    kinetic, potential = kinetic_energy(state, run.inertia), stored + audit[d.ON_DRUMS]
+    for i in range(rows.shape[1]):
+        if drives.kind == d.DRUMS:
+            kinetic += 0.5 * drives.data[d.INERTIA, i] * drives.now[d.SPEED, i] * drives.now[d.SPEED, i]
+    if at[READY] < 2:
+        at[READY] = 2
+        audit[d.START] = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST]
+        audit[d.START_POTENTIAL] = potential
+    invented = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST] - audit[d.START]
+    moved = kinetic + abs(potential - audit[d.START_POTENTIAL]) + abs(audit[d.SUPPLIED]) + abs(audit[d.LOST])
+    audit[d.MOVED] = max(audit[d.MOVED], moved)
+    if not abs(invented) <= GROWTH * audit[d.MOVED] + ROUNDING * size:
+        at[FAILED] = 1
+        for i in range(rows.shape[1]):
+            if drives.now[d.AT_FRAME, i] > drives.now[d.AT_FRAME, at[FAILED] - 1]:
+                at[FAILED] = i + 1
+    if row < states.shape[0]:
+        turning = spin(state, run.inertia)
+        for k in range(MOMENTUM):
+            states[row, CENTER + k] = state[CENTER + k]
+        for k in range(3):
+            states[row, MOMENTUM + k] = turning[k]
+        for i in range(rows.shape[1]):
+            tensions[row, i] = drives.now[d.AT_FRAME, i]
+            lengths[row, i] = rows[g.LENGTH, i]
+        energies[row, KINETIC], energies[row, POTENTIAL] = kinetic, potential
+        energies[row, SUPPLIED], energies[row, LOST] = audit[d.SUPPLIED], audit[d.LOST]
+        at[RECORDS] += 1
+
+
+@glue
+def runge_kutta_step(run: MasslessRun, now: float) -> None:
+    """One step of the classical Runge-Kutta method; forces at hand before and after are those of the state."""
+    h, drives, rows, state = run.step, run.drives, run.rows, run.state
+    m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
+    supplied, lost = 0.0, 0.0
+    for k in range(STATE_COLUMNS):
+        run.base[k] = state[k]
+        run.total[k] = 0.0
+    for i in range(m):
+        run.lengths_base[0, i], run.lengths_base[1, i] = rows[g.LENGTH, i], drives.now[d.RATE, i]
+        run.lengths_base[2, i] = run.lengths_base[3, i] = 0.0
+    for stage in range(4):
+        weight = 1.0 / 3.0 if stage == 1 or stage == 2 else 1.0 / 6.0
+        ahead = 0.5 * h if stage < 2 else h
+        fill_damping(run)
+        for k in range(6):
+            run.before[k] = run.gradient[k] + (run.damping[k] if run.work & DAMPED else 0.0)
+        rates_of(state, run.inertia, run.before, run.first)
+        supplied += weight * drives.audit[d.GIVEN_POWER]
+        lost += weight * drives.audit[d.LOST_POWER]
+        for k in range(STATE_COLUMNS):
+            run.total[k] += weight * run.first[k]
+            state[k] = run.base[k] + (ahead * run.first[k] if stage < 3 else h * run.total[k])
+        for i in range(m):
+            rate = drives.now[d.RATE, i]
+            supplied -= weight * (drives.now[d.WHOLE, i] + drives.now[d.STRETCHING, i]) * rate
+            if lagging:
+                omega, ratio = drives.data[d.BANDWIDTH, i], drives.data[d.RATIO, i]
+                push = omega * omega * (run.targets[i] - rows[g.LENGTH, i]) - 2.0 * ratio * omega * rate
+                if drives.now[d.HELD, i] > 0.0:
+                    push = rate = 0.0
+                run.lengths_base[2, i] += weight * rate
+                run.lengths_base[3, i] += weight * push
+                length = ahead * rate if stage < 3 else h * run.lengths_base[2, i]
+                speed = ahead * push if stage < 3 else h * run.lengths_base[3, i]
+                rows[g.LENGTH, i] = run.lengths_base[0, i] + length
+                drives.now[d.RATE, i] = run.lengths_base[1, i] + speed
+        if stage == 3:
+            scale = 0.0
+            for k in range(4):
+                scale += state[TURN + k] * state[TURN + k]
+            for k in range(4):
+                state[TURN + k] /= math.sqrt(scale)
+        fill_forces(run, now + ahead)
+    drives.audit[d.SUPPLIED] += h * supplied
+    drives.audit[d.LOST] += h * lost
+    fill_damping(run)
+
+
+@glue
+def splitting_step(run: MasslessRun, now: float) -> None:
+    """One step of the splitting from a time on; forces at hand before and after are those of the state."""
+    h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
+    fill_damping(run)
+    add_powers(drives, half)
+    kick_body(run.state, run.inertia, run.gradient, half)
+    if run.work & DAMPED:
+        kick_body(run.state, run.inertia, run.damping, half)
+    kick_winches(drives, rows, run.targets, half, True)
+    store_step_start(drives, rows)
+    drift_body(run.state, h)
+    free_turn(run.state, run.inertia, h)
+    turn_winches(drives, run.cables, rows, cable_gravity(run), h)
+    fill_forces(run, now + h)
+    add_winch_energy(drives, run.cables, rows, h)
+    kick_body(run.state, run.inertia, run.gradient, half)
+    if run.work & DAMPED:  # the adjoint of the first kick, by one correction
+        fill_damping(run)
+        for k in range(6):
+            run.before[k] = run.damping[k]
+        kick_body(run.state, run.inertia, run.damping, half)
+        fill_damping(run)
+        kick_body(run.state, run.inertia, run.before, -half)
+        kick_body(run.state, run.inertia, run.damping, half)
+    kick_winches(drives, rows, run.targets, half, False)
+    fill_damping(run)
+    add_powers(drives, half)
 
 
 @glue

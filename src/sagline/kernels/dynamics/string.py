@@ -1,4 +1,4 @@
-"""One cable as a string that vibrates about its catenary: how it hangs, and how much of it may be one element."""
+"""One cable as a string that vibrates about its catenary, and the compliance of its frame end over a pulley."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.jit import formula
+from sagline.kernels.cable import geometry as g
+from sagline.kernels.cable.over_pulleys import end_motion_per_length
+from sagline.kernels.cable.pulley import pulley_at
+from sagline.kernels.cable.terms import Model, Terms, model_of
+from sagline.kernels.jit import entry, formula
 
 # columns of the table of strings
 HORIZONTAL, VERTICAL = 0, 1  # T_x, T_z on the platform end [N]
@@ -23,23 +27,14 @@ TINY = 1e-300
 
 
 class String(NamedTuple):
-    """A cable at rest.
+    """A cable at rest."""
 
-    Attributes:
-        horizontal: T_x [N].
-        vertical: T_z on the platform end [N].
-        length: Unstrained length L [m].
-        weight: w [N/m].
-        stiffness: EA [N].
-        density: Rho [kg/m].
-    """
-
-    horizontal: float
-    vertical: float
-    length: float
-    weight: float
-    stiffness: float
-    density: float
+    horizontal: float  # T_x [N]
+    vertical: float  # T_z on the platform end [N]
+    length: float  # unstrained length L [m]
+    weight: float  # w [N/m]
+    stiffness: float  # EA [N]
+    density: float  # rho [kg/m]
 
 
 @formula
@@ -106,3 +101,32 @@ def element_length(string: String, start: float, omega: float, phase: float) -> 
             break
         size = max(allowed, 0.5 * size)
     return size if start + 1.0001 * size < string.length else string.length - start
+
+
+@entry
+def fill_routing_compliance(
+    terms: Terms, robots: Array, wraps: Array, leaving: Array, rows: Array, strings: Array
+) -> None:
+    """Fill the last columns of the table of strings, (N, m, STRING_COLUMNS), of cables with something behind them.
+
+    Args:
+        terms: Cable model.
+        robots: cable_table, (1 or N, m, CABLE_COLUMNS).
+        wraps: Wrap angles [rad], (N, m).
+        leaving: Tensions where the cables leave their pulleys [N], (N, m).
+        rows: Work array, (CABLE_ROWS, m).
+        strings: Its other columns are known.
+    """
+    bare = model_of(terms)
+    model = Model(bare.code, bare.k_h, bare.k_p, bare.gravity, True)
+    for p in range(strings.shape[0]):
+        cables = robots[min(p, robots.shape[0] - 1)]
+        for i in range(strings.shape[1]):
+            rows[g.WRAP, i], rows[g.LEAVING, i] = wraps[p, i], leaving[p, i]
+            rows[g.WRAP_SINE, i], rows[g.WRAP_COSINE, i] = math.sin(wraps[p, i]), math.cos(wraps[p, i])
+            x, z, gives = end_motion_per_length(model, cables, rows, i)
+            root = math.sqrt(gives)
+            strings[p, i, BEHIND_X], strings[p, i, BEHIND_Z] = root * x, root * z
+            # the whole plane turns about the swivel axis
+            slack = pulley_at(cables, i).radius * (1.0 - rows[g.WRAP_COSINE, i])
+            strings[p, i, BEHIND_Y] = slack / strings[p, i, HORIZONTAL] if slack > 0.0 else 0.0

@@ -10,9 +10,9 @@ import math
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.angle import angle
-from sagline.kernels.algebra.cholesky import factor_positive
-from sagline.kernels.balance.freedom import components_along
+from sagline.kernels.algebra.factors import factor_positive
+from sagline.kernels.algebra.functions import angle
+from sagline.kernels.balance.wrench import components_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.over_pulleys import chord_at, material_at

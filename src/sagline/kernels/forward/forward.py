@@ -9,11 +9,10 @@ import math
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.cholesky import factor_positive
 from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
-from sagline.kernels.balance.freedom import components_along, is_rotation, symmetric_part
+from sagline.kernels.algebra.factors import factor_positive
+from sagline.kernels.balance.wrench import components_along, is_rotation, symmetric_part
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import behind_at
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import (
@@ -27,8 +26,7 @@ from sagline.kernels.codes import (
     FORWARD_SOLVED,
     FORWARD_UNSTABLE,
 )
-from sagline.kernels.forward.descent import descend
-from sagline.kernels.forward.newton import BALANCED, newton_from, polish, predict
+from sagline.kernels.forward.newton import BALANCED, descend, newton_from, polish, predict
 from sagline.kernels.forward.platform import platform_energy, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import (
     ENERGY,
@@ -75,7 +73,7 @@ def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> in
     taut = 0
     strain = 0.0
     for i in range(cables.shape[0]):
-        tension = rows[t.TENSION, i]
+        tension = rows[g.TENSION, i]
         half_weight = 0.0 if model.code == ELASTIC else 0.5 * cables[i, tables.DENSITY] * model.gravity
         taut += 1 if tension > half_weight * rows[g.CHORD, i] else 0
         strain = max(strain, tension / cables[i, tables.STIFFNESS])
@@ -175,18 +173,18 @@ def _store_chain(chain: LastEquilibrium, pose: Array, wrench: Array) -> None:
 def _store_sample(problem: PoseProblem, rows: Array, p: int, results: Array, statuses: Codes) -> None:
     """Write one sample's cables."""
     for i in range(rows.shape[1]):
-        statuses[p, i] = int(rows[t.STATUS, i])
+        statuses[p, i] = int(rows[g.STATUS, i])
         results[tables.SPAN, p, i] = rows[g.SPAN, i]
         results[tables.RISE, p, i] = rows[g.RISE, i]
     for k in range(tables.WRAP - tables.LENGTH):  # length and forces follow each other in both
         for i in range(rows.shape[1]):
-            results[tables.LENGTH + k, p, i] = rows[t.LENGTH + k, i]
+            results[tables.LENGTH + k, p, i] = rows[g.LENGTH + k, i]
     if problem.model.behind is not None:
         for i in range(rows.shape[1]):
             wrapped, dead = behind_at(problem.model, problem.cables, rows, i)
-            results[tables.SPAN, p, i] = rows[t.FREE_SPAN, i]
-            results[tables.RISE, p, i] = rows[t.FREE_RISE, i]
-            results[tables.WRAP, p, i] = rows[t.WRAP, i]
+            results[tables.SPAN, p, i] = rows[g.FREE_SPAN, i]
+            results[tables.RISE, p, i] = rows[g.FREE_RISE, i]
+            results[tables.WRAP, p, i] = rows[g.WRAP, i]
             results[tables.WRAPPED, p, i] = wrapped
             results[tables.DEAD, p, i] = dead
             results[tables.SINE, p, i] = rows[g.SINE, i]
@@ -227,7 +225,7 @@ def forward_poses(
             copy_pose(row_of(batch.starts, p), start)
             kept.last[0] = math.nan
             for i in range(m):
-                kept.rows[t.PARAMETER, i] = math.nan
+                kept.rows[g.PARAMETER, i] = math.nan
         problem = problem_at(Model(code, k_h, k_p, 0.0, behind), batch, p, free, arcs)
         exact = Model(ELASTIC if code == ELASTIC else CATENARY, 0.0, 0.0, problem.model.gravity, behind)
         steps, size = _find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)

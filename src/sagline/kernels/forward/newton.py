@@ -1,9 +1,7 @@
-"""Newton's method on the wrench balance: from near, and to the last digit.
+"""Steps to an equilibrium: Newton from near, and from far downhill in the energy with a trust region.
 
-docs/model.md, section 6. From a start so near that the platform cannot mean another equilibrium no energy is needed:
-the first-order step from the last equilibrium of a chain, then full Newton steps that get shorter and shorter. Where
-that is in doubt, `descend` goes downhill and what follows here is careful. Steps are in the
-problem's units.
+docs/model.md, section 6. Downhill it ends in a stable equilibrium from almost any start. Steps are in the problem's
+units.
 """
 
 from __future__ import annotations
@@ -12,19 +10,66 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.elimination import solve_general
-from sagline.kernels.balance.freedom import components_along, matrix_along, norm, symmetric_part
+from sagline.kernels.algebra.factors import factor_positive, solve_general, solve_lower, solve_upper
+from sagline.kernels.balance.wrench import components_along, matrix_along, norm, symmetric_part
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
 from sagline.kernels.cable.over_pulleys import end_motion_per_length, material_at
 from sagline.kernels.cable.slopes import Pair, force_by_length, force_change
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY, ELASTIC
-from sagline.kernels.forward.platform import add_force, platform_stiffness, step_pose, unbalance
+from sagline.kernels.forward.platform import add_force, platform_energy, platform_stiffness, step_pose, unbalance
 from sagline.kernels.forward.problem import LAST_WRENCH, ForwardArrays, PoseProblem, copy_pose
 from sagline.kernels.jit import glue, kernel
+
+
+@kernel
+def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, work: Array, step: Array) -> float:
+    """Fill the step that minimizes g.s + s.H s/2 within |s| <= radius; returns the shift mu it took.
+
+    More and Sorensen: (H + mu 1) s = -g with the smallest mu that makes the matrix positive definite and the step
+    short enough; 0 is a plain Newton step.
+    """
+    n = gradient.shape[0]
+    square = 0.0
+    for i in range(n):
+        square += gradient[i] * gradient[i]
+    frobenius = 0.0
+    for i in range(n):
+        for j in range(n):
+            frobenius += matrix[i, j] * matrix[i, j]
+    low = 0.0
+    high = math.sqrt(square) / radius + math.sqrt(frobenius)
+    shift = 0.0
+    for _ in range(40):
+        if not factor_positive(matrix, shift, factor):
+            low = max(low, shift)
+            shift = max(math.sqrt(low * high), low + 0.001 * (high - low))
+            continue
+        for i in range(n):
+            step[i] = -gradient[i]
+        solve_lower(factor, step)
+        solve_upper(factor, step)
+        norm2 = 0.0
+        for i in range(n):
+            norm2 += step[i] * step[i]
+        length = math.sqrt(norm2)
+        if length <= 1.1 * radius and (shift == 0.0 or length >= 0.8 * radius or high - low <= 1e-6 * high):
+            break
+        if length > radius:
+            low = shift
+        else:
+            high = shift
+        for i in range(n):
+            work[i] = step[i]
+        solve_lower(factor, work)
+        bend = 0.0
+        for i in range(n):
+            bend += work[i] * work[i]
+        new = shift + norm2 / bend * (length - radius) / radius
+        shift = new if low < new < high else max(math.sqrt(low * high), low + 0.1 * (high - low))
+    return shift
+
 
 POLISH_STEPS = 30
 SHORTENINGS = 10
@@ -41,7 +86,7 @@ LAST_DIGIT = 1e-15  # a step that rounding hides
 def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
     """Add to a wrench (6,) what new lengths (m,) do to the cables' forces, to first order."""
     for i in range(cables.shape[0]):
-        span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
+        span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
         if model.behind is not None:
             x, z, _gives = end_motion_per_length(model, cables, rows, i)
             slope = force_change(plane_of(rows, i), Pair(x, z))
@@ -80,7 +125,7 @@ def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, spa
     if known:
         step_pose(problem.free, problem.body, start, space.step, space.motion, pose)
     for i in range(lengths.shape[0]):
-        space.rows[t.LENGTH, i] = lengths[i]
+        space.rows[g.LENGTH, i] = lengths[i]
     return known
 
 
@@ -188,3 +233,79 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
             break
         before = length
     return steps
+
+
+DESCENT_STEPS = 150
+FIRST_RADIUS = 0.5  # of the trust region, in these units
+LARGEST_RADIUS = 1.0
+NOISE = 4e-15  # of the sum of an energy's parts: what rounding leaves of it
+
+
+@glue
+def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: float) -> tuple[int, float]:
+    """Move pose downhill until a full Newton step is short; a start in balance stays where it is, stable or not.
+
+    known: the sum of tensions that `unbalance` gave at the pose, if space is still that of the pose with its stiffness
+    as matrix; else 0.
+
+    Returns the number of steps tried, and that sum at the pose; 0 where the last pose tried was another.
+    """
+    model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
+    trial, motion, rotation, rows, gradient = space.trial, space.motion, space.rotation, space.rows, space.gradient
+    matrix, part, step = space.matrix, space.part, space.step
+    radius = FIRST_RADIUS
+    steps, tensions = DESCENT_STEPS, known
+    energy, size, promised, shift, length = 0.0, 0.0, 0.0, 0.0, 0.0
+    copy_pose(pose, trial)
+    for iteration in range(DESCENT_STEPS + 1):
+        if iteration > 0 or known == 0.0:
+            tensions = unbalance(model, cables, body, wrench, trial, rotation, rows, gradient)
+        new_energy, new_size = platform_energy(model, cables, body, wrench, trial, rotation, rows)
+        fresh = True
+        if iteration == 0:
+            if components_along(free, gradient, part) <= BALANCED * tensions * problem.unit:
+                steps = 0
+                break
+        else:
+            gain = energy - new_energy
+            for k in range(3):  # the work of a given moment along the motion
+                gain += wrench[3 + k] * motion[3 + k]
+            noise = NOISE * (size + new_size)
+            fresh = gain + noise >= 0.1 * promised  # false for NaN too
+            if not fresh:
+                radius = 0.3 * min(length, radius)
+                tensions = 0.0
+                if not radius > 1e-14:
+                    steps = iteration
+                    break
+            else:
+                copy_pose(trial, pose)
+                if shift == 0.0 and (length <= NEAR or promised <= noise):
+                    steps = iteration
+                    break
+                if gain >= 0.6 * promised and length >= 0.7 * radius:
+                    radius = min(2.0 * radius, LARGEST_RADIUS)
+                elif gain < 0.3 * promised:
+                    radius = 0.5 * length
+        if fresh:
+            energy, size = new_energy, new_size
+            if iteration > 0 or known == 0.0:
+                platform_stiffness(model, cables, rows, space.stiffness)
+                symmetric_part(free, space.stiffness, matrix)
+            components_along(free, gradient, part)
+        shift = trust_step(matrix, part, radius, space.factor, motion, step)
+        length = norm(step)
+        promised = _promised_gain(matrix, part, step)
+        step_pose(free, body, pose, step, motion, trial)
+    return steps, tensions
+
+
+@glue
+def _promised_gain(matrix: Array, gradient: Array, step: Array) -> float:
+    """Decrease of the quadratic model of the energy along a step."""
+    gain = 0.0
+    for j in range(step.shape[0]):
+        gain -= gradient[j] * step[j]
+        for k in range(step.shape[0]):
+            gain -= 0.5 * step[j] * matrix[j, k] * step[k]
+    return gain

@@ -10,13 +10,11 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import motion_along
+from sagline.kernels.balance.wrench import motion_along
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
-from sagline.kernels.cable.energy import energy_of_cables
 from sagline.kernels.cable.forces import cable_forces
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.stiffness import plane_of, stiffnesses_in_plane
+from sagline.kernels.cable.stiffness import energy_of_cables, plane_of, stiffnesses_in_plane
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, kernel
 
@@ -41,8 +39,8 @@ def unbalance(
     gradient[2] += weight
     size = weight + abs(wrench[0]) + abs(wrench[1]) + abs(wrench[2])
     for i in range(cables.shape[0]):
-        add_force(rows, i, rows[t.HORIZONTAL, i], rows[t.VERTICAL, i], gradient)
-        size += rows[t.HORIZONTAL, i] + abs(rows[t.VERTICAL, i])
+        add_force(rows, i, rows[g.HORIZONTAL, i], rows[g.VERTICAL, i], gradient)
+        size += rows[g.HORIZONTAL, i] + abs(rows[g.VERTICAL, i])
     return size
 
 
@@ -84,7 +82,7 @@ def platform_energy(
 def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
     """Stiffness of cable i against displacements of its platform end in world axes [N/m], row by row."""
     xx, xz, zx, zz = plane_of(rows, i)
-    across = rows[t.ACROSS, i]
+    across = rows[g.ACROSS, i]
     c, s = rows[g.AZIMUTH_X, i], rows[g.AZIMUTH_Y, i]
     mixed = (xx - across) * c * s
     return (
@@ -132,9 +130,9 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
         _add_row(stiffness[5], x, by_y)
         _add_row(stiffness[5], -y, by_x)
         # the force keeps its direction while r turns: r T^T - (r.T) 1
-        tx = rows[t.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
-        ty = rows[t.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
-        tz = rows[t.VERTICAL, i]
+        tx = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_X, i]
+        ty = rows[g.HORIZONTAL, i] * rows[g.AZIMUTH_Y, i]
+        tz = rows[g.VERTICAL, i]
         stiffness[3, 3] -= y * ty + z * tz
         stiffness[3, 4] += x * ty
         stiffness[3, 5] += x * tz

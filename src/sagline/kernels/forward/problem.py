@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import is_rotation
+from sagline.kernels.balance.wrench import is_rotation
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
@@ -29,75 +29,43 @@ LastEquilibriumArrays = tuple[Array, Array, Array]
 
 
 class Samples(NamedTuple):
-    """A batch of N samples to solve.
+    """A batch of N samples to solve."""
 
-    Attributes:
-        freedom: Rows that pick the free motions, (n, 6).
-        bodies: body_table, (1 or N, BODY_COLUMNS).
-        robots: cable_table, (1 or N, m, CABLE_COLUMNS).
-        lengths: Unstrained lengths [m], (N, m); a row of NaN is left out.
-        starts: Pose rows (1 or N, POSE_COLUMNS).
-        wrenches: External plus inertial, about the center of mass, (1 or N, 6).
-    """
-
-    freedom: Array
-    bodies: Array
-    robots: Array
-    lengths: Array
-    starts: Array
-    wrenches: Array
+    freedom: Array  # rows that pick the free motions, (n, 6)
+    bodies: Array  # body_table, (1 or N, BODY_COLUMNS)
+    robots: Array  # cable_table, (1 or N, m, CABLE_COLUMNS)
+    lengths: Array  # unstrained lengths [m], (N, m); a row of NaN is left out
+    starts: Array  # pose rows (1 or N, POSE_COLUMNS)
+    wrenches: Array  # external plus inertial, about the center of mass, (1 or N, 6)
 
 
 class Solutions(NamedTuple):
-    """Output arrays of a batch.
+    """Output arrays of a batch."""
 
-    Attributes:
-        poses: Pose rows (N, POSE_COLUMNS).
-        results: Span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m).
-        statuses: Status of each cable, (N, m).
-        numbers: Energy, residuals, smallest stiffness, iterations, (N, FORWARD_NUMBERS).
-        pose_statuses: How each sample ended, (N,).
-    """
-
-    poses: Array
-    results: Array
-    statuses: Codes
-    numbers: Array
-    pose_statuses: Codes
+    poses: Array  # pose rows (N, POSE_COLUMNS)
+    results: Array  # span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m)
+    statuses: Codes  # status of each cable, (N, m)
+    numbers: Array  # energy, residuals, smallest stiffness, iterations, (N, FORWARD_NUMBERS)
+    pose_statuses: Codes  # how each sample ended, (N,)
 
 
 class LastEquilibrium(NamedTuple):
-    """Last equilibrium of a sequence of samples, kept from one call to the next; NaN: none.
+    """Last equilibrium of a sequence of samples, kept from one call to the next; NaN: none."""
 
-    Attributes:
-        rows: Of the cables, (CABLE_ROWS, m).
-        factor: Cholesky factor of the stiffness, scaled, (n, n).
-        last: Pose and wrench, (LAST_COLUMNS,).
-    """
-
-    rows: Array
-    factor: Array
-    last: Array
+    rows: Array  # of the cables, (CABLE_ROWS, m)
+    factor: Array  # Cholesky factor of the stiffness, scaled, (n, n)
+    last: Array  # pose and wrench, (LAST_COLUMNS,)
 
 
 class PoseProblem(NamedTuple):
-    """One pose to find: the cable model, what the robot is, and what is given.
+    """One pose to find: the cable model, what the robot is, and what is given."""
 
-    Attributes:
-        model: Cable model.
-        free: Rows that pick the free motions, each times its unit: what counts as equally far, (n, 6).
-        cables: Rows of the cable_table, (m, CABLE_COLUMNS).
-        body: Row of the body_table, (BODY_COLUMNS,).
-        wrench: External plus inertial, about the center of mass, (6,).
-        unit: Norm of the units, by which a sum of forces becomes one of components along the free motions.
-    """
-
-    model: Model
-    free: Array
-    cables: Array
-    body: Array
-    wrench: Array
-    unit: float
+    model: Model  # cable model
+    free: Array  # rows that pick the free motions, each times its unit: what counts as equally far, (n, 6)
+    cables: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
+    body: Array  # row of the body_table, (BODY_COLUMNS,)
+    wrench: Array  # external plus inertial, about the center of mass, (6,)
+    unit: float  # norm of the units, by which a sum of forces becomes one of components along the free motions
 
 
 class ForwardArrays(NamedTuple):
@@ -131,19 +99,12 @@ def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[Forw
 
 
 class _Motions(NamedTuple):
-    """The free motions of the sample at hand, and the poses on its way.
+    """The free motions of the sample at hand, and the poses on its way."""
 
-    Attributes:
-        free: In the units of steps, (n, 6).
-        arcs: In those by which stiffnesses are compared, (n, 6).
-        start: Pose row to begin at.
-        pose: Pose row that is found.
-    """
-
-    free: Array
-    arcs: Array
-    start: Array
-    pose: Array
+    free: Array  # in the units of steps, (n, 6)
+    arcs: Array  # in those by which stiffnesses are compared, (n, 6)
+    start: Array  # pose row to begin at
+    pose: Array  # pose row that is found
 
 
 @glue

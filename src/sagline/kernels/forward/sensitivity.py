@@ -7,10 +7,9 @@ import math
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable import rows as t
+from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.cable.over_pulleys import material_at
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.rows import CABLE_ROWS
 from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
@@ -44,9 +43,9 @@ def _describe_cable(
         block[1, j] = across[1][j]
         block[2, j] = across[2][j]
         lever[j] = rows[g.LEVER_X + j, i]
-    span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[t.LENGTH, i]
+    span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
     material, force, plane = material_at(cables, i), force_of(rows, i), plane_of(rows, i)
-    free = length if model.behind is None else rows[t.FREE_LENGTH, i]
+    free = length if model.behind is None else rows[g.FREE_LENGTH, i]
     own, machine = slopes_over(model, material, pulley_at(cables, i), free, force, plane)
     if model.behind is None:
         own = force_slopes(model, span, rise, material, length, force, plane)
@@ -95,8 +94,8 @@ def describe_states(
         body, cables = row_of(batch.bodies, p), row_of(batch.robots, p)
         placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         for i in range(m):
-            rows[t.LENGTH, i] = batch.lengths[p, i]
-            rows[t.PARAMETER, i] = math.nan  # an answer must not depend on the sample before
+            rows[g.LENGTH, i] = batch.lengths[p, i]
+            rows[g.PARAMETER, i] = math.nan  # an answer must not depend on the sample before
         unbalance(placed, cables, body, row_of(batch.wrenches, p), batch.starts[p], rotation, rows, gradient)
         platform_stiffness(placed, cables, rows, matrices[p])
         for i in range(m):

@@ -13,7 +13,6 @@ import numpy as np
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.interference.nearest import nearest_of_curves, nearest_to_box, square_between
-from sagline.kernels.interference.segments import between_segments, nearest_in_box, to_box
 from sagline.kernels.interference.shapes import (
     AXES,
     BOX,
@@ -23,9 +22,12 @@ from sagline.kernels.interference.shapes import (
     LAST,
     PLACE,
     RADIUS,
+    between_segments,
     bulge,
     level_point,
+    nearest_in_box,
     point,
+    to_box,
 )
 from sagline.kernels.jit import entry, kernel
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from sagline.core.arrays import Array
-from sagline.kernels.interference.segments import in_axes, outside
-from sagline.kernels.interference.shapes import FIRST, HALF, LAST, LEVEL, PLACE, point, slopes
+from sagline.kernels.interference.shapes import FIRST, HALF, LAST, LEVEL, PLACE, in_axes, outside, point, slopes
 from sagline.kernels.jit import kernel
 
 STEPS = 30

@@ -1,11 +1,21 @@
-"""Iterations of tension distribution and cable states until the sag forces converge; docs/model.md, section 5."""
+"""Iterations of tension distribution and cable states until the sag forces converge; docs/model.md, section 5.
+
+A distribution in the tension at the frame end is linearized at the tensions of the last iteration.
+"""
 
 from __future__ import annotations
 
 import math
 
 from sagline.core.arrays import Codes
-from sagline.kernels.balance.setting import Balance, Platform, fill_needed_wrench, start_from_minimum_norm
+from sagline.kernels.balance.setting import (
+    Balance,
+    Platform,
+    factor_balance,
+    fill_needed_wrench,
+    scale_limits,
+    start_from_minimum_norm,
+)
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.states import NEAR, frame_end_tension, solve_cable_states
 from sagline.kernels.cable.terms import Model
@@ -21,11 +31,29 @@ from sagline.kernels.codes import (
     POSE_SOLVED,
     POSE_TOO_SLACK,
 )
-from sagline.kernels.inverse.frame_end import STILL, linearize_ends
-from sagline.kernels.jit import glue
+from sagline.kernels.jit import glue, kernel
 from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nearest, set_reference, share_nearest
 from sagline.kernels.tension.other_methods import distribute_by_other_method
-from sagline.kernels.tension.work_arrays import WorkArrays, reset_work_arrays
+from sagline.kernels.tension.polygon import WorkArrays, reset_work_arrays
+
+STILL = 1e-9  # relative change of tension at which a distribution in frame-end tensions stands still
+SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
+
+
+@kernel
+def linearize_ends(model: Model, distribution: Distribution, cables: Cables, balance: Balance) -> bool:
+    """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
+    for i in range(cables.tau.size):
+        tau = cables.tau[i]
+        chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
+        above = frame_end_tension(model, chord, material, pulley, tau * (1.0 + SLOPE_STEP))
+        below = frame_end_tension(model, chord, material, pulley, tau * (1.0 - SLOPE_STEP))
+        slope = (above - below) / (2.0 * SLOPE_STEP * tau)
+        balance.offset[i] = frame_end_tension(model, chord, material, pulley, tau) - slope * tau
+        balance.scale[i] = slope * distribution.weight[i]
+        scale_limits(cables, balance, i)
+    return factor_balance(balance)
+
 
 ROUNDS = 30
 FREE_ROUNDS = 8  # then a choice that jumps with the last digits of the pulls is held where it is
@@ -39,15 +67,8 @@ def distribute_and_solve_cables(
 ) -> int:  # fmt: skip
     """Share the load and hang the cables until their pulls stand still; returns the pose's status.
 
-    Args:
-        model: Cable model.
-        distribution: Tension distribution.
-        platform: What is given at the pose.
-        cables: Those of `set_pose`; tensions, ratios and pulls are filled.
-        balance: That of `set_pose`.
-        near: Reference of the projection.
-        room: Work arrays for the methods that are not projections, and for frame-end tensions; None leaves them out.
-        statuses: Filled: status of each cable, (m,).
+    cables: those of `set_pose`; tensions, ratios and pulls are filled; room: work arrays for the methods that are not
+    projections, and for frame-end tensions; None leaves them out; statuses: filled: status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if room is not None:

@@ -10,9 +10,9 @@ import math
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.algebra.angle import angle
-from sagline.kernels.balance.freedom import is_rotation
+from sagline.kernels.algebra.functions import angle
 from sagline.kernels.balance.setting import Balance, Platform, TensionLimits, fill_needed_wrench, new_balance, set_pose
+from sagline.kernels.balance.wrench import is_rotation
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
@@ -22,7 +22,7 @@ from sagline.kernels.inverse.iterations import distribute_and_solve_cables, stor
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
 from sagline.kernels.tension.nearest import Distribution, new_reference_point
-from sagline.kernels.tension.work_arrays import new_work_arrays
+from sagline.kernels.tension.polygon import new_work_arrays
 
 FORCE, MOMENT = 0, 1  # columns of the residuals
 

@@ -14,12 +14,12 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra.householder import factorize, orthogonal_factor, pseudo_inverse
-from sagline.kernels.cable.sag_force_extrema import find_extrema
+from sagline.kernels.algebra.factors import factorize, orthogonal_factor, pseudo_inverse
 from sagline.kernels.cable.sag_forces import (
     LOOSEST,
     Curves,
     Section,
+    find_extrema,
     most_along,
     sag_force_at,
     sag_force_range,
@@ -43,15 +43,10 @@ RANGE_ROWS = 4
 
 
 class _Search(NamedTuple):
-    """State of the search.
+    """State of the search."""
 
-    Attributes:
-        tops: The most each cable gives along a direction [N], (m,).
-        ranges: Those that wait, the last one is next, (DEPTH, RANGE_ROWS, m).
-    """
-
-    tops: Array
-    ranges: Array
+    tops: Array  # the most each cable gives along a direction [N], (m,)
+    ranges: Array  # those that wait, the last one is next, (DEPTH, RANGE_ROWS, m)
 
 
 @glue
@@ -101,8 +96,7 @@ def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Ar
 def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
     """Take from a range the tensions with which a cable falls short of its best by more than is spare.
 
-    Returns:
-        Whether anything is left of it.
+    Returns whether anything is left of it.
     """
     if not spare < math.inf:
         return True
@@ -129,8 +123,7 @@ def _narrow_free(
 ) -> bool:
     """Narrow a range along the directions in which one cable between its limits counts and the others do not.
 
-    Returns:
-        Whether anything is left of it.
+    Returns whether anything is left of it.
     """
     n, m = demand.matrix.shape
     count = 0
@@ -220,9 +213,8 @@ def _approach_demand(
 ) -> tuple[float, bool]:
     """Let tensions in a range come as near to the demand as they can.
 
-    Returns:
-        The force that is left [N], infinite where moments are out of reach: then the direction is one of moments alone;
-        and whether the moments balance.
+    Returns the force that is left [N], infinite where moments are out of reach: then the direction is one of moments
+    alone; and whether the moments balance.
     """
     n, m = demand.matrix.shape
     first = demand.soft
@@ -247,15 +239,9 @@ def decide_feasibility(
 ) -> tuple[int, float, float, bool]:
     """Feasibility of a demand with tensions within the cables' limits.
 
-    Args:
-        curves: The cables of one pose.
-        demand: What is asked of them.
-        change: Where to begin; filled with the tensions that leave least, what they leave and along what.
-        memory: To work in.
-
-    Returns:
-        POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED where the arithmetic broke down; the
-        bracket of the shortfall [N]; whether the direction alone proves infeasibility, over the whole first range.
+    change: where to begin; filled with the tensions that leave least, what they leave and along what. Returns
+    POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED where the arithmetic broke down; the bracket of
+    the shortfall [N]; whether the direction alone proves infeasibility, over the whole first range.
     """
     n, m = demand.matrix.shape
     search, rest = _new_search(memory, m)

@@ -6,14 +6,14 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound
-from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
+from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.linear_program import LP_SOLVED, lowest_point
 from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block
+from sagline.kernels.tension.norms import program_status
 from sagline.kernels.tension.on_polygon import centroid, feasible_corners
-from sagline.kernels.tension.programs import program_status
-from sagline.kernels.tension.work_arrays import WorkArrays
+from sagline.kernels.tension.polygon import WorkArrays
 
 THIN = 1e-9  # of the largest tension: a set thinner than this has no inside worth centering in
 NEWTON_STEPS = 200
@@ -97,8 +97,7 @@ def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -
     Newton's method with damped steps on the barrier, which is self-concordant; infinite limits do not count. A set
     too thin to have an inside keeps the point it was given.
 
-    Returns:
-        Whether the center was found.
+    Returns whether the center was found.
     """
     r, m = null.shape
     vectors, at = block(memory.numbers, 0, 2, r)

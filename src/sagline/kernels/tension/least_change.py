@@ -12,8 +12,15 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, inward, largest_bound
-from sagline.kernels.algebra.cholesky import factor_positive, solve_lower, solve_upper
-from sagline.kernels.algebra.householder import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
+from sagline.kernels.algebra.factors import (
+    factor_positive,
+    factorize,
+    minimum_norm,
+    orthogonal_factor,
+    pseudo_inverse,
+    solve_lower,
+    solve_upper,
+)
 from sagline.kernels.algebra.nearest_point import ActiveSet, nearest_point, new_active_set
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at, slopes_at
 from sagline.kernels.jit import formula, glue, kernel
@@ -29,75 +36,42 @@ STEADY = 1e-6  # of what is left: tensions that move by less no longer turn its 
 
 
 class Demand(NamedTuple):
-    """Demand on the cables of one pose; moments are divided by the lever arm, so that every row is in newtons.
+    """Demand on the cables of one pose; moments are divided by the lever arm, so that every row is in newtons."""
 
-    Attributes:
-        matrix: J, what a chord tension gives, (n, m).
-        hanging: G, what a pull takes away, (n, m).
-        right: Wrench to be supplied beside the pulls, (n,).
-        soft: How many of the rows, the first ones, may leave something; the others, hard ones, leave nothing.
-        size: The largest force at hand [N], by which tolerances are measured.
-    """
-
-    matrix: Array
-    hanging: Array
-    right: Array
-    soft: int
-    size: float
+    matrix: Array  # J, what a chord tension gives, (n, m)
+    hanging: Array  # G, what a pull takes away, (n, m)
+    right: Array  # wrench to be supplied beside the pulls, (n,)
+    soft: int  # how many of the rows, the first ones, may leave something; the others, hard ones, leave nothing
+    size: float  # the largest force at hand [N], by which tolerances are measured
 
 
 class TensionChange(NamedTuple):
-    """A state of the search, for m cables and n rows.
+    """A state of the search, for m cables and n rows."""
 
-    Attributes:
-        tau: Chord tensions [N], (m,).
-        pull: Their pulls [N], (m,).
-        residual: What they leave of the demand [N], moments per lever arm, (n,).
-        direction: y, along which the rest is; moments per lever arm, (n,).
-    """
-
-    tau: Array
-    pull: Array
-    residual: Array
-    direction: Array
+    tau: Array  # chord tensions [N], (m,)
+    pull: Array  # their pulls [N], (m,)
+    residual: Array  # what they leave of the demand [N], moments per lever arm, (n,)
+    direction: Array  # y, along which the rest is; moments per lever arm, (n,)
 
 
 class _Tangents(NamedTuple):
-    """One Newton step, with h hard and k soft rows and d = m - h unknowns.
+    """One Newton step, with h hard and k soft rows and d = m - h unknowns."""
 
-    Attributes:
-        matrix: J - G dpull/dtau, (n, m).
-        reduced: Its hard rows, then their reflections, (h, m).
-        diagonals: Of their factors, (2, h).
-        q: Orthogonal factor, and a row to work in, (m + 1, m).
-        inverse: Transposed pseudo-inverse of the hard rows, (h, m).
-        soft: The soft rows along the null space of the hard ones, (k, d).
-        normal: Normal matrix of these and the weight of change, then its factor, (d, d).
-        rows: What each unknown changes the tensions by, (d, m).
-        bounds: Tensions that are best without limits, and the limits, (3, m).
-        unknowns: A right side, a target of zeros and the point, (3, d).
-        held: Limits that the last point stands on.
-        push: Slopes of the pulls, then what the limits push with, (m,).
-        bend: What the square of a change of each tension weighs, (m,).
-        multipliers: What the step before left, and what its hard rows cost [N], (n,).
-        trial: Tensions, (m,), pulls, (m,), and residual of a step that is tried, (n,).
-    """
-
-    matrix: Array
-    reduced: Array
-    diagonals: Array
-    q: Array
-    inverse: Array
-    soft: Array
-    normal: Array
-    rows: Array
-    bounds: Array
-    unknowns: Array
-    held: ActiveSet
-    push: Array
-    bend: Array
-    multipliers: Array
-    trial: tuple[Array, Array, Array]
+    matrix: Array  # J - G dpull/dtau, (n, m)
+    reduced: Array  # its hard rows, then their reflections, (h, m)
+    diagonals: Array  # of their factors, (2, h)
+    q: Array  # orthogonal factor, and a row to work in, (m + 1, m)
+    inverse: Array  # transposed pseudo-inverse of the hard rows, (h, m)
+    soft: Array  # the soft rows along the null space of the hard ones, (k, d)
+    normal: Array  # normal matrix of these and the weight of change, then its factor, (d, d)
+    rows: Array  # what each unknown changes the tensions by, (d, m)
+    bounds: Array  # tensions that are best without limits, and the limits, (3, m)
+    unknowns: Array  # A right side, a target of zeros and the point, (3, d)
+    held: ActiveSet  # limits that the last point stands on
+    push: Array  # slopes of the pulls, then what the limits push with, (m,)
+    bend: Array  # what the square of a change of each tension weighs, (m,)
+    multipliers: Array  # what the step before left, and what its hard rows cost [N], (n,)
+    trial: tuple[Array, Array, Array]  # tensions, (m,), pulls, (m,), and residual of a step that is tried, (n,)
 
 
 @glue
@@ -304,16 +278,9 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
 def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionChange, memory: Memory) -> float:
     """Change tensions within their ranges until what they leave of the demand is least; returns its length [N].
 
-    Args:
-        curves: The cables of one pose.
-        demand: What is asked of them.
-        ranges: Least and largest tensions, rows 0 and 1.
-        change: Where to begin, and filled.
-        memory: To work in.
-
-    Returns:
-        Length of what the soft rows leave [N]; infinite where hard rows and ranges contradict, on the tangents; NaN
-        where the hard rows depend on each other.
+    ranges: least and largest tensions, rows 0 and 1; change: where to begin, and filled. Returns length of what the
+    soft rows leave [N]; infinite where hard rows and ranges contradict, on the tangents; NaN where the hard rows depend
+    on each other.
     """
     n, m = demand.matrix.shape
     soft = demand.soft

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels.algebra.gram_schmidt import normalize_row, orthogonalize_row
+from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 

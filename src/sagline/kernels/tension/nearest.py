@@ -18,37 +18,22 @@ from sagline.kernels.memory import Memory, block
 
 
 class Distribution(NamedTuple):
-    """Tension distribution of one pose.
+    """Tension distribution of one pose."""
 
-    Attributes:
-        method: Which choice.
-        parameter: Its exponent, or which optimum of the polygon walk.
-        variable: In which variable.
-        weight: Root weights of the cables, (m,).
-        goal: Tensions of a quadratic program to be near to [N], (m,).
-    """
-
-    method: int
-    parameter: float
-    variable: int
-    weight: Array
-    goal: Array
+    method: int  # which choice
+    parameter: float  # its exponent, or which optimum of the polygon walk
+    variable: int  # in which variable
+    weight: Array  # root weights of the cables, (m,)
+    goal: Array  # tensions of a quadratic program to be near to [N], (m,)
 
 
 class ReferencePoint(NamedTuple):
-    """Reference point of a nearest-point method, in coordinates of the null space.
+    """Reference point of a nearest-point method, in coordinates of the null space."""
 
-    Attributes:
-        previous: Tensions in the distribution's variable to stay close to (m,), NaN for none.
-        reference: lambda_ref, (r,).
-        held: The limits that the last projection met.
-        point: The last projection, (r,).
-    """
-
-    previous: Array
-    reference: Array
-    held: ActiveSet
-    point: Array
+    previous: Array  # tensions in the distribution's variable to stay close to (m,), NaN for none
+    reference: Array  # lambda_ref, (r,)
+    held: ActiveSet  # the limits that the last projection met
+    point: Array  # the last projection, (r,)
 
 
 @glue

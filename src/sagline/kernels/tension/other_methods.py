@@ -1,9 +1,13 @@
-"""Tension distribution methods that are not projections: the one switch between them."""
+"""Tension distribution methods that are not projections: the switch between them, and those in closed form.
+
+The closed forms are near the middle of the limits, without a search; they do not find every distribution.
+"""
 
 from __future__ import annotations
 
 from sagline.core.arrays import Array
-from sagline.kernels.algebra.bounds import TOLERANCE, largest_bound
+from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
+from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
 from sagline.kernels.codes import (
     ANALYTIC_CENTER,
     CENTROID,
@@ -17,14 +21,100 @@ from sagline.kernels.codes import (
     POSE_SOLVED,
     PUNCTURE,
 )
-from sagline.kernels.jit import kernel
+from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.tension.centers import share_at_center
-from sagline.kernels.tension.closed_form import share_near_middle
 from sagline.kernels.tension.nearest import Distribution, ReferencePoint, satisfies_limits, set_point, share_nearest
+from sagline.kernels.tension.norms import share_by_norm, share_lowest_maximum, share_lowest_sum
 from sagline.kernels.tension.on_polygon import distribute_on_polygon
-from sagline.kernels.tension.p_norm import share_by_norm
-from sagline.kernels.tension.programs import share_lowest_maximum, share_lowest_sum
-from sagline.kernels.tension.work_arrays import WorkArrays
+from sagline.kernels.tension.polygon import WorkArrays
+
+DEPENDENT = 1e-10  # square of what is left of a cable's row once the cables before it are held
+
+
+@kernel
+def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, tension: Array) -> bool:
+    """Fill the tensions (m,) by the closed form, the improved closed form or the puncture method.
+
+    Returns whether the method found tensions within their limits.
+
+    Source:
+        Pott, Bruckmann & Mikelsons 2009; Pott 2014; Mueller, Reichert & Bruckmann 2015.
+    """
+    r, m = null.shape
+    slack = TOLERANCE * largest_bound(bounds)
+    for i in range(m):
+        tension[i] = bounds[START, i]
+    if method == PUNCTURE and satisfies_limits(bounds, tension, slack):
+        return True
+    for k in range(r):
+        share = 0.0
+        for i in range(m):
+            share += null[k, i] * 0.5 * (bounds[LOW, i] + bounds[HIGH, i])
+        for i in range(m):
+            tension[i] += null[k, i] * share
+    if method == CLOSED_FORM:
+        return satisfies_limits(bounds, tension, slack)
+    if not _hold_violated(bounds, null, slack, memory, tension):
+        return False
+    if method == PUNCTURE:
+        _puncture(bounds, tension)
+    return True
+
+
+@glue
+def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
+    """Hold the cable that misses its limit most at that limit, and share the rest again, until all keep theirs.
+
+    Works on the tensions, by orthogonal steps in the null space; a cable once held stays there.
+    """
+    r, m = null.shape
+    held, at = block(memory.numbers, 0, r + 1, r)
+    triangle, at = block(memory.numbers, at, r + 1, r + 1)
+    for count in range(r + 1):
+        worst = slack
+        cable = -1
+        limit = 0.0
+        for i in range(m):
+            if bounds[LOW, i] - tension[i] > worst:
+                worst = bounds[LOW, i] - tension[i]
+                cable = i
+                limit = bounds[LOW, i]
+            if tension[i] - bounds[HIGH, i] > worst:
+                worst = tension[i] - bounds[HIGH, i]
+                cable = i
+                limit = bounds[HIGH, i]
+        if cable < 0:
+            return True
+        if count == r:
+            return False
+        for k in range(r):
+            held[count, k] = null[k, cable]
+        square = orthogonalize_row(held, count, triangle)
+        if square < DEPENDENT:
+            return False
+        step = (limit - tension[cable]) / square
+        for i in range(m):
+            for k in range(r):
+                tension[i] += step * held[count, k] * null[k, i]
+        normalize_row(held, count, triangle, square)
+    return False
+
+
+@glue
+def _puncture(bounds: Array, tension: Array) -> None:
+    """Move the tensions back towards the minimum norm, START, as far as the limits let them."""
+    m = tension.size
+    share = 0.0  # 0 at the minimum norm, 1 where we are
+    for i in range(m):
+        start = bounds[START, i]
+        way = tension[i] - start
+        if start < bounds[LOW, i] and way > 0.0:
+            share = max(share, min((bounds[LOW, i] - start) / way, 1.0))
+        if start > bounds[HIGH, i] and way < 0.0:
+            share = max(share, min((bounds[HIGH, i] - start) / way, 1.0))
+    for i in range(m):
+        tension[i] = bounds[START, i] + share * (tension[i] - bounds[START, i])
 
 
 @kernel

@@ -8,10 +8,14 @@ each with the label of the side that leaves it: 2i for the lower limit of cable 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, box_radius, inward, largest_bound, side_of
+from sagline.kernels.algebra.linear_program import Basis, new_basis
+from sagline.kernels.codes import LOWEST_SUM
 from sagline.kernels.jit import formula, glue, kernel
+from sagline.kernels.memory import Memory, block, counters
 
 FLAT = 1e-12  # a null-space row shorter than this does not move the cable's tension
 SPARE_CORNERS = 6  # beyond two a cable: the box and the corner in the making
@@ -224,3 +228,32 @@ def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tupl
             best_x = px
             best_y = py
     return best_x, best_y
+
+
+class WorkArrays(NamedTuple):
+    """Memory with a meaning."""
+
+    corners: Array  # of the feasible polygon, (2m + SPARE_CORNERS, 2)
+    labels: Indices  # of its sides, (2m + SPARE_CORNERS,)
+    known: Indices  # how many corners the polygon of the last round had, (1,); 0 for none
+    basis: Basis  # of the linear program of the last round
+    rest: Memory  # memory that keeps nothing
+
+
+@glue
+def new_work_arrays(method: int, memory: Memory, m: int, r: int) -> WorkArrays:
+    """Work arrays for m cables, r of them redundant."""
+    corner_count = 2 * m + SPARE_CORNERS
+    corners, at = block(memory.numbers, 0, corner_count, 2)
+    known, after = counters(memory, 0, 1)
+    labels, after = counters(memory, after, corner_count)
+    rest = Memory(memory.numbers[at:], memory.counters[after:])
+    basis, rest = new_basis(rest, r if method == LOWEST_SUM else r + 1)
+    return WorkArrays(corners, labels, known, basis, rest)
+
+
+@glue
+def reset_work_arrays(room: WorkArrays) -> None:
+    """A new pose: nothing is known from the one before."""
+    room.known[0] = 0
+    room.basis.labels[0] = -1

@@ -1,4 +1,10 @@
-"""Tensions for a box of poses: limits that hold all over it, and tensions well inside them at its middle."""
+"""Tensions for a box of poses: limits that hold all over it, and tensions well inside them at its middle.
+
+Centered tensions make sum over cables of -log(tau - low) - log(high - tau), times a smoothing, plus half the square of
+what is left of the demand, least. Where the demand can be balanced they are near the analytic center; where not, what
+is left points along the direction that separates the demand from all that the cables give, but for the square root of
+the smoothing. Primal-dual Newton steps, each one system of as many unknowns as the platform has free motions.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +13,156 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
+from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.sag_forces import LOOSEST, Curves, sag_forces_at
 from sagline.kernels.codes import CATENARY, LIMITS_OF_CHORD
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.workspaces.centered import FARTHEST, Centered, fill_imbalance, find_center
+from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
 from sagline.kernels.workspaces.sag_force_bounds import has_sag, most_pull, pull_slope
+
+STEPS = 40
+REDUCTION = 0.1  # of the smoothing, at most, with each step
+TO_LIMIT = 0.95  # share of the way to a limit that a step may go
+CENTERED = 0.2  # relative error of slack times push at which the center is found: nothing depends on it but luck
+FARTHEST = 50.0  # of all forces at hand: where there is no limit, tensions are sought up to so much
+
+
+class Centered(NamedTuple):
+    """The search, for m cables and n rows."""
+
+    low: Array  # limits of the tensions [N], (m,)
+    high: Array  # (m,), finite
+    tau: Array  # tensions, strictly inside, (m,)
+    below: Array  # what the lower limits push with [N], (m,), > 0
+    above: Array  # what the upper ones do, (m,), > 0
+    give: Array  # inverse of how stiffly the limits hold each tension, (m,)
+    right: Array  # what the chord tensions have to supply [N], (n,)
+    left: Array  # what they leave of it, (n,)
+    normal: Array  # working space, (n, n)
+    vector: Array  # working space, (n,)
+
+
+@glue
+def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
+    """Work arrays for m cables and n rows, and the memory that is left; the tensions are not known yet."""
+    wide, at = block(memory.numbers, 0, 6, m)
+    thin, at = block(memory.numbers, at, 3 + n, n)
+    centered = Centered(wide[0], wide[1], wide[2], wide[3], wide[4], wide[5], thin[0], thin[1], thin[3:], thin[2])
+    centered.tau[0] = math.nan
+    return centered, Memory(memory.numbers[at:], memory.counters)
+
+
+@kernel
+def fill_imbalance(matrix: Array, centered: Centered) -> float:
+    """Fill what the tensions leave of the right side; returns the square of its length [N^2]."""
+    n, m = matrix.shape
+    square = 0.0
+    for k in range(n):
+        centered.left[k] = centered.right[k]
+        for i in range(m):
+            centered.left[k] -= matrix[k, i] * centered.tau[i]
+        square += centered.left[k] * centered.left[k]
+    return square
+
+
+@kernel
+def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> None:
+    """Start from the tensions of the search before, where they fit between the limits, else from the middle."""
+    m = centered.tau.size
+    known = not math.isnan(centered.tau[0])
+    for i in range(m):
+        room = centered.high[i] - centered.low[i]
+        slack = 0.01 * room
+        if not known or not centered.low[i] + slack < centered.tau[i] < centered.high[i] - slack:
+            centered.tau[i] = min(max(centered.tau[i], centered.low[i] + slack), centered.high[i] - slack)
+            if not known:
+                centered.tau[i] = centered.low[i] + 0.5 * room
+    square = max(fill_imbalance(matrix, centered) / m, smoothing)
+    for i in range(m):
+        centered.below[i] = square / (centered.tau[i] - centered.low[i])
+        centered.above[i] = square / (centered.high[i] - centered.tau[i])
+
+
+@kernel
+def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> bool:
+    """Fill the factor of unit times 1 + matrix give matrix^T, (n, n); False where it is not positive definite."""
+    n, m = matrix.shape
+    for k in range(n):
+        for j in range(k + 1):
+            total = unit if j == k else 0.0
+            for i in range(m):
+                total += matrix[k, i] * give[i] * matrix[j, i]
+            normal[k, j] = total
+    return factor_positive(normal, 0.0, normal)
+
+
+@kernel
+def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
+    """Let the tensions come to the smoothed center; returns the square of what they leave [N^2].
+
+    matrix: structure matrix, all rows in newtons, (n, m); smoothing: [N^2], > 0; centered: limits and right side; the
+    rest is filled.
+    """
+    n, m = matrix.shape
+    tau, low, high, below, above = centered.tau, centered.low, centered.high, centered.below, centered.above
+    _start_centering(matrix, smoothing, centered)
+    square = fill_imbalance(matrix, centered)
+    for _ in range(STEPS):
+        present = 0.0
+        worst = 0.0
+        for i in range(m):
+            down, up = below[i] * (tau[i] - low[i]), above[i] * (high[i] - tau[i])
+            present += (down + up) / (2 * m)
+            worst = max(worst, abs(down - smoothing), abs(up - smoothing))
+        unbalanced = 0.0
+        for i in range(m):
+            push = below[i] - above[i]
+            for k in range(n):
+                push += matrix[k, i] * centered.left[k]
+            unbalanced = max(unbalanced, abs(push) / (below[i] + above[i]))
+        if worst <= CENTERED * smoothing and unbalanced <= CENTERED:
+            break
+        goal = max(smoothing, REDUCTION * present) if present > smoothing else smoothing
+        for i in range(m):
+            centered.give[i] = 1.0 / (below[i] / (tau[i] - low[i]) + above[i] / (high[i] - tau[i]))
+        if not factor_normal(matrix, centered.give, 1.0, centered.normal):
+            break
+        for k in range(n):
+            centered.vector[k] = centered.left[k]
+            for i in range(m):
+                force = goal / (tau[i] - low[i]) - goal / (high[i] - tau[i])
+                centered.vector[k] -= matrix[k, i] * centered.give[i] * force
+        solve_lower(centered.normal, centered.vector)
+        solve_upper(centered.normal, centered.vector)
+        share = 1.0
+        dual_share = 1.0
+        for i in range(m):
+            down, up = tau[i] - low[i], high[i] - tau[i]
+            step = goal / down - goal / up
+            for k in range(n):
+                step += matrix[k, i] * centered.vector[k]
+            step *= centered.give[i]
+            centered.give[i] = step
+            if step < 0.0:
+                share = min(share, -TO_LIMIT * down / step)
+            elif step > 0.0:
+                share = min(share, TO_LIMIT * up / step)
+            fall = below[i] * (1.0 + step / down) - goal / down
+            if fall > 0.0:
+                dual_share = min(dual_share, TO_LIMIT * below[i] / fall)
+            fall = above[i] * (1.0 - step / up) - goal / up
+            if fall > 0.0:
+                dual_share = min(dual_share, TO_LIMIT * above[i] / fall)
+        for i in range(m):
+            down, up, step = tau[i] - low[i], high[i] - tau[i], centered.give[i]
+            below[i] += dual_share * (goal / down - below[i] * (1.0 + step / down))
+            above[i] += dual_share * (goal / up - above[i] * (1.0 - step / up))
+            tau[i] += share * step
+        square = fill_imbalance(matrix, centered)
+    return square
+
 
 SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
 SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the pull
@@ -23,21 +172,13 @@ LEAST_WAY = 1e-4  # of a chord: a smaller box is smoothed as one so large
 
 
 class Ranges(NamedTuple):
-    """Limits of the chord tensions that hold all over a box [N].
+    """Limits of the chord tensions that hold all over a box [N]."""
 
-    Attributes:
-        low: What no limit exceeds, (m,): for inside.
-        high: What no limit falls below, nor stretches a cable to more than twice its length; may be infinite.
-        lowest: What no limit falls below: for outside.
-        highest: What no limit exceeds, or no load can cause; may be infinite.
-        pull: Pulls at the centered tensions.
-    """
-
-    low: Array
-    high: Array
-    lowest: Array
-    highest: Array
-    pull: Array
+    low: Array  # what no limit exceeds, (m,): for inside
+    high: Array  # what no limit falls below, nor stretches a cable to more than twice its length; may be infinite
+    lowest: Array  # what no limit falls below: for outside
+    highest: Array  # what no limit exceeds, or no load can cause; may be infinite
+    pull: Array  # pulls at the centered tensions
 
 
 @kernel
@@ -82,12 +223,8 @@ def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, r
 
     Along the vertical they balance weight, load and pulls, of which each is at most the rest.
 
-    Args:
-        freedom: Rows that pick the free motions, (n, 6).
-        place: Where the cables stand.
-        curves: They.
-        upward: Most vertical force that the cables have to give beside their pulls [N].
-        ranges: Theirs.
+    freedom: rows that pick the free motions, (n, 6); upward: most vertical force that the cables have to give beside
+    their pulls [N].
     """
     free = 0.0
     for k in range(freedom.shape[0]):
@@ -143,13 +280,7 @@ def _fill_demand(
 ) -> None:
     """Fill what the chord tensions have to supply, with the pulls at the present ones.
 
-    Args:
-        curves: The cables.
-        place: Where they stand.
-        center: Row of the body_table.
-        load: Wrench, (6,).
-        centered: Tensions; filled.
-        ranges: Its pulls are filled.
+    load: wrench, (6,); centered: tensions; filled; ranges: its pulls are filled.
     """
     n, m = place.matrix.shape
     sag_forces_at(curves, centered.tau, ranges.pull)
@@ -180,8 +311,7 @@ def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
 def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered) -> bool:
     """Fill the limits between which tensions are sought: those of the box, less what is taken (m,).
 
-    Returns:
-        Whether there is room between them.
+    Returns whether there is room between them.
     """
     possible = True
     for i in range(taken.size):
@@ -200,8 +330,7 @@ def center_tensions(
 ) -> tuple[float, float]:
     """Let tensions between the limits of the search balance a wrench (6,), with their own pulls.
 
-    Returns:
-        The square of what they leave [N^2], and the smoothing.
+    Returns the square of what they leave [N^2], and the smoothing.
     """
     rounds = ROUNDS if curves.model.code == CATENARY else 1
     square, smoothing = 0.0, 0.0

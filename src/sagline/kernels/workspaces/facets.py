@@ -36,22 +36,15 @@ MEMBERS: Final = np.array([([i for i in range(6) if bits >> i & 1] + [0] * 6)[:6
 
 
 class Facets(NamedTuple):
-    """State of the walk over the facets.
+    """State of the walk over the facets."""
 
-    Attributes:
-        table: A row for each column of the basis: along the m columns, in world axes, and the sum of the absolute
-            components, moments times the lever arm, (n, m + 7).
-        others: The columns that are not in the basis along its rows, each with a largest entry of 1, (r, n).
-        minors: Of the present subset and its beginnings, by sets of rows, (n, 2^n).
-        basis: The column of each row, (n,).
-        chosen: The present subset of the others, from place 1 on, (n + 1,).
-    """
-
+    # A row for each column of the basis: along the m columns, in world axes, and the sum of the absolute components,
+    # moments times the lever arm, (n, m + 7)
     table: Array
-    others: Array
-    minors: Array
-    basis: Indices
-    chosen: Indices
+    others: Array  # the columns that are not in the basis along its rows, each with a largest entry of 1, (r, n)
+    minors: Array  # of the present subset and its beginnings, by sets of rows, (n, 2^n)
+    basis: Indices  # the column of each row, (n,)
+    chosen: Indices  # the present subset of the others, from place 1 on, (n + 1,)
 
 
 @glue

@@ -11,8 +11,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels.balance.freedom import is_rotation
-from sagline.kernels.balance.wrench import fill_structure_matrix, rows_along_freedom
+from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
@@ -22,43 +21,25 @@ MOTIONS = 6  # three of translation, three of rotation
 
 
 class PoseRange(NamedTuple):
-    """A box of poses.
+    """A box of poses."""
 
-    Attributes:
-        half: Half edges [m], (3,).
-        turn: Largest turn away from the orientation at the middle [rad].
-    """
-
-    half: Array
-    turn: float
+    half: Array  # half edges [m], (3,)
+    turn: float  # largest turn away from the orientation at the middle [rad]
 
 
 class CablesInBox(NamedTuple):
-    """The cables of one pose, the middle of a box, and how far from there they get in the box.
+    """The cables of one pose, the middle of a box, and how far from there they get in the box."""
 
-    Attributes:
-        rows: Free motions, those that turn per lever arm, so that all components are in newtons, (n, 6).
-        full: Structure matrix, (6, m).
-        matrix: Its components along the rows, (n, m).
-        lever: From center of mass to platform end, world axes [m], (3, m).
-        slopes: Of the structure matrix with each motion of the platform, (MOTIONS, 6 * m).
-        way: How far a platform end goes [m], (m,).
-        turned: How far a unit vector goes, (m,).
-        bent: How far it gets from where its slopes lead, (m,).
-        swung: How far a lever goes [m], (m,).
-        curled: How far it gets from where its slopes lead [m], (m,).
-    """
-
-    rows: Array
-    full: Array
-    matrix: Array
-    lever: Array
-    slopes: Array
-    way: Array
-    turned: Array
-    bent: Array
-    swung: Array
-    curled: Array
+    rows: Array  # free motions, those that turn per lever arm, so that all components are in newtons, (n, 6)
+    full: Array  # structure matrix, (6, m)
+    matrix: Array  # its components along the rows, (n, m)
+    lever: Array  # from center of mass to platform end, world axes [m], (3, m)
+    slopes: Array  # of the structure matrix with each motion of the platform, (MOTIONS, 6 * m)
+    way: Array  # how far a platform end goes [m], (m,)
+    turned: Array  # how far a unit vector goes, (m,)
+    bent: Array  # how far it gets from where its slopes lead, (m,)
+    swung: Array  # how far a lever goes [m], (m,)
+    curled: Array  # how far it gets from where its slopes lead [m], (m,)
 
 
 @glue
@@ -81,13 +62,9 @@ def set_cables_in_box(
 ) -> bool:
     """Fill a place from the geometry of its cables; False where a platform end may meet its frame end in the box.
 
-    Args:
-        freedom: Rows that pick the free motions, (n, 6).
-        geometry: Rows of `cable_geometry` at the middle, (GEOMETRY_ROWS, m).
-        rotation: Platform -> world at the middle, (3, 3).
-        center: Center of mass in the platform frame [m], (3,).
-        box: The box.
-        place: Filled.
+    freedom: rows that pick the free motions, (n, 6); geometry: rows of `cable_geometry` at the middle, (GEOMETRY_ROWS,
+    m); rotation: platform -> world at the middle, (3, 3); center: center of mass in the platform frame [m], (3,);
+    place: filled.
     """
     n, m = place.matrix.shape
     fill_structure_matrix(geometry, place.full)

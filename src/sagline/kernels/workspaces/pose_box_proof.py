@@ -19,19 +19,18 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block
+from sagline.kernels.workspaces.box_proofs import Precision, proves_inside, proves_outside
 from sagline.kernels.workspaces.box_tensions import (
     Ranges,
     center_tensions,
     in_wrench_space,
+    new_centered,
     search_limits,
     set_ranges,
     tighten,
 )
-from sagline.kernels.workspaces.centered import new_centered
-from sagline.kernels.workspaces.inside import Precision, proves_inside
-from sagline.kernels.workspaces.loads import Loads, farthest, reach_of_loads
-from sagline.kernels.workspaces.outside import proves_outside
 from sagline.kernels.workspaces.pose_box import PoseRange, new_cables_in_box, set_cables_in_box
+from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_loads
 
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn

@@ -17,9 +17,8 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
 from sagline.kernels import tables
-from sagline.kernels.balance.freedom import is_rotation
 from sagline.kernels.balance.setting import TensionLimits, place_cables
-from sagline.kernels.balance.wrench import fill_structure_matrix, rows_along_freedom
+from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
@@ -36,16 +35,6 @@ from sagline.kernels.codes import (
 )
 from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory, block
-from sagline.kernels.workspaces.bands import (
-    BAND_ROWS,
-    HIGH,
-    LEAST,
-    LOW,
-    MOST,
-    PULL_HIGH,
-    PULL_LOW,
-    fill_bands,
-)
 from sagline.kernels.workspaces.facets import (
     DEPENDENT,
     LIMIT,
@@ -56,6 +45,16 @@ from sagline.kernels.workspaces.facets import (
     choose_basis,
     new_facets,
     next_subset,
+)
+from sagline.kernels.workspaces.sag_force_bounds import (
+    BAND_ROWS,
+    HIGH,
+    LEAST,
+    LOW,
+    MOST,
+    PULL_HIGH,
+    PULL_LOW,
+    fill_bands,
 )
 from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSetArrays, new_set, place_set, reach_of_set
 
@@ -98,23 +97,15 @@ Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 
 
 
 class _FacetWeights(NamedTuple):
-    """Weights of the facets of one pose.
+    """Weights of the facets of one pose."""
 
-    Attributes:
-        rows: Of the cables, (COUNT_ROWS, m).
-        points: What the cables give in the middle of their ends, and of their pulls' ranges, less the demand, (2, 6).
-        high: Upper limits [N], (m,).
-        endless: Whether a cable has none.
-        arm: Lever arm of the norm [m].
-        lever: Mean lever arm [m], by which moments are divided while normals are looked for; 1 without any.
-    """
-
-    rows: Array
+    rows: Array  # of the cables, (COUNT_ROWS, m)
+    # what the cables give in the middle of their ends, and of their pulls' ranges, less the demand, (2, 6)
     points: Array
-    high: Array
-    endless: bool
-    arm: float
-    lever: float
+    high: Array  # upper limits [N], (m,)
+    endless: bool  # whether a cable has none
+    arm: float  # lever arm of the norm [m]
+    lever: float  # mean lever arm [m], by which moments are divided while normals are looked for; 1 without any
 
 
 @entry

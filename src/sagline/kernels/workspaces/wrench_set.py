@@ -1,4 +1,7 @@
-"""Support function of a set of loads against a direction: the sum of those of its parts."""
+"""Sets of wrenches on the platform: support function for margins, and extent from the center for proofs.
+
+docs/model.md, section 13.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +10,90 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import tables
-from sagline.kernels.jit import glue, kernel
+from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
+
+
+class Loads(NamedTuple):
+    """A set of wrenches on the platform, as in `WrenchSet`, whose corners are counted from their mean."""
+
+    center: Array  # (6,)
+    segments: Array  # (S, 6)
+    ellipsoids: Array  # (E, 6, 6)
+    corners: Array  # (C, 6)
+    sizes: Indices  # corners of each polytope, (P,)
+
+
+@formula
+def dot6(a: Array, b: Array) -> float:
+    """Inner product of two wrenches."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+
+
+@formula
+def _along_axis(axes: Array, k: int, against: Array) -> float:
+    """Inner product of column k of an ellipsoid's matrix (6, 6) and a direction (6,)."""
+    along = 0.0
+    for a in range(6):
+        along += axes[a, k] * against[a]
+    return along
+
+
+@formula
+def _reach_of_ellipsoid(axes: Array, against: Array) -> float:
+    """Extent of an ellipsoid to either side of its center."""
+    square = 0.0
+    for k in range(6):
+        along = _along_axis(axes, k, against)
+        square += along * along
+    return math.sqrt(square)
+
+
+@kernel
+def reach_of_loads(loads: Loads, against: Array) -> float:
+    """Largest -against . (w - center) over the set."""
+    most = 0.0
+    for s in range(loads.segments.shape[0]):
+        most += abs(dot6(loads.segments[s], against))
+    for e in range(loads.ellipsoids.shape[0]):
+        most += _reach_of_ellipsoid(loads.ellipsoids[e], against)
+    first = 0
+    for p in range(loads.sizes.size):
+        best = -math.inf
+        for c in range(first, first + loads.sizes[p]):
+            best = max(best, -dot6(loads.corners[c], against))
+        most += best
+        first += loads.sizes[p]
+    return most
+
+
+@kernel
+def farthest(loads: Loads, against: Array, wrench: Array) -> None:
+    """Fill the wrench of the set that goes farthest against a direction, (6,)."""
+    for a in range(6):
+        wrench[a] = loads.center[a]
+    for s in range(loads.segments.shape[0]):
+        sign = -1.0 if dot6(loads.segments[s], against) > 0.0 else 1.0
+        for a in range(6):
+            wrench[a] += sign * loads.segments[s, a]
+    for e in range(loads.ellipsoids.shape[0]):
+        axes = loads.ellipsoids[e]
+        length = _reach_of_ellipsoid(axes, against)
+        if length > 0.0:
+            for k in range(6):
+                share = _along_axis(axes, k, against) / length
+                for a in range(6):
+                    wrench[a] -= axes[a, k] * share
+    first = 0
+    for p in range(loads.sizes.size):
+        best = first
+        for c in range(first, first + loads.sizes[p]):
+            if dot6(loads.corners[c], against) < dot6(loads.corners[best], against):
+                best = c
+        for a in range(6):
+            wrench[a] += loads.corners[best, a]
+        first += loads.sizes[p]
+
 
 # as it comes from Python: center (6,), half (6,), segments (S, 6), ellipsoids (E, 6, 6), corners (C, 6), sizes (P,),
 # accelerations (2,), inertias (1 or R, 3, 3)
@@ -16,21 +101,13 @@ SetTerms = tuple[Array, Array, Array, Array, Array, Indices, Array, Array]
 
 
 class WrenchSetArrays(NamedTuple):
-    """A set of loads at one pose, in world axes about the center of mass.
+    """A set of loads at one pose, in world axes about the center of mass."""
 
-    Attributes:
-        own: Segments of the pose: a box, those of linear acceleration within it, and of angular ones, (9, 6).
-        segments: Each adds all between minus and plus itself, (S, 6).
-        ellipsoids: Each A adds A^T s for all s no longer than 1, (E, 6, 6).
-        corners: Of polytopes, those of one after those of the other, (C, 6).
-        sizes: How many corners each polytope has, (P,).
-    """
-
-    own: Array
-    segments: Array
-    ellipsoids: Array
-    corners: Array
-    sizes: Indices
+    own: Array  # segments of the pose: a box, those of linear acceleration within it, and of angular ones, (9, 6)
+    segments: Array  # each adds all between minus and plus itself, (S, 6)
+    ellipsoids: Array  # each A adds A^T s for all s no longer than 1, (E, 6, 6)
+    corners: Array  # of polytopes, those of one after those of the other, (C, 6)
+    sizes: Indices  # how many corners each polytope has, (P,)
 
 
 @glue
@@ -66,13 +143,7 @@ def reach_of_set(
 ) -> None:
     """Fill the largest -y . w and the largest y . w [N] of the first so many normals.
 
-    Args:
-        wrenches: The set.
-        normals: y, (6, B).
-        count: How many.
-        work: To work in, (2, B).
-        against: Filled, (B,).
-        along: Filled, (B,).
+    normals: y, (6, B); work: to work in, (2, B); against: filled, (B,); along: filled, (B,).
     """
     for b in range(count):
         against[b] = 0.0

@@ -1,0 +1,204 @@
+"""Small dense systems: Cholesky factor, Gauss elimination, orthonormal frames, and Householder factors.
+
+For a matrix (n, m), n <= m, matrix.T = Q R: the first n columns of the orthogonal Q give the minimum-norm solutions,
+the others span the null space. Sums that do not depend on each other run side by side: the loops are small and would
+otherwise wait for themselves.
+"""
+
+from __future__ import annotations
+
+import math
+
+from sagline.core.arrays import Array
+from sagline.kernels.jit import formula, kernel
+
+LEAST_PIVOT = 1e-15  # of the diagonal element it is left of: smaller ones are rounding
+
+
+@kernel
+def factor_positive(matrix: Array, shift: float, factor: Array) -> bool:
+    """Fill the lower triangle of the factor L of matrix + shift 1, (n, n); False if that is not positive definite.
+
+    Of the matrix only the lower triangle counts; factor may be the matrix itself.
+    """
+    n = matrix.shape[0]
+    for j in range(n):
+        diagonal = matrix[j, j] + shift
+        pivot = diagonal
+        for k in range(j):
+            pivot -= factor[j, k] * factor[j, k]
+        if not pivot > LEAST_PIVOT * abs(diagonal):
+            return False
+        root = math.sqrt(pivot)
+        inverse = 1.0 / root
+        factor[j, j] = root
+        for i in range(j + 1, n):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            factor[i, j] = total * inverse
+    return True
+
+
+@kernel
+def solve_lower(factor: Array, vector: Array) -> None:
+    """Replace a vector (n,) by x with L x = vector."""
+    for k in range(vector.size):
+        for j in range(k):
+            vector[k] -= factor[k, j] * vector[j]
+        vector[k] /= factor[k, k]
+
+
+@kernel
+def solve_upper(factor: Array, vector: Array) -> None:
+    """Replace a vector (n,) by x with L^T x = vector."""
+    for k in range(vector.size - 1, -1, -1):
+        for j in range(k + 1, vector.size):
+            vector[k] -= factor[j, k] * vector[j]
+        vector[k] /= factor[k, k]
+
+
+@kernel
+def solve_general(matrix: Array, right: Array) -> bool:
+    """Gauss elimination with partial pivoting; matrix is destroyed, right becomes the solution; False if singular."""
+    n = matrix.shape[0]
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if not abs(matrix[best, k]) > 0.0:
+            return False
+        if best != k:
+            for j in range(k, n):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+            right[k], right[best] = right[best], right[k]
+        for i in range(k + 1, n):
+            ratio = matrix[i, k] / matrix[k, k]
+            for j in range(k + 1, n):
+                matrix[i, j] -= ratio * matrix[k, j]
+            right[i] -= ratio * right[k]
+    for r in range(n):
+        i = n - 1 - r
+        total = right[i]
+        for j in range(i + 1, n):
+            total -= matrix[i, j] * right[j]
+        right[i] = total / matrix[i, i]
+    return True
+
+
+@formula
+def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
+    """Take the first rows of an orthonormal frame (.., d), count of them, out of the row that follows them.
+
+    Fills column count of the triangle above its diagonal with the shares taken out; returns the square of what is left.
+    """
+    d = frame.shape[1]
+    for b in range(count):
+        triangle[b, count] = 0.0
+    for _ in range(2):
+        for b in range(count):
+            share = 0.0
+            for k in range(d):
+                share += frame[b, k] * frame[count, k]
+            triangle[b, count] += share
+            for k in range(d):
+                frame[count, k] -= share * frame[b, k]
+    square = 0.0
+    for k in range(d):
+        square += frame[count, k] * frame[count, k]
+    return square
+
+
+@formula
+def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> None:
+    """Make what `orthogonalize_row` left in row count, of a given square, a row of the frame."""
+    length = math.sqrt(square)
+    triangle[count, count] = length
+    for k in range(frame.shape[1]):
+        frame[count, k] /= length
+
+
+HEADS, FACTORS = 0, 1
+
+RANK = 1e-9  # a diagonal entry of R below this share of its row says that rank is lost
+
+
+@formula
+def factorize(reduced: Array, diagonals: Array) -> bool:
+    """QR in place; returns whether the matrix (n, m) has full rank.
+
+    Row k of reduced then holds column k of R before its diagonal and the k-th reflection's vector from there
+    on; row HEADS of diagonals (2, n) is the diagonal of R, row FACTORS the reflections' 2/|v|^2.
+    """
+    n, m = reduced.shape
+    for k in range(n):
+        before = 0.0
+        for i in range(k):
+            before += reduced[k, i] * reduced[k, i]
+        square = 0.0
+        for i in range(k, m):
+            square += reduced[k, i] * reduced[k, i]
+        if not square > RANK * RANK * (before + square):
+            return False
+        norm = math.sqrt(square)
+        first = reduced[k, k]
+        head = -math.copysign(norm, first)
+        factor = 1.0 / (norm * (norm + abs(first)))
+        diagonals[HEADS, k] = head
+        diagonals[FACTORS, k] = factor
+        reduced[k, k] = first - head
+        for j in range(k + 1, n):
+            total = 0.0
+            for i in range(k, m):
+                total += reduced[k, i] * reduced[j, i]
+            total *= factor
+            for i in range(k, m):
+                reduced[j, i] -= total * reduced[k, i]
+    return True
+
+
+@formula
+def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
+    """Fill Q (m, m) from its reflections; a row m of q is working space."""
+    n, m = reduced.shape
+    for i in range(m):
+        for j in range(m):
+            q[i, j] = 0.0
+        q[i, i] = 1.0
+    for k in range(n - 1, -1, -1):
+        for j in range(m):
+            q[m, j] = 0.0
+        for i in range(k, m):
+            for j in range(m):
+                q[m, j] += reduced[k, i] * q[i, j]
+        for i in range(k, m):
+            share = diagonals[FACTORS, k] * reduced[k, i]
+            for j in range(m):
+                q[i, j] -= share * q[m, j]
+
+
+@formula
+def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -> None:
+    """Fill the transposed pseudo-inverse (n, m): the minimum-norm solution is right . inverse."""
+    n, m = reduced.shape
+    for k in range(n - 1, -1, -1):
+        for i in range(m):
+            inverse[k, i] = q[i, k]
+        for j in range(k + 1, n):
+            for i in range(m):
+                inverse[k, i] -= reduced[j, k] * inverse[j, i]
+        head = 1.0 / diagonals[HEADS, k]
+        for i in range(m):
+            inverse[k, i] *= head
+
+
+@formula
+def minimum_norm(inverse: Array, right: Array, solution: Array) -> None:
+    """Fill the shortest solution (m,) of matrix solution = right (n,)."""
+    n, m = inverse.shape
+    for i in range(m):
+        solution[i] = 0.0
+    for k in range(n):
+        for i in range(m):
+            solution[i] += right[k] * inverse[k, i]
