@@ -18,7 +18,7 @@ from sagline.core.numbers import counted
 from sagline.core.progress import Progress
 from sagline.core.results import Result
 from sagline.core.status import Status
-from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN, OUTSIDE, prove_boxes, room_for
+from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN, OUTSIDE, memory_for_proofs, prove_boxes
 from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
@@ -84,7 +84,7 @@ class Prover:
         self.size = 0.5 * float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
         self.axes = np.eye(3) if robot.plane_normal is None else robot.plane_normal[None]
         self.deadline, self.tried, self._progress = np.inf, 0, progress
-        self._work = room_for(robot.cable_count)
+        self._work = memory_for_proofs(robot.cable_count)
         self._statuses = np.zeros(robot.cable_count, dtype=np.int8)
 
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:

@@ -93,7 +93,7 @@ def test_balance_of_a_pose(m: int, freedom: Array, variable: int) -> None:
             (cables.density, case.robot[:, tables.DENSITY]),
             (cables.stiffness, case.robot[:, tables.STIFFNESS]),
             (cables.half_weight, half),
-            (cables.pull, half),  # the first order
+            (cables.sag_force, half),  # the first order
             (cables.low, case.robot[:, tables.TENSION_MIN]),
             (cables.high, case.robot[:, tables.TENSION_MAX]),
         ):
@@ -109,7 +109,7 @@ def test_balance_of_a_pose(m: int, freedom: Array, variable: int) -> None:
         np.testing.assert_allclose(balance.inverse.T, np.linalg.pinv(scaled), atol=1e-13 * large**2)
         np.testing.assert_allclose(balance.null @ balance.null.T, np.eye(m - len(freedom)), atol=1e-14)
         np.testing.assert_allclose(scaled @ balance.null.T, 0.0, atol=1e-14 * np.abs(scaled).max())
-        cables.pull[:] = rng.uniform(0.0, 3.0, m)
+        cables.sag_force[:] = rng.uniform(0.0, 3.0, m)
         need(platform, cables, balance)
         np.testing.assert_allclose(balance.right, freedom @ balance.needed, atol=1e-13)
         start_from_minimum_norm(balance)
@@ -147,7 +147,7 @@ def test_the_bound_of_validity_lifts_the_lower_limit() -> None:
     bound = cables.half_weight * cables.cosine / np.abs(cables.sine) + 2.0
     np.testing.assert_allclose(cables.low, np.maximum(case.robot[:, tables.TENSION_MIN], bound / cables.cosine))
     assert (cables.low > case.robot[:, tables.TENSION_MIN]).any()
-    np.testing.assert_allclose(cables.pull, 4.9 * cables.density * cables.chord, rtol=1e-14)
+    np.testing.assert_allclose(cables.sag_force, 4.9 * cables.density * cables.chord, rtol=1e-14)
 
 
 def test_lost_rank_is_told() -> None:

@@ -31,9 +31,9 @@ def test_structure_matrices() -> None:
 def test_needed_wrench_balances_weight_load_and_pulls() -> None:
     case = random_case(np.random.default_rng(1), 8)
     geometry, needed = geometry_of(case), np.full(6, np.nan)
-    pull = np.random.default_rng(2).uniform(0.0, 5.0, 8)
-    needed_wrench(geometry, case.body, case.wrench, pull, needed)
-    hanging = np.outer(-pull, [0.0, 0.0, 1.0])  # of each cable on the platform, at its end
+    sag_force = np.random.default_rng(2).uniform(0.0, 5.0, 8)
+    needed_wrench(geometry, case.body, case.wrench, sag_force, needed)
+    hanging = np.outer(-sag_force, [0.0, 0.0, 1.0])  # of each cable on the platform, at its end
     forces = hanging.sum(axis=0) + np.array([0.0, 0.0, -5.0 * GRAVITY]) + case.wrench[:3]
     moments = np.cross(geometry[g.LEVER_X :].T, hanging).sum(axis=0) + case.wrench[3:]
     np.testing.assert_allclose(needed, -np.concatenate((forces, moments)), atol=1e-13)

@@ -1,4 +1,4 @@
-"""Cables of one pose as kernels take them, and their pulls one by one: the reference of their curves."""
+"""Cables of one pose as kernels take them, and their sag forces one by one: the reference of their curves."""
 
 from __future__ import annotations
 

@@ -23,24 +23,24 @@ def exact_end(t_x: Decimal, t_z: Decimal, length: Decimal, w: Decimal, ea: Decim
 def length_and_pull(
     span: float, rise: float, w: float, ea: float, tension: float, near: tuple[float, float]
 ) -> tuple[Decimal, Decimal]:
-    """Unstrained length and T_z - tau sin phi at a chord tension, by Newton steps from a length and a pull nearby."""
+    """Unstrained length and T_z - tau sin phi at a chord tension, by Newton steps from values nearby."""
     with localcontext() as context:
         context.prec = DIGITS
         x, z, weight, stiffness = (Decimal(v) for v in (span, rise, w, ea))
         chord = (x * x + z * z).sqrt()
         t_x, base = Decimal(tension) * x / chord, Decimal(tension) * z / chord
-        length, pull = Decimal(near[0]), Decimal(near[1])
+        length, sag_force = Decimal(near[0]), Decimal(near[1])
         for _ in range(40):
-            here = exact_end(t_x, base + pull, length, weight, stiffness)
-            by_length = exact_end(t_x, base + pull, length * (1 + SMALL), weight, stiffness)
-            by_pull = exact_end(t_x, base + pull * (1 + SMALL), length, weight, stiffness)
+            here = exact_end(t_x, base + sag_force, length, weight, stiffness)
+            by_length = exact_end(t_x, base + sag_force, length * (1 + SMALL), weight, stiffness)
+            by_sag_force = exact_end(t_x, base + sag_force * (1 + SMALL), length, weight, stiffness)
             a, c = ((v - u) / (length * SMALL) for u, v in zip(here, by_length, strict=True))
-            b, d = ((v - u) / (pull * SMALL) for u, v in zip(here, by_pull, strict=True))
+            b, d = ((v - u) / (sag_force * SMALL) for u, v in zip(here, by_sag_force, strict=True))
             miss_x, miss_z = x - here[0], z - here[1]
             determinant = a * d - b * c
             step = (d * miss_x - b * miss_z) / determinant
             length += step
-            pull += (a * miss_z - c * miss_x) / determinant
+            sag_force += (a * miss_z - c * miss_x) / determinant
             if abs(step) < Decimal("1e-32") * length:
-                return length, pull
+                return length, sag_force
     raise ArithmeticError("no cable found near there")

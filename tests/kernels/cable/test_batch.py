@@ -55,10 +55,12 @@ def test_many_at_their_tensions(code: int) -> None:
     length, horizontal, vertical, status = solve(terms, *given, count=COUNT)
     for i, (x, z, density, stiffness, tension) in enumerate(zip(*given, strict=True)):
         d = float(np.hypot(x, z))
-        one, pull, verdict = from_tension(Model(*terms), Chord(d, z / d, x / d), Material(density, stiffness), tension)
+        one, sag_force, verdict = from_tension(
+            Model(*terms), Chord(d, z / d, x / d), Material(density, stiffness), tension
+        )
         assert length[i] == pytest.approx(one, rel=1e-14)
         assert horizontal[i] == pytest.approx(tension * x / d, rel=1e-14)
-        assert vertical[i] == pytest.approx(tension * z / d + pull, rel=1e-13, abs=1e-13 * tension)
+        assert vertical[i] == pytest.approx(tension * z / d + sag_force, rel=1e-13, abs=1e-13 * tension)
         assert status[i] == verdict
 
 
@@ -68,8 +70,10 @@ def test_ordinary_cables_to_the_last_digit(largest: float) -> None:
     density = density / 3.0  # X up to 2
     length, _, vertical, _ = solve((CATENARY, 0.0, 0.0, GRAVITY), span, rise, density, stiffness, tension, count=60)
     for i in range(60):
-        pull = vertical[i] - tension[i] * rise[i] / np.hypot(span[i], rise[i])
-        exact, _ = length_and_pull(span[i], rise[i], density[i] * GRAVITY, stiffness[i], tension[i], (length[i], pull))
+        sag_force = vertical[i] - tension[i] * rise[i] / np.hypot(span[i], rise[i])
+        exact, _ = length_and_pull(
+            span[i], rise[i], density[i] * GRAVITY, stiffness[i], tension[i], (length[i], sag_force)
+        )
         assert length[i] == pytest.approx(float(exact), rel=1e-14)
 
 

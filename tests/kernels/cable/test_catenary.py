@@ -16,7 +16,7 @@ ordinary_length_ratio = from_python(c.ordinary_length_ratio)
 ordinary_length_ratio_near = from_python(c.ordinary_length_ratio_near)
 ordinary_sag_force_ratio = from_python(c.ordinary_sag_force_ratio)
 length_ratio = from_python(c.length_ratio)
-pull_ratio = from_python(c.pull_ratio)
+sag_force_ratio = from_python(c.sag_force_ratio)
 catenary_from_length = from_python(c.catenary_from_length)
 catenary_end = from_python(c.catenary_end)
 
@@ -29,8 +29,10 @@ def exact(half_weight: float, sine: float, strain: float, near: tuple[float, flo
     cosine = math.sqrt(1.0 - sine * sine)
     size = math.hypot(cosine, sine)
     # D = size rather than 1 in the last digit: X and e are those of tau = 1
-    length, pull = length_and_pull(cosine, sine, 2.0 * half_weight / size, 1.0 / strain, 1.0, (near[0] * size, near[1]))
-    return float(length / Decimal(size)), float(pull), cosine
+    length, sag_force = length_and_pull(
+        cosine, sine, 2.0 * half_weight / size, 1.0 / strain, 1.0, (near[0] * size, near[1])
+    )
+    return float(length / Decimal(size)), float(sag_force), cosine
 
 
 @pytest.mark.parametrize("sine", SLOPES)
@@ -40,11 +42,11 @@ def test_length_and_pull_at_a_chord_tension(half_weight: float, strain: float, s
     cosine = math.sqrt(1.0 - sine * sine)
     ratio, status = length_ratio(half_weight, sine, cosine, strain)
     assert status == CABLE_SOLVED
-    pull = pull_ratio(half_weight, sine, strain, ratio)
-    length, force, _ = exact(half_weight, sine, strain, (ratio, pull))
+    sag_force = sag_force_ratio(half_weight, sine, strain, ratio)
+    length, force, _ = exact(half_weight, sine, strain, (ratio, sag_force))
     # a U's length grows like exp X: rounding of X grows with it
     assert ratio == pytest.approx(length, rel=LAST_DIGITS * max(1.0, half_weight))
-    assert pull == pytest.approx(force, rel=LAST_DIGITS * max(1.0, half_weight), abs=1e-15)
+    assert sag_force == pytest.approx(force, rel=LAST_DIGITS * max(1.0, half_weight), abs=1e-15)
 
 
 @pytest.mark.parametrize("sine", SLOPES)
@@ -56,10 +58,10 @@ def test_ordinary_cables_without_branches(half_weight: float, sine: float) -> No
         ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
         if strain > c.TAUT_STRAIN:
             ratio = ordinary_length_ratio_near(half_weight, sine, cosine, strain, ratio)
-        pull = ordinary_sag_force_ratio(half_weight, sine, strain, ratio)
-        length, force, _ = exact(half_weight, sine, strain, (ratio, pull))
+        sag_force = ordinary_sag_force_ratio(half_weight, sine, strain, ratio)
+        length, force, _ = exact(half_weight, sine, strain, (ratio, sag_force))
         assert ratio == pytest.approx(length, rel=LAST_DIGITS)
-        assert pull == pytest.approx(force, rel=LAST_DIGITS, abs=1e-15)
+        assert sag_force == pytest.approx(force, rel=LAST_DIGITS, abs=1e-15)
 
 
 @pytest.mark.parametrize("sine", SLOPES)
@@ -108,12 +110,12 @@ def test_forces_at_a_length_put_the_end_where_it_is(case: tuple[float, ...]) -> 
     force, status = catenary_from_length(*case)
     assert status == CABLE_SOLVED
     chord = math.hypot(span, rise)
-    pull = force.vertical - force.tension * rise / chord
-    found, exact_pull = length_and_pull(span, rise, weight, stiffness, force.tension, (length, pull))
+    sag_force = force.vertical - force.tension * rise / chord
+    found, exact_pull = length_and_pull(span, rise, weight, stiffness, force.tension, (length, sag_force))
     assert force.horizontal == pytest.approx(force.tension * span / chord, rel=1e-14)
     assert force.vertical == pytest.approx(float(exact_pull) + force.tension * rise / chord, rel=1e-12)
     # the tension to its own last digits: a change of it by 1e-13 shows in the length
-    slightly, _ = length_and_pull(span, rise, weight, stiffness, force.tension * (1.0 + 1e-13), (length, pull))
+    slightly, _ = length_and_pull(span, rise, weight, stiffness, force.tension * (1.0 + 1e-13), (length, sag_force))
     assert abs(found - Decimal(length)) <= max(abs(slightly - found), Decimal(4e-16 * length))
 
 

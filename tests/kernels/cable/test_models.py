@@ -23,7 +23,7 @@ from tests.kernels.compiled import from_python
 
 from_tension = from_python(models.from_tension)
 from_length = from_python(models.from_length)
-pull_of_shallow = from_python(models.pull_of_shallow)
+shallow_sag_force = from_python(models.shallow_sag_force)
 
 GRAVITY = 9.81
 K_H, K_P = 4.9, 4.0
@@ -43,7 +43,7 @@ def test_pulls_of_first_order() -> None:
         (PARABOLIC_MODEL, 0.5 * 0.067 * GRAVITY * 5.0),
         (EXACT, 0.5 * 0.067 * GRAVITY * 5.0),
     ):
-        assert pull_of_shallow(model, 5.0, 0.067) == pytest.approx(expected, rel=1e-15)
+        assert shallow_sag_force(model, 5.0, 0.067) == pytest.approx(expected, rel=1e-15)
 
 
 @pytest.mark.parametrize("chord", [CHORD, FALLING])
@@ -53,23 +53,23 @@ def test_lengths_and_pulls_as_printed(tension: float, chord: Chord) -> None:
     assert from_tension(STRAIGHT_MODEL, chord, CABLE, tension) == (d, 0.0, CABLE_SOLVED)
     assert from_tension(ELASTIC_MODEL, chord, CABLE, tension)[0] == pytest.approx(d / (1.0 + tension / 44e3), rel=1e-15)
 
-    length, pull, status = from_tension(PARABOLIC_MODEL, chord, CABLE, tension)
+    length, sag_force, status = from_tension(PARABOLIC_MODEL, chord, CABLE, tension)
     sag = (GRAVITY * 0.067 * d * cosine / tension) ** 2 / 24.0
     assert length == pytest.approx(d * (1.0 + sag) / (1.0 + tension / 44e3), rel=1e-15)
-    assert pull == pytest.approx(0.5 * 0.067 * GRAVITY * d, rel=1e-15)
+    assert sag_force == pytest.approx(0.5 * 0.067 * GRAVITY * d, rel=1e-15)
     assert status == CABLE_SOLVED
 
-    length, pull, status = from_tension(EMPIRICAL_MODEL, chord, CABLE, tension)
+    length, sag_force, status = from_tension(EMPIRICAL_MODEL, chord, CABLE, tension)
     end = math.hypot(tension * cosine, tension * sine + K_H * 0.067 * d)
     sag = K_P * (0.067 * d * cosine / tension) ** 2
     assert length == pytest.approx(d * (1.0 + sag) / (1.0 + end / 44e3), rel=1e-15)
-    assert pull == pytest.approx(K_H * 0.067 * d, rel=1e-15)
+    assert sag_force == pytest.approx(K_H * 0.067 * d, rel=1e-15)
     assert status == CABLE_SOLVED
 
-    length, pull, status = from_tension(EXACT, chord, CABLE, tension)
-    expected = length_and_pull(d * cosine, d * sine, 0.067 * GRAVITY, 44e3, tension, (length, pull))
+    length, sag_force, status = from_tension(EXACT, chord, CABLE, tension)
+    expected = length_and_pull(d * cosine, d * sine, 0.067 * GRAVITY, 44e3, tension, (length, sag_force))
     assert length == pytest.approx(float(expected[0]), rel=6e-15)
-    assert pull == pytest.approx(float(expected[1]), rel=6e-15, abs=1e-15 * tension)
+    assert sag_force == pytest.approx(float(expected[1]), rel=6e-15, abs=1e-15 * tension)
     assert status == CABLE_SOLVED
 
 
@@ -77,13 +77,13 @@ def test_lengths_and_pulls_as_printed(tension: float, chord: Chord) -> None:
 @pytest.mark.parametrize("model", [ELASTIC_MODEL, EMPIRICAL_MODEL, PARABOLIC_MODEL, EXACT])
 def test_there_and_back(model: Model, chord: Chord) -> None:
     for tension in (4.0, 60.0, 2000.0):
-        length, pull, status = from_tension(model, chord, CABLE, tension)
+        length, sag_force, status = from_tension(model, chord, CABLE, tension)
         force, again = from_length(model, chord.length * chord.cosine, chord.length * chord.sine, CABLE, length)
         assert again == status
         # a last digit of the length is EA times as much tension, where the cable is taut
         assert force.tension == pytest.approx(tension, rel=1e-11, abs=44e3 * 4e-16)
         assert force.horizontal == pytest.approx(force.tension * chord.cosine, rel=1e-14)
-        assert force.vertical - force.tension * chord.sine == pytest.approx(pull, rel=1e-11, abs=1e-11)
+        assert force.vertical - force.tension * chord.sine == pytest.approx(sag_force, rel=1e-11, abs=1e-11)
 
 
 def test_what_models_cannot_answer() -> None:
@@ -94,10 +94,10 @@ def test_what_models_cannot_answer() -> None:
     assert (force.tension, status) == (0.0, CABLE_SLACK)
     assert from_length(PARABOLIC_MODEL, 0.0, 3.0, CABLE, 3.5)[1] == CABLE_SLACK  # a vertical line has no sag
     for model in (PARABOLIC_MODEL, EMPIRICAL_MODEL, EXACT):
-        length, pull, status = from_tension(model, CHORD, CABLE, 0.5 * 0.067 * GRAVITY * 5.0 / 501.0)
+        length, sag_force, status = from_tension(model, CHORD, CABLE, 0.5 * 0.067 * GRAVITY * 5.0 / 501.0)
         assert status == CABLE_TOO_SLACK
         assert math.isnan(length)
-        assert math.isnan(pull)
+        assert math.isnan(sag_force)
 
 
 def test_the_empirical_model_is_valid_while_its_lowest_point_lies_outside_the_span() -> None:
@@ -111,9 +111,9 @@ def test_the_empirical_model_is_valid_while_its_lowest_point_lies_outside_the_sp
 
 def test_a_weightless_cable_is_elastic_in_every_model() -> None:
     for model in (EMPIRICAL_MODEL, PARABOLIC_MODEL, EXACT):
-        length, pull, _ = from_tension(model, CHORD, Material(0.0, 1e4), 50.0)
+        length, sag_force, _ = from_tension(model, CHORD, Material(0.0, 1e4), 50.0)
         assert length == pytest.approx(5.0 / 1.005, rel=1e-15)
-        assert pull == 0.0
+        assert sag_force == 0.0
         force, status = from_length(model, 4.0, 3.0, Material(0.0, 1e4), length)
         assert force.tension == pytest.approx(50.0, rel=1e-11)
         assert status == CABLE_SOLVED

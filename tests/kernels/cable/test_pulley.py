@@ -130,17 +130,17 @@ def there_and_back(count: int, seed: int) -> tuple[Array, Array, Array, Array]:
         over = Pulley(*(float(x) for x in cables[i, tables.PULLEY_RADIUS :]))
         line = Chord(float(chord[i]), math.sin(slope[i]), math.cos(slope[i]))
         material = Material(float(cables[i, tables.DENSITY]), float(cables[i, tables.STIFFNESS]))
-        free, pull, status = solve_cable_state(model, line, material, over, float(tension[i]))
+        free, sag_force, status = solve_cable_state(model, line, material, over, float(tension[i]))
         assert status == CABLE_SOLVED
         horizontal, weight = tension[i] * line.cosine, material.density * GRAVITY
-        vertical = tension[i] * line.sine + pull
+        vertical = tension[i] * line.sine + sag_force
         for _ in range(30):  # until free and wrapped length are those of one angle to the last digit
             angle = math.atan2(horizontal, over.entry * (vertical - weight * free))
             span, rise = free_span(over, line, math.cos(angle)), free_rise(over, line, math.sin(angle))
             own = math.hypot(span, rise)
             taut = horizontal * own / span
-            free, pull, status = from_tension(model, Chord(own, rise / own, span / own), material, taut)
-            vertical = taut * rise / own + pull
+            free, sag_force, status = from_tension(model, Chord(own, rise / own, span / own), material, taut)
+            vertical = taut * rise / own + sag_force
         leaving = math.hypot(horizontal, vertical - weight * free)
         rows[g.LENGTH, i] = free + sum(behind_cable(model, material, over, leaving, wrap(angle)))
     for _ in range(8):  # from where the last pose left it, as the platform's own steps do

@@ -1,4 +1,4 @@
-"""Where pulls turn, against the sign of their differences on fine grids."""
+"""Where sag forces turn, against the sign of their differences on fine grids."""
 
 import numpy as np
 import pytest
@@ -10,10 +10,10 @@ GRID = 3000
 
 
 def turns_on_a_grid(curves: Curves, i: int) -> tuple[list[float], list[float]]:
-    """Tensions on a fine grid at which the pull has a least and a largest value between its neighbors."""
+    """Tensions on a fine grid at which the sag force has a least and a largest value between its neighbors."""
     tensions = np.geomspace(curves.cables.low[i], curves.cables.high[i], GRID)
-    pulls = pulls_of(curves, i, tensions)
-    step = np.diff(pulls)
+    sag_forces = pulls_of(curves, i, tensions)
+    step = np.diff(sag_forces)
     step[np.abs(step) < 1e-13 * curves.cables.half_weight[i]] = 0.0
     falls_then_rises = np.flatnonzero((step[:-1] < 0) & (step[1:] > 0)) + 1
     rises_then_falls = np.flatnonzero((step[:-1] > 0) & (step[1:] < 0)) + 1

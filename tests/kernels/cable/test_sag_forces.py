@@ -52,7 +52,7 @@ def test_the_most_along_a_direction_is_that_of_a_fine_grid_where_an_end_is_best(
             size = np.abs(values).max() + abs(hanging) * float(curves.cables.half_weight[i])
             assert bound >= values.max() - 1e-9 * size
             end = values[-1] if along > 0 else values[0]
-            # where the tension's share outweighs the steepest pull, the better end is the answer
+            # where the tension's share outweighs the steepest sag force, the better end is the answer
             slope = np.abs(np.diff(values - along * tensions) / np.diff(tensions)).max()
             if abs(along) > 3.0 * slope:
                 exact += 1
@@ -77,17 +77,17 @@ def test_all_pulls_at_once_are_those_one_by_one() -> None:
     for _ in range(20):
         curves = random_curves(rng, 8)
         tau = np.sqrt(curves.cables.low * curves.cables.high)
-        pull, slope, bend = np.empty(8), np.empty(8), np.empty(8)
-        sag_forces_at(curves, tau, pull)
+        sag_force, slope, bend = np.empty(8), np.empty(8), np.empty(8)
+        sag_forces_at(curves, tau, sag_force)
         expected = np.array([pulls_of(curves, i, tau[i : i + 1])[0] for i in range(8)])
-        np.testing.assert_allclose(pull, expected, rtol=1e-12, atol=1e-12 * curves.cables.half_weight.max())
+        np.testing.assert_allclose(sag_force, expected, rtol=1e-12, atol=1e-12 * curves.cables.half_weight.max())
         slopes_at(curves, tau, slope, bend)
         for i in range(8):  # five-point differences of steps twenty times wider
             h = 2e-3 * tau[i]
             p = pulls_of(curves, i, tau[i] + h * np.array([-2, -1, 0, 1, 2]))
             assert slope[i] == pytest.approx((p[0] - 8 * p[1] + 8 * p[3] - p[4]) / (12 * h), rel=1e-6, abs=1e-9)
             second = (-p[0] + 16 * p[1] - 30 * p[2] + 16 * p[3] - p[4]) / (12 * h * h)
-            if curves.cables.half_weight[i] > 0.2 * tau[i]:  # of tauter cables it shows the pull's own rounding
+            if curves.cables.half_weight[i] > 0.2 * tau[i]:  # of tauter cables it shows the sag force's own rounding
                 assert bend[i] == pytest.approx(second, rel=1e-2)
 
 
@@ -95,8 +95,8 @@ def test_all_pulls_at_once_are_those_one_by_one() -> None:
 def test_other_models_pull_alike_at_every_tension(model: int) -> None:
     curves = with_turns(random_curves(np.random.default_rng(5), 4, model))
     assert np.isnan(curves.turns).all()
-    slope, bend, pull, no_tension = np.empty(4), np.empty(4), np.empty(4), np.zeros(4)
+    slope, bend, sag_force, no_tension = np.empty(4), np.empty(4), np.empty(4), np.zeros(4)
     slopes_at(curves, no_tension, slope, bend)
     np.testing.assert_array_equal((slope, bend), 0.0)
-    sag_forces_at(curves, no_tension, pull)
-    np.testing.assert_allclose(pull, [pulls_of(curves, i, curves.cables.low[i : i + 1])[0] for i in range(4)])
+    sag_forces_at(curves, no_tension, sag_force)
+    np.testing.assert_allclose(sag_force, [pulls_of(curves, i, curves.cables.low[i : i + 1])[0] for i in range(4)])

@@ -46,12 +46,12 @@ def assert_exact(cables: Cables) -> None:
     for i in range(cables.tau.size):
         chord, tau = cables.chord[i], cables.tau[i]
         x, z = chord * cables.cosine[i], chord * cables.sine[i]
-        length, pull = length_and_pull(
-            x, z, cables.density[i] * GRAVITY, cables.stiffness[i], tau, (cables.ratio[i] * chord, cables.pull[i])
+        length, sag_force = length_and_pull(
+            x, z, cables.density[i] * GRAVITY, cables.stiffness[i], tau, (cables.ratio[i] * chord, cables.sag_force[i])
         )
         heavy = max(1.0, cables.half_weight[i] / tau)  # a U's length grows like exp X
         assert cables.ratio[i] * chord == pytest.approx(float(length), rel=LAST_DIGITS * heavy)
-        assert cables.pull[i] == pytest.approx(float(pull), rel=LAST_DIGITS * heavy, abs=1e-15 * tau)
+        assert cables.sag_force[i] == pytest.approx(float(sag_force), rel=LAST_DIGITS * heavy, abs=1e-15 * tau)
 
 
 def at_strains(strains: Array) -> Cables:
@@ -135,11 +135,11 @@ def test_all_together_are_what_each_is_alone(code: int) -> None:
     _, statuses = hang(cables, model)
     for i in range(12):
         line = Chord(cables.chord[i], cables.sine[i], cables.cosine[i])
-        length, pull, status = from_tension(
+        length, sag_force, status = from_tension(
             model, line, Material(cables.density[i], cables.stiffness[i]), cables.tau[i]
         )
         assert cables.ratio[i] * cables.chord[i] == pytest.approx(length, rel=1e-15)
-        assert cables.pull[i] == pytest.approx(pull, rel=1e-13)
+        assert cables.sag_force[i] == pytest.approx(sag_force, rel=1e-13)
         assert statuses[i] == status
     np.testing.assert_allclose(cables.slackness, cables.half_weight / cables.tau, rtol=1e-15)
     np.testing.assert_allclose(cables.strain, cables.tau / cables.stiffness, rtol=1e-15)
@@ -158,8 +158,8 @@ def test_limits_of_the_frame_end_as_chord_tensions(code: int, case: tuple[float,
     least = 0.5 * weight * length * chord.cosine
     for tension in (1.5 * weight * length, 3.0 * weight * length, 300.0 * weight * length):
         tau = chord_tension_at_frame_end(model, chord, material, NO_PULLEY, tension)
-        whole, pull, _ = from_tension(model, chord, material, tau)
-        end = math.hypot(tau * chord.cosine, tau * sine + pull - weight * whole)  # what the frame feels
+        whole, sag_force, _ = from_tension(model, chord, material, tau)
+        end = math.hypot(tau * chord.cosine, tau * sine + sag_force - weight * whole)  # what the frame feels
         assert frame_end_tension(model, chord, material, NO_PULLEY, tau) == pytest.approx(end, rel=1e-14)
         assert end == pytest.approx(tension, rel=1e-12)
         assert tau > 0.5 * weight * length * sine  # the taut side

@@ -76,9 +76,9 @@ def test_catenary_energy_is_strain_and_height_of_its_mass(case: tuple[float, ...
         expected = Decimal(0)
         for node, weight in zip(nodes, weights, strict=True):
             s = length * (1 + Decimal(node)) / 2
-            pull = t_z - w * (length - s)
-            _, height = exact_end(t_x, pull, s, w, ea)
-            expected += Decimal(weight) * length / 2 * ((t_x**2 + pull**2) / (2 * ea) + w * height)
+            sag_force = t_z - w * (length - s)
+            _, height = exact_end(t_x, sag_force, s, w, ea)
+            expected += Decimal(weight) * length / 2 * ((t_x**2 + sag_force**2) / (2 * ea) + w * height)
     found = catenary_energy(float(x), float(z), case[2], Force(case[0], case[1], math.nan), case[3], case[4])
     size = abs(case[0] * float(x)) + abs(case[1] * float(z))
     assert found == pytest.approx(float(expected), abs=2e-14 * size)

@@ -21,13 +21,13 @@ def test_cables_take_the_tensions_shared_and_remember_their_pulls() -> None:
     cables, _ = room_for_cables(memory(), 3, False)
     balance, _ = room_for_balance(memory(), 3, 1)
     balance.tension[:], balance.scale[:] = [10.0, 24.0, 6.0], [1.0, 2.0, 0.5]
-    cables.tau[:], cables.pull[:] = [10.0, 15.0, 12.0], [1.0, 2.0, 3.0]
+    cables.tau[:], cables.sag_force[:] = [10.0, 15.0, 12.0], [1.0, 2.0, 3.0]
     moved, largest = take_tensions(cables, balance)
     np.testing.assert_array_equal(cables.tau, [10.0, 12.0, 12.0])
-    np.testing.assert_array_equal(cables.last_pull, [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(cables.last_sag_force, [1.0, 2.0, 3.0])
     assert moved == 0.25
     assert largest == 12.0
-    cables.pull[:] = [1.0, 1.5, 3.25]
+    cables.sag_force[:] = [1.0, 1.5, 3.25]
     assert sag_force_change(cables) == 0.5
 
 

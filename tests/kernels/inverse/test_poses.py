@@ -351,9 +351,9 @@ def decided(case: Case, room: WorkArrays) -> Array:
 
 def margined(case: Case, room: WorkArrays) -> Array:
     found = np.full(1, np.nan)
-    pulls = locked(np.zeros((1, len(case.robot))))
+    sag_forces = locked(np.zeros((1, len(case.robot))))
     margins_of_poses(
-        TERMS, LIMITS, robot_terms(case), fixed(case.pose[None]), fixed(case.wrench[None]), pulls, room, found
+        TERMS, LIMITS, robot_terms(case), fixed(case.pose[None]), fixed(case.wrench[None]), sag_forces, room, found
     )
     return found
 

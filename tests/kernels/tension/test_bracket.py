@@ -43,7 +43,7 @@ def test_no_force_helps_where_moments_are_out_of_reach() -> None:
 
 
 def test_one_sagging_cable_reaches_the_range_of_its_curve() -> None:
-    # one row: tau - pull(tau), which need not grow with tau; what it reaches is known from a fine grid
+    # one row: tau - sag_force(tau), which need not grow with tau; what it reaches is known from a fine grid
     rng = np.random.default_rng(7)
     verdicts: list[bool] = []
     nearest: list[bool] = []

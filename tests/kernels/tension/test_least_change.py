@@ -22,7 +22,7 @@ def search(matrix: Array, right: Array, low: Array, high: Array, soft: int) -> t
 
 
 def test_by_hand() -> None:
-    # two cables along x and y that pull with 1 to 2 N; needed: (5, 0.5) N, three too much and half too little
+    # two cables along x and y that sag force with 1 to 2 N; needed: (5, 0.5) N, three too much and half too little
     left, change = search(np.eye(2), np.array([5.0, 0.5]), np.ones(2), np.full(2, 2.0), 2)
     assert left == pytest.approx(np.hypot(3.0, 0.5), rel=1e-12)
     np.testing.assert_allclose(change.tau, [2.0, 1.0], rtol=1e-12)

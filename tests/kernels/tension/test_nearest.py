@@ -38,7 +38,7 @@ def test_daqp_agrees_and_the_next_round_starts_where_this_one_ended(m: int, r: i
     for _ in range(40):
         problem = random_problem(rng, m, r, open_share=0.2)
         near = nearness(r, rng.normal(size=r) * 100.0)
-        for size in (0.0, 1e-6, 1.0, 20.0):  # rounds: START moves with the pulls
+        for size in (0.0, 1e-6, 1.0, 20.0):  # rounds: START moves with the sag forces
             moved = problem._replace(bounds=problem.bounds + size * rng.uniform(-1, 1, m) * [[1.0], [0.0], [0.0]])
             tension = np.full(m, np.nan)
             status = share_nearest(*moved, near, tension)

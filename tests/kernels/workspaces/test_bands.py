@@ -1,4 +1,4 @@
-"""Ranges of pulls from their ends and first order, against fine grids of exact pulls."""
+"""Ranges of sag forces from their ends and first order, against fine grids of exact sag forces."""
 
 import math
 from typing import Any, cast
@@ -16,7 +16,7 @@ between_ends = cast("Any", sag_force_bounds.range_between_ends).py_func
 
 
 def cables_and_pulls(rng: np.random.Generator, count: int) -> tuple[Any, Array, Array]:
-    """Cables of 2 N weight below their frame ends, and pulls on grids of tensions, (N, GRID)."""
+    """Cables of 2 N weight below their frame ends, and sag forces on grids of tensions, (N, GRID)."""
     sine = rng.uniform(-1.0, 0.0, count)
     level, steep = rng.random(count) < 0.3, rng.random(count) < 0.2
     sine[level] = -(10 ** rng.uniform(-5, 0, level.sum()))
@@ -29,26 +29,26 @@ def cables_and_pulls(rng: np.random.Generator, count: int) -> tuple[Any, Array, 
     tension[:, 0], tension[:, -1] = low, high
     cable = sl.Cable(np.full((count, 1), 2.0), stiffness[:, None])
     hung = sl.Catenary().from_tension(cable, cosine[:, None], sine[:, None], tension, 1.0)
-    pull = hung.vertical_force - tension * sine[:, None]
+    sag_force = hung.vertical_force - tension * sine[:, None]
     rows = np.zeros((sag_force_bounds.BAND_ROWS, count))
     rows[sag_force_bounds.LOW], rows[sag_force_bounds.TAUT] = low, high
-    rows[sag_force_bounds.PULL_LOW], rows[sag_force_bounds.PULL_HIGH] = pull[:, 0], pull[:, -1]
+    rows[sag_force_bounds.SAG_FORCE_LOW], rows[sag_force_bounds.SAG_FORCE_HIGH] = sag_force[:, 0], sag_force[:, -1]
     cables = plain_cables(count, np.nan, half_weight=np.ones(count), sine=sine, cosine=cosine, stiffness=stiffness)
-    return cables, rows, pull
+    return cables, rows, sag_force
 
 
 def check(rng: np.random.Generator, count: int) -> tuple[Array, Array]:
-    """Compare; by how much too wide the ranges are, NaN where none is told; whether pulls turn between their ends."""
-    cables, rows, pull = cables_and_pulls(rng, count)
+    """Compare; excess width of the ranges, NaN where undecided; whether sag forces turn between their ends."""
+    cables, rows, sag_force = cables_and_pulls(rng, count)
     found = np.array([between_ends(cables, i, rows) for i in range(count)])
     told = ~np.isnan(found[:, 0])
     rounding = 1e-14 * rows[sag_force_bounds.TAUT]
-    assert (found[told, 0] <= (pull.min(axis=1) + rounding)[told]).all()
-    assert (found[told, 1] >= (pull.max(axis=1) - rounding)[told]).all()
-    turns = (pull.max(axis=1) > np.maximum(pull[:, 0], pull[:, -1]) + 1e-9) | (
-        pull.min(axis=1) < np.minimum(pull[:, 0], pull[:, -1]) - 1e-9
+    assert (found[told, 0] <= (sag_force.min(axis=1) + rounding)[told]).all()
+    assert (found[told, 1] >= (sag_force.max(axis=1) - rounding)[told]).all()
+    turns = (sag_force.max(axis=1) > np.maximum(sag_force[:, 0], sag_force[:, -1]) + 1e-9) | (
+        sag_force.min(axis=1) < np.minimum(sag_force[:, 0], sag_force[:, -1]) - 1e-9
     )
-    return found[:, 1] - found[:, 0] - np.ptp(pull, axis=1), turns
+    return found[:, 1] - found[:, 0] - np.ptp(sag_force, axis=1), turns
 
 
 def test_no_pull_is_outside_its_range_and_few_ranges_are_much_too_wide() -> None:
@@ -69,7 +69,10 @@ def test_no_pull_of_a_million_cables_is_outside_its_range() -> None:
 
 def test_cables_above_their_frame_ends_or_with_pulleys() -> None:
     rows = np.zeros((sag_force_bounds.BAND_ROWS, 1))
-    rows[[sag_force_bounds.LOW, sag_force_bounds.TAUT, sag_force_bounds.PULL_LOW, sag_force_bounds.PULL_HIGH], 0] = (
+    rows[
+        [sag_force_bounds.LOW, sag_force_bounds.TAUT, sag_force_bounds.SAG_FORCE_LOW, sag_force_bounds.SAG_FORCE_HIGH],
+        0,
+    ] = (
         5.0,
         50.0,
         1.2,

@@ -1,4 +1,4 @@
-"""What bounds the change of a pull, against the pulls of random cables, one by one."""
+"""What bounds the change of a sag force, against the sag forces of random cables, one by one."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ from tests.kernels.compiled import from_python
 
 fall, rise = from_python(sag_force_bounds.fall), from_python(sag_force_bounds.rise)
 fall_rate, rise_rate = from_python(sag_force_bounds.fall_rate), from_python(sag_force_bounds.rise_rate)
-pull_slope, most_pull = from_python(sag_force_bounds.pull_slope), from_python(sag_force_bounds.most_pull)
+sag_force_slope, largest_sag_force = (
+    from_python(sag_force_bounds.sag_force_slope),
+    from_python(sag_force_bounds.largest_sag_force),
+)
 from_tension = from_python(models.from_tension)
 chord_tension_at_frame_end = from_python(states.chord_tension_at_frame_end)
 MODEL = Model(4, 0.0, 0.0, GRAVITY)
@@ -37,13 +40,15 @@ def test_tensions(soft: bool) -> None:
         for i in range(8):
             low = max(cables.low[i], cables.half_weight[i] / LOOSEST)
             high = low * 10 ** rng.uniform(0.01, 2)
-            pulls = [_pull(cables, i, tau) for tau in (low, high, low * 1.0001)]
+            sag_forces = [_pull(cables, i, tau) for tau in (low, high, low * 1.0001)]
             tiny = 1e-12 * low
-            assert -rise(curves, i, low, high) - tiny <= pulls[0] - pulls[1] <= fall(curves, i, low, high) + tiny
-            assert pulls[0] <= most_pull(curves, i, low) + tiny
-            change = (pulls[0] - pulls[2]) / (1e-4 * low)
+            assert (
+                -rise(curves, i, low, high) - tiny <= sag_forces[0] - sag_forces[1] <= fall(curves, i, low, high) + tiny
+            )
+            assert sag_forces[0] <= largest_sag_force(curves, i, low) + tiny
+            change = (sag_forces[0] - sag_forces[2]) / (1e-4 * low)
             assert -rise_rate(curves, i, low) - 1e-8 <= change <= fall_rate(curves, i, low) + 1e-8
-            tightest = max(tightest, (pulls[0] - pulls[1]) / fall(curves, i, low, high))
+            tightest = max(tightest, (sag_forces[0] - sag_forces[1]) / fall(curves, i, low, high))
     assert soft or tightest > 0.99  # and not larger than need be
 
 
@@ -65,7 +70,7 @@ def test_positions() -> None:
             material = Material(float(cables.density[i]), float(cables.stiffness[i]))
             moved = from_tension(MODEL, Chord(there, height / there, span / there), material, float(tau))[1]
             change = abs(moved - _pull(cables, i, tau))
-            most = way * pull_slope(curves, i, way, tau)
+            most = way * sag_force_slope(curves, i, way, tau)
             assert change <= most + 1e-12 * tau
             tightest = max(tightest, change / most)
     assert tightest > 0.95
@@ -90,7 +95,7 @@ def test_limits_of_the_frame_end_move_no_faster() -> None:
             limits = [_chord_limit(at, material, float(limit)) for at in (place, there)]
             if min(limits) < tight:
                 continue
-            change, most = abs(limits[1] - limits[0]), way * pull_slope(curves, i, way, tight)
+            change, most = abs(limits[1] - limits[0]), way * sag_force_slope(curves, i, way, tight)
             assert change <= most + 1e-10 * limit
             tightest = max(tightest, change / most)
     assert tightest > 0.6

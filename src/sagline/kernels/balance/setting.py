@@ -17,7 +17,7 @@ from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix,
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.geometry import cable_geometry
-from sagline.kernels.cable.models import pull_of_shallow
+from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import chord_tension_at_frame_end, taut_at_frame_end
 from sagline.kernels.cable.terms import Model
@@ -106,7 +106,7 @@ def set_pose(
     cables: Cables,
     balance: Balance,
 ) -> int:
-    """Fill cables, with the pulls of first order, and balance of one pose; returns POSE_SOLVED or why there is none.
+    """Fill cables, with first-order sag forces, and balance of one pose; returns POSE_SOLVED or the reason for none.
 
     weight: root weights of the cables in the distribution's variable, (m,).
     """
@@ -121,7 +121,7 @@ def set_pose(
 
 @glue
 def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Array, cables: Cables) -> bool:
-    """Fill chords, material, first pulls and limits of the chord tensions; False where a cable has no chord."""
+    """Fill chords, material, first sag forces and limits of the chord tensions; False where a cable has no chord."""
     for i in range(robot.shape[0]):
         chord, sine = geometry[g.CHORD, i], geometry[g.SINE, i]
         if not chord >= SHORTEST_CHORD:
@@ -137,7 +137,7 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
         cables.dead[i] = behind.dead
         cables.rise[i] = behind.rise
         cables.half_weight[i] = 0.5 * robot[i, tables.DENSITY] * model.gravity * chord
-        cables.pull[i] = pull_of_shallow(model, chord, robot[i, tables.DENSITY])
+        cables.sag_force[i] = shallow_sag_force(model, chord, robot[i, tables.DENSITY])
         low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
         if limits.quantity == LIMITS_OF_FRAME_END:
             line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
@@ -198,8 +198,8 @@ def factor_balance(balance: Balance) -> bool:
 
 @glue
 def fill_needed_wrench(platform: Platform, cables: Cables, balance: Balance) -> None:
-    """Fill the needed wrench with the present pulls."""
-    needed_wrench(balance.geometry, platform.body, platform.wrench, cables.pull, balance.needed)
+    """Fill the needed wrench with the present sag forces."""
+    needed_wrench(balance.geometry, platform.body, platform.wrench, cables.sag_force, balance.needed)
     along_freedom(platform.freedom, balance.needed, balance.right)
 
 

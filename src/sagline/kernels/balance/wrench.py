@@ -104,19 +104,19 @@ def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
 
 
 @formula
-def needed_wrench(geometry: Array, body: Array, wrench: Array, pull: Array, needed: Array) -> None:
+def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array, needed: Array) -> None:
     """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
 
     It balances the platform's weight (counted here, once), the given wrench (external plus inertial,
-    about the center of mass) and the cables' pulls T_z - tau sin phi (m,), which hang on the platform ends.
+    about the center of mass) and the cables' sag forces T_z - tau sin phi (m,), which hang on the platform ends.
     """
     fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
     mx = -wrench[3]
     my = -wrench[4]
     for i in range(geometry.shape[1]):
-        fz += pull[i]
-        mx += geometry[g.LEVER_Y, i] * pull[i]
-        my -= geometry[g.LEVER_X, i] * pull[i]
+        fz += sag_force[i]
+        mx += geometry[g.LEVER_Y, i] * sag_force[i]
+        my -= geometry[g.LEVER_X, i] * sag_force[i]
     needed[0] = -wrench[0]
     needed[1] = -wrench[1]
     needed[2] = fz

@@ -57,7 +57,7 @@ def batch_from_tension(
     count = length_out.shape[0]
     x, z, rho, ea, tau = buffer[0], buffer[1], buffer[2], buffer[3], buffer[4]
     chord, sine, cosine, half = buffer[5], buffer[6], buffer[7], buffer[8]
-    ratio, pull = buffer[9], buffer[10]
+    ratio, sag_force = buffer[9], buffer[10]
     for start in range(0, count, CHUNK):
         stop = min(start + CHUNK, count)
         size = stop - start
@@ -84,21 +84,21 @@ def batch_from_tension(
                 for i in range(size):
                     ratio[i] = ordinary_length_ratio_near(half[i], sine[i], cosine[i], tau[i] / ea[i], ratio[i])
             for i in range(size):
-                pull[i] = ordinary_sag_force_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
+                sag_force[i] = ordinary_sag_force_ratio(half[i], sine[i], tau[i] / ea[i], ratio[i]) * tau[i]
             for i in range(size):
                 ratio[i] *= chord[i]
         for i in range(size):
             status = CABLE_SOLVED
             if model.code != CATENARY or not is_ordinary(half[i], tau[i] / ea[i]):
                 line = Chord(chord[i], sine[i], cosine[i])
-                ratio[i], pull[i], status = from_tension(model, line, Material(rho[i], ea[i]), tau[i])
+                ratio[i], sag_force[i], status = from_tension(model, line, Material(rho[i], ea[i]), tau[i])
             status_out[start + i] = status
         for i in range(size):
             length_out[start + i] = ratio[i]
         for i in range(size):
             horizontal_out[start + i] = tau[i] * cosine[i]
         for i in range(size):
-            vertical_out[start + i] = tau[i] * sine[i] + pull[i]
+            vertical_out[start + i] = tau[i] * sine[i] + sag_force[i]
 
 
 @entry
@@ -178,12 +178,12 @@ def shape_points(
 
 @kernel
 def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
-    """Drop below the chord [m] at a fraction t of it: b D t (1 - t)/tau, with b the pull on the end."""
+    """Drop below the chord [m] at a fraction t of it: b D t (1 - t)/tau, with b the sag force on the end."""
     if model.code == STRAIGHT or model.code == ELASTIC or tension == 0.0:
         return 0.0
     chord = math.hypot(span, rise)
-    pull = vertical - tension * rise / chord
-    return pull * chord * t * (1.0 - t) / tension
+    sag_force = vertical - tension * rise / chord
+    return sag_force * chord * t * (1.0 - t) / tension
 
 
 @kernel
@@ -256,8 +256,8 @@ def closures(
             cosine = span[i] / chord
             weightless = model.code == ELASTIC or density[i] * model.gravity == 0.0
             sag = 0.0 if weightless else sag_of_shallow(model, density[i] * chord * cosine)
-            pull = vertical[i] - tension[i] * sine if model.code == EMPIRICAL else 0.0
-            ratio = shallow_length_ratio(tension[i], sine, cosine, pull, sag, stiffness[i])
+            sag_force = vertical[i] - tension[i] * sine if model.code == EMPIRICAL else 0.0
+            ratio = shallow_length_ratio(tension[i], sine, cosine, sag_force, sag, stiffness[i])
             residual_out[i] = abs(length[i] - chord * ratio)
 
 

@@ -29,8 +29,8 @@ class Cables(NamedTuple):
     high: Array  # upper limit of the chord tension [N], may be infinite
     tau: Array  # chord tension [N]
     ratio: Array  # L/D of the free span
-    pull: Array  # T_z - tau sin phi [N]
-    last_pull: Array  # the same in the round before [N]
+    sag_force: Array  # T_z - tau sin phi [N]
+    last_sag_force: Array  # the same in the iteration before [N]
     slackness: Array  # X = wD/(2 tau) of the free span
     strain: Array  # e = tau/EA of the free span
     free_half_weight: Array  # wD/2 of the free span [N]
@@ -38,7 +38,7 @@ class Cables(NamedTuple):
     free_sine: Array  # sin phi of the free span
     free_cosine: Array  # cos phi of the free span
     free_tau: Array  # chord tension of the free span [N]
-    free_pull: Array  # T_z - tau sin phi of the free span [N]
+    free_sag_force: Array  # T_z - tau sin phi of the free span [N]
     wrap_sine: Array  # sine of the wrap angle psi
     wrap_cosine: Array  # cosine of psi
     radius: Array  # of the pulley [m]

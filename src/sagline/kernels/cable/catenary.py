@@ -77,10 +77,10 @@ def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: fl
     s = taut * sinhc_polynomial(y)
     c = strain * cosh_polynomial(y)
     inverse = 1.0 / (s + ratio * c)
-    pull = sine2 * inverse * inverse
-    root = math.sqrt(cosine2 + pull)
+    sag_force = sine2 * inverse * inverse
+    root = math.sqrt(cosine2 + sag_force)
     excess = ratio - s * root
-    slope = 1.0 + c * root - pull * inverse * (s * s * strain * strain * square * ratio) / root
+    slope = 1.0 + c * root - sag_force * inverse * (s * s * strain * strain * square * ratio) / root
     return ratio - excess / slope
 
 
@@ -131,10 +131,10 @@ def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) 
         s = taut * sinhc(h)
         c = strain * cosh(h)
         inverse = 1.0 / (s + ratio * c)
-        pull = sine2 * inverse * inverse
-        root = math.sqrt(cosine2 + pull)
+        sag_force = sine2 * inverse * inverse
+        root = math.sqrt(cosine2 + sag_force)
         excess = ratio - s * root
-        slope = 1.0 + c * root - pull * inverse * (s * s * strain * strain * square * ratio) / root
+        slope = 1.0 + c * root - sag_force * inverse * (s * s * strain * strain * square * ratio) / root
         if excess > 0.0:
             high = ratio
         else:
@@ -150,7 +150,7 @@ def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) 
 
 
 @kernel
-def pull_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
+def sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
     """(T_z/tau - sin phi): what the weight adds to the vertical force on the platform end, in chord tensions."""
     taut = 1.0 - strain * ratio
     h = half_weight * taut
@@ -260,11 +260,11 @@ def _vertical_from_length(rise: float, length: float, weight: float, stiffness: 
     kappa = 0.5 * weight * length / stiffness
     stretch = (height - length) / length  # exact difference for a taut cable
     if stretch >= kappa:
-        pull = stiffness * stretch
-        vertical = math.copysign(pull, rise) + 0.5 * weight * length
-        # tanh h = kappa/stretch; a weightless cable has h = 0 and carries the pull alone
+        sag_force = stiffness * stretch
+        vertical = math.copysign(sag_force, rise) + 0.5 * weight * length
+        # tanh h = kappa/stretch; a weightless cable has h = 0 and carries the sag force alone
         h = math.atanh(kappa / stretch) if stretch > kappa else math.inf
-        tension = pull if weight == 0.0 else 0.5 * weight * height / (h + kappa)
+        tension = sag_force if weight == 0.0 else 0.5 * weight * height / (h + kappa)
         return vertical, tension, CABLE_SOLVED if tension > 0.0 else CABLE_SLACK
     return 0.5 * weight * length + 0.5 * weight * rise / (1.0 + kappa), 0.0, CABLE_SLACK
 

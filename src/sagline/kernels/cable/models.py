@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from sagline.kernels.cable.catenary import RANGE, catenary_from_length, length_ratio, pull_ratio
+from sagline.kernels.cable.catenary import RANGE, catenary_from_length, length_ratio, sag_force_ratio
 from sagline.kernels.cable.terms import Chord, Force, Material, Model
 from sagline.kernels.codes import (
     CABLE_BELOW_VALIDITY,
@@ -34,22 +34,22 @@ STEPS = 60
 
 
 @kernel
-def stretching_tension(tension: float, sine: float, cosine: float, pull: float) -> float:
-    """Magnitude of the force on the platform end [N]; the chord tension itself where pull is 0."""
-    return math.hypot(tension * cosine, tension * sine + pull)
+def stretching_tension(tension: float, sine: float, cosine: float, sag_force: float) -> float:
+    """Magnitude of the force on the platform end [N]; the chord tension itself where sag force is 0."""
+    return math.hypot(tension * cosine, tension * sine + sag_force)
 
 
 @kernel
 def shallow_length_ratio(
-    tension: float, sine: float, cosine: float, pull: float, sag: float, stiffness: float
+    tension: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float
 ) -> float:
-    """L/D; sag = k (rho D cos phi)^2 [N^2], pull = b [N] where the stretch includes it."""
-    return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, pull) / stiffness)
+    """L/D; sag = k (rho D cos phi)^2 [N^2], sag force = b [N] where the stretch includes it."""
+    return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, sag_force) / stiffness)
 
 
 @kernel
 def shallow_tension(
-    chord: float, sine: float, cosine: float, pull: float, sag: float, stiffness: float, length: float
+    chord: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float, length: float
 ) -> tuple[float, bool]:
     """Chord tension at which the shallow cable has the given length, and whether it was found.
 
@@ -68,15 +68,15 @@ def shallow_tension(
         if not new < tension:
             break
         tension = new
-    if pull == 0.0:
+    if sag_force == 0.0:
         return tension, True
     low = 0.0
     high = math.inf
     for _ in range(STEPS):
-        end = stretching_tension(tension, sine, cosine, pull)
+        end = stretching_tension(tension, sine, cosine, sag_force)
         square = tension * tension
         error = length * (1.0 + end / stiffness) - chord * (1.0 + sag / square)
-        slope = length * (tension + pull * sine) / (end * stiffness) + 2.0 * chord * sag / (square * tension)
+        slope = length * (tension + sag_force * sine) / (end * stiffness) + 2.0 * chord * sag / (square * tension)
         if error > 0.0:
             high = tension
         else:
@@ -92,8 +92,8 @@ def shallow_tension(
 
 
 @kernel
-def pull_of_shallow(model: Model, chord: float, density: float) -> float:
-    """First-order pull T_z - tau sin phi of the weight on the platform end [N]; 0 for weightless models."""
+def shallow_sag_force(model: Model, chord: float, density: float) -> float:
+    """First-order sag force T_z - tau sin phi of the weight on the platform end [N]; 0 for weightless models."""
     if model.code == STRAIGHT or model.code == ELASTIC:
         return 0.0
     if model.code == EMPIRICAL:
@@ -110,26 +110,26 @@ def sag_of_shallow(model: Model, line: float) -> float:
 
 @kernel
 def from_tension(model: Model, chord: Chord, material: Material, tension: float) -> tuple[float, float, int]:
-    """Unstrained length [m], pull T_z - tau sin phi [N] and status of a cable at a chord tension."""
+    """Unstrained length [m], sag force T_z - tau sin phi [N] and status of a cable at a chord tension."""
     if model.code == STRAIGHT:
         return chord.length, 0.0, CABLE_SOLVED
     strain = tension / material.stiffness
     if model.code == ELASTIC or material.density * model.gravity == 0.0:
         return chord.length / (1.0 + strain), 0.0, CABLE_SOLVED
-    pull = pull_of_shallow(model, chord.length, material.density)
+    sag_force = shallow_sag_force(model, chord.length, material.density)
     half_weight = 0.5 * material.density * model.gravity * chord.length / tension
     if not half_weight < RANGE:
         return math.nan, math.nan, CABLE_TOO_SLACK
     if model.code == CATENARY:
         ratio, status = length_ratio(half_weight, chord.sine, chord.cosine, strain)
-        return chord.length * ratio, tension * pull_ratio(half_weight, chord.sine, strain, ratio), status
+        return chord.length * ratio, tension * sag_force_ratio(half_weight, chord.sine, strain, ratio), status
     sag = sag_of_shallow(model, material.density * chord.length * chord.cosine)
     if model.code == EMPIRICAL:
-        status = CABLE_SOLVED if tension * abs(chord.sine) > abs(pull) else CABLE_BELOW_VALIDITY
-        ratio = shallow_length_ratio(tension, chord.sine, chord.cosine, pull, sag, material.stiffness)
-        return chord.length * ratio, pull, status
+        status = CABLE_SOLVED if tension * abs(chord.sine) > abs(sag_force) else CABLE_BELOW_VALIDITY
+        ratio = shallow_length_ratio(tension, chord.sine, chord.cosine, sag_force, sag, material.stiffness)
+        return chord.length * ratio, sag_force, status
     ratio = shallow_length_ratio(tension, chord.sine, chord.cosine, 0.0, sag, material.stiffness)
-    return chord.length * ratio, pull, CABLE_SOLVED
+    return chord.length * ratio, sag_force, CABLE_SOLVED
 
 
 @kernel
@@ -147,15 +147,15 @@ def from_length(model: Model, span: float, rise: float, material: Material, leng
         tension = max(material.stiffness * ((chord - length) / length), 0.0)
         status = CABLE_SOLVED if tension > 0.0 else CABLE_SLACK
         return Force(tension * cosine, tension * sine, tension), status
-    pull = pull_of_shallow(model, chord, material.density)
+    sag_force = shallow_sag_force(model, chord, material.density)
     sag = sag_of_shallow(model, material.density * chord * cosine)
-    stretch_pull = pull if model.code == EMPIRICAL else 0.0
-    tension, found = shallow_tension(chord, sine, cosine, stretch_pull, sag, material.stiffness, length)
+    stretch_force = sag_force if model.code == EMPIRICAL else 0.0
+    tension, found = shallow_tension(chord, sine, cosine, stretch_force, sag, material.stiffness, length)
     status = CABLE_SOLVED
     if not found:
         status = CABLE_NOT_CONVERGED
     elif tension == 0.0:
         status = CABLE_SLACK
-    elif model.code == EMPIRICAL and tension * abs(sine) <= abs(pull):
+    elif model.code == EMPIRICAL and tension * abs(sine) <= abs(sag_force):
         status = CABLE_BELOW_VALIDITY
-    return Force(tension * cosine, tension * sine + pull, tension), status
+    return Force(tension * cosine, tension * sine + sag_force, tension), status

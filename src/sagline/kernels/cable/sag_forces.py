@@ -1,8 +1,8 @@
-"""The cables of one pose as curves: how their pulls T_z - tau sin phi run with their chord tensions.
+"""The cables of one pose as curves: how their sag forces T_z - tau sin phi run with their chord tensions.
 
-Weight makes the pull of a cable that hangs below its frame end rise and fall with the tension: it falls while the sag
-is deep, rises while the sag grows shallow, and falls again by stretch. On a range of tensions it is therefore within
-its ends and at most two turns between them; docs/model.md, section 5.
+Weight makes the sag force of a cable that hangs below its frame end rise and fall with the tension: it falls while the
+sag is deep, rises while the sag grows shallow, and falls again by stretch. On a range of tensions it is therefore
+within its ends and at most two turns between them; docs/model.md, section 5.
 """
 
 from __future__ import annotations
@@ -12,32 +12,32 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
-from sagline.kernels.cable.models import pull_of_shallow
+from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.states import solve_cable_state, solve_cable_states
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
-LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
-SLOPE_STEP = 1e-4  # relative step of the central difference of the pull
-EXITS = 4  # passes over pulleys: for X up to 1 the pull is then known to 1e-9 of the tension
+LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch sag forces on
+SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
+EXITS = 4  # passes over pulleys: for X up to 1 the sag force is then known to 1e-9 of the tension
 SHRINKINGS = 30
-TURN_ERROR = 1e-10  # of half the cable's weight: the pull at a turn is better known
+TURN_ERROR = 1e-10  # of half the cable's weight: the sag force at a turn is better known
 SHRINKS = 0.9  # of the section before: what shrinks less does not shrink
 SMALLEST_GAIN = 1e-15  # of the numbers at hand
 
-# Rows of the turns of the cables' pulls, (TURN_ROWS, m): NaN where there is none.
-LEAST_TENSION, LEAST_PULL, MOST_TENSION, MOST_PULL = 0, 1, 2, 3
+# Rows of the turns of the cables' sag forces, (TURN_ROWS, m): NaN where there is none.
+LEAST_TENSION, LEAST_SAG_FORCE, MOST_TENSION, MOST_SAG_FORCE = 0, 1, 2, 3
 TURN_ROWS = 4
 
 
 class Curves(NamedTuple):
-    """The cables of one pose, whose pulls run with their chord tensions."""
+    """The cables of one pose, whose sag forces run with their chord tensions."""
 
     model: Model  # cable model
     cables: Cables  # the cables; what they carry is working space
-    turns: Array  # of their pulls, (TURN_ROWS, m)
+    turns: Array  # of their sag forces, (TURN_ROWS, m)
     statuses: Codes  # how each cable's calculation ended, (m,)
 
 
@@ -46,8 +46,8 @@ class Section(NamedTuple):
 
     low: float  # least tension [N]
     high: float  # largest tension [N], may be infinite
-    at_low: float  # pull at the least tension [N]
-    at_high: float  # pull at the largest tension [N]
+    at_low: float  # sag force at the least tension [N]
+    at_high: float  # sag force at the largest tension [N]
 
 
 @glue
@@ -58,36 +58,38 @@ def new_curves(model: Model, cables: Cables, statuses: Codes, memory: Memory) ->
 
 
 @kernel
-def sag_forces_at(curves: Curves, tau: Array, pull: Array) -> None:
-    """Fill the pulls (m,) at chord tensions (m,), and let the cables carry them."""
+def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
+    """Fill the sag forces (m,) at chord tensions (m,), and let the cables carry them."""
     for i in range(tau.size):
         curves.cables.tau[i] = tau[i]
     for k in range(EXITS if curves.cables.machine else 1):
         solve_cable_states(curves.model, curves.cables, k == 0, False, curves.statuses)
     for i in range(tau.size):
         if curves.model.code != CATENARY:  # the same at every tension, one of zero included
-            curves.cables.pull[i] = pull_of_shallow(curves.model, curves.cables.chord[i], curves.cables.density[i])
-        pull[i] = curves.cables.pull[i]
+            curves.cables.sag_force[i] = shallow_sag_force(
+                curves.model, curves.cables.chord[i], curves.cables.density[i]
+            )
+        sag_force[i] = curves.cables.sag_force[i]
 
 
 @kernel
 def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
-    """Fill how the pulls grow with the chord tensions, (m,), and how the slopes do [1/N], by central differences."""
+    """Fill slopes (m,) and curvatures (m,) [1/N] of the sag forces by the chord tensions, from central differences."""
     cables = curves.cables
     if curves.model.code != CATENARY:
         for i in range(tau.size):
             slope[i] = bend[i] = 0.0
         return
     for i in range(tau.size):
-        cables.last_pull[i] = tau[i] * (1.0 + SLOPE_STEP)
-    sag_forces_at(curves, cables.last_pull, slope)
+        cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
+    sag_forces_at(curves, cables.last_sag_force, slope)
     sag_forces_at(curves, tau, bend)
     for i in range(tau.size):
-        cables.last_pull[i] = tau[i] * (1.0 - SLOPE_STEP)
-    sag_forces_at(curves, cables.last_pull, cables.pull)
+        cables.last_sag_force[i] = tau[i] * (1.0 - SLOPE_STEP)
+    sag_forces_at(curves, cables.last_sag_force, cables.sag_force)
     for i in range(tau.size):
         step = SLOPE_STEP * tau[i]
-        above, below, here = slope[i], cables.pull[i], bend[i]
+        above, below, here = slope[i], cables.sag_force[i], bend[i]
         weighs = cables.half_weight[i] > 0.0
         slope[i] = (above - below) / (2.0 * step) if weighs else 0.0
         bend[i] = (above - 2.0 * here + below) / (step * step) if weighs else 0.0
@@ -98,36 +100,36 @@ def sag_force_at(curves: Curves, i: int, tau: float) -> float:
     """Pull of one cable at a chord tension [N]; zero at an infinite one, which leaves no cable to weigh."""
     cables = curves.cables
     if curves.model.code != CATENARY:
-        return pull_of_shallow(curves.model, cables.chord[i], cables.density[i])
+        return shallow_sag_force(curves.model, cables.chord[i], cables.density[i])
     if tau == math.inf:
         return 0.0
-    _length, pull, _status = solve_cable_state(
+    _length, sag_force, _status = solve_cable_state(
         curves.model, chord_of(cables, i), material_of(cables, i), pulley_of(cables, i), tau
     )
-    return pull
+    return sag_force
 
 
 @glue
 def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, float]:
-    """Least and largest pull of cable i on a section of its chord tensions."""
+    """Least and largest sag force of cable i on a section of its chord tensions."""
     turns = curves.turns
     beyond = TURN_ERROR * curves.cables.half_weight[i]
     least, most = min(section.at_low, section.at_high), max(section.at_low, section.at_high)
     if section.low < turns[LEAST_TENSION, i] < section.high:
-        least = min(least, turns[LEAST_PULL, i] - beyond)
+        least = min(least, turns[LEAST_SAG_FORCE, i] - beyond)
     if section.low < turns[MOST_TENSION, i] < section.high:
-        most = max(most, turns[MOST_PULL, i] + beyond)
+        most = max(most, turns[MOST_SAG_FORCE, i] + beyond)
     return least, most
 
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along tau - hanging pull(tau) on a section [N]; exact where the better end is the answer.
+    """Upper bound of along tau - hanging sag_force(tau) on a section [N]; exact where the better end is the answer.
 
-    That end, and the range of the pull, say how far from it anything better can be; so the section shrinks.
+    That end, and the range of the sag force, say how far from it anything better can be; so the section shrinks.
 
     section: of its chord tensions; the upper end may be infinite; along: what a newton of chord tension counts;
-    hanging: what a newton of pull takes away.
+    hanging: what a newton of sag force takes away.
     """
     low, high, at_low, at_high = section
     if along > 0.0 and high == math.inf:
@@ -135,11 +137,11 @@ def most_along(curves: Curves, i: int, section: Section, along: float, hanging: 
     bound = math.inf
     for _ in range(SHRINKINGS):
         least, most = sag_force_range(curves, i, Section(low, high, at_low, at_high))
-        tension, pull = (high, at_high) if along > 0.0 else (low, at_low)
-        end = along * tension - hanging * pull
+        tension, sag_force = (high, at_high) if along > 0.0 else (low, at_low)
+        end = along * tension - hanging * sag_force
         bound = min(bound, along * tension - hanging * (least if hanging > 0.0 else most))
         gain = bound - end
-        known = SMALLEST_GAIN * (abs(end) + abs(hanging * pull))
+        known = SMALLEST_GAIN * (abs(end) + abs(hanging * sag_force))
         if not gain > known or not gain < SHRINKS * abs(along) * (high - low):
             break
         if along > 0.0:
@@ -151,10 +153,10 @@ def most_along(curves: Curves, i: int, section: Section, along: float, hanging: 
     return bound
 
 
-TURN_PRECISION = 1e-4  # relative, of a turn's tension: its pull, flat there, is known to 1e-11 of the weight
+TURN_PRECISION = 1e-4  # relative, of a turn's tension: its sag force, flat there, is known to 1e-11 of the weight
 STEPS = 30
 PEAK_STEPS = 40
-PEAK_PRECISION = 1e-3  # relative, of the tension where the pull rises fastest
+PEAK_PRECISION = 1e-3  # relative, of the tension where the sag force rises fastest
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 # Where the search begins: the first-order turns are at X = |sin phi|/cos^2 phi and at sqrt(EA wD |sin phi|/6), the true
 # ones, on 200,000 random cables with X <= 1 and e <= 0.01, at 0.28 to 1.03 of that X and 0.58 to 1.0 of that tension.
@@ -170,16 +172,16 @@ ROWS = 8
 
 @kernel
 def _growths(curves: Curves, tau: Array, growth: Array) -> None:
-    """Fill the growth of the pulls with the logarithm of the chord tensions [N], (m,)."""
+    """Fill the growth of the sag forces with the logarithm of the chord tensions [N], (m,)."""
     cables = curves.cables
     for i in range(tau.size):
-        cables.last_pull[i] = tau[i] * (1.0 + SLOPE_STEP)
-    sag_forces_at(curves, cables.last_pull, growth)
+        cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
+    sag_forces_at(curves, cables.last_sag_force, growth)
     for i in range(tau.size):
-        cables.last_pull[i] = tau[i] * (1.0 - SLOPE_STEP)
-    sag_forces_at(curves, cables.last_pull, cables.pull)
+        cables.last_sag_force[i] = tau[i] * (1.0 - SLOPE_STEP)
+    sag_forces_at(curves, cables.last_sag_force, cables.sag_force)
     for i in range(tau.size):
-        growth[i] = (growth[i] - cables.pull[i]) / (2.0 * SLOPE_STEP)
+        growth[i] = (growth[i] - cables.sag_force[i]) / (2.0 * SLOPE_STEP)
 
 
 @formula
@@ -191,7 +193,7 @@ def _growth_of(curves: Curves, i: int, tau: float) -> float:
 
 @formula
 def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, float, float]:
-    """Stretch, slope and depth of the first-order growth of one cable's pull [N]."""
+    """Stretch, slope and depth of the first-order growth of one cable's sag force [N]."""
     cables = curves.cables
     half_weight = cables.half_weight[i]
     x = half_weight / tau
@@ -201,7 +203,7 @@ def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, floa
 
 @kernel
 def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> float:
-    """A chord tension between two at which the pull rises, where it falls at both; NaN where it never rises.
+    """A chord tension between two at which the sag force rises, where it falls at both; NaN where it never rises.
 
     Its growth has one peak, which golden sections find.
     """
@@ -226,7 +228,7 @@ def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> 
 
 @glue
 def _find_rises(curves: Curves, work: Array) -> None:
-    """Fill for each cable a tension between A and B at which its pull rises: RISEN, NaN where it never does."""
+    """Fill for each cable a tension between A and B at which its sag force rises: RISEN, NaN where it never does."""
     cables = curves.cables
     for i in range(work.shape[1]):
         best = 1.5 * cables.half_weight[i] * cables.cosine[i] * cables.cosine[i] / abs(cables.sine[i])
@@ -250,14 +252,14 @@ def _find_rises(curves: Curves, work: Array) -> None:
 
 
 @glue
-def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, pulls: Array) -> None:
-    """Fill where and how far the pulls turn between A and B, of the cables whose tension is not NaN.
+def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, sag_forces: Array) -> None:
+    """Fill where and how far the sag forces turn between A and B, of the cables whose tension is not NaN.
 
     Newton steps from TENSION on, with the slope of first order, then with that of the last two points, within what is
     left of A to B.
 
-    rising: whether the pulls rise at A and fall at B, or the other way round; tensions: anything, or NaN for no turn,
-    (m,); filled; pulls: filled, (m,).
+    rising: whether the sag forces rise at A and fall at B, or the other way round; tensions: anything, or NaN for no
+    turn, (m,); filled; sag forces: filled, (m,).
     """
     m = tensions.size
     for step in range(STEPS):
@@ -281,22 +283,24 @@ def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, p
                 work[TENSION, i] = new
         if largest <= TURN_PRECISION:
             break
-    sag_forces_at(curves, work[TENSION], pulls)
+    sag_forces_at(curves, work[TENSION], sag_forces)
     for i in range(m):
         if math.isnan(tensions[i]):
-            pulls[i] = math.nan
+            sag_forces[i] = math.nan
         else:
             tensions[i] = work[TENSION, i]
 
 
 @kernel
 def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> None:
-    """Fill the turns of the cables' pulls between chord tensions (m,), which are finite."""
+    """Fill the turns of the cables' sag forces between chord tensions (m,), which are finite."""
     cables, turns = curves.cables, curves.turns
     m = cables.low.size
     work, _ = block(memory.numbers, 0, ROWS, m)
     for i in range(m):
-        turns[LEAST_TENSION, i] = turns[LEAST_PULL, i] = turns[MOST_TENSION, i] = turns[MOST_PULL, i] = math.nan
+        turns[LEAST_TENSION, i] = turns[LEAST_SAG_FORCE, i] = turns[MOST_TENSION, i] = turns[MOST_SAG_FORCE, i] = (
+            math.nan
+        )
         work[A, i] = low[i]
         work[B, i] = high[i]
     if curves.model.code != CATENARY:
@@ -311,7 +315,7 @@ def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> Non
             work[TENSION, i] = min(max(guess, risen), work[B, i])
             sought = True
     if sought:
-        _find_extremum(curves, True, work, turns[MOST_TENSION], turns[MOST_PULL])
+        _find_extremum(curves, True, work, turns[MOST_TENSION], turns[MOST_SAG_FORCE])
     sought = False
     for i in range(m):
         risen = work[RISEN, i]
@@ -322,4 +326,4 @@ def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> Non
             work[TENSION, i] = min(max(guess, low[i]), risen)
             sought = True
     if sought:
-        _find_extremum(curves, False, work, turns[LEAST_TENSION], turns[LEAST_PULL])
+        _find_extremum(curves, False, work, turns[LEAST_TENSION], turns[LEAST_SAG_FORCE])

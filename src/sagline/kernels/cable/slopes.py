@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable.catenary import slack_series
-from sagline.kernels.cable.models import pull_of_shallow
+from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.pulley import Change, Motion, Pulley, end_by
 from sagline.kernels.cable.stiffness import shallow_slopes
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
@@ -97,10 +97,10 @@ def _shallow_force_slopes(
     chord = math.hypot(span, rise)
     cosine = span / chord
     sine = rise / chord
-    pull = pull_of_shallow(model, chord, 1.0)
+    sag_force = shallow_sag_force(model, chord, 1.0)
     return _ForceSlopes(
         Pair(slopes.by_length * cosine, slopes.by_length * sine),
-        Pair(slopes.by_density * cosine, slopes.by_density * sine + pull),
+        Pair(slopes.by_density * cosine, slopes.by_density * sine + sag_force),
         Pair(slopes.by_stiffness * cosine, slopes.by_stiffness * sine),
     )
 

@@ -24,11 +24,11 @@ from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import entry, glue, kernel
 
 # Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
-# X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that rounds which stand still end in the last digit.
+# X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that converged iterations end in the last digit.
 NEAR = 1e-3
 # passes until a cable leaves its pulley where its force says; a taut one is 1e-4, 4e-8, 1e-11, 0 off
 CONTACTS = 40
-SAME_PULL = 4e-16  # of the tension: a pull that changes by no more stands still
+SAME_SAG_FORCE = 4e-16  # of the tension: a sag force that changes by no more stands still
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative: more than what the passes for a slack cable's pulley leave
@@ -40,8 +40,8 @@ TAUT = 1.25  # of wD/2: a chord tension above that of the least tension at the f
 def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
     """Fill the free spans and their tensions, from where the forces at the pulleys say that the cables leave them.
 
-    The forces are those of the last length and pull (fresh: of first order) at the present chord tensions. Cables of
-    the shallow models leave along their chord.
+    The forces are those of the last length and sag force (fresh: of first order) at the present chord tensions. Cables
+    of the shallow models leave along their chord.
     """
     exact = model.code == CATENARY
     for i in range(cables.tau.size):
@@ -50,7 +50,7 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
         horizontal = cables.tau[i] * chord.cosine
         hanging = -half_density * chord.length
         if not fresh:
-            hanging = cables.pull[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
+            hanging = cables.sag_force[i] - 2.0 * half_density * cables.ratio[i] * cables.free_chord[i]
         vertical_a = cables.tau[i] * chord.sine + hanging
         inverse = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
         sine = horizontal * inverse if exact else chord.cosine
@@ -69,13 +69,13 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
 
 @glue
 def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> int:
-    """Fill slackness, strain, ratio and pull of all cables, and the statuses (m,), at their chord tensions.
+    """Fill slackness, strain, ratio and sag force of all cables, and the statuses (m,), at their chord tensions.
 
     Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one. Cables leave
-    their pulleys where the lengths and pulls before said.
+    their pulleys where the lengths and sag forces before said.
 
-    fresh: whether there are no lengths and pulls yet; near: whether their ratios are the answer at tensions less than
-    NEAR away; statuses: filled. Returns the gravest status.
+    fresh: whether there are no lengths and sag forces yet; near: whether their ratios are the answer at tensions less
+    than NEAR away; statuses: filled. Returns the gravest status.
     """
     m = cables.tau.size
     if cables.machine:
@@ -99,7 +99,7 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
                     cables.slackness[i], cables.free_sine[i], cables.free_cosine[i], cables.strain[i], cables.ratio[i]
                 )
         for i in range(m):
-            cables.free_pull[i] = cables.free_tau[i] * ordinary_sag_force_ratio(
+            cables.free_sag_force[i] = cables.free_tau[i] * ordinary_sag_force_ratio(
                 cables.slackness[i], cables.free_sine[i], cables.strain[i], cables.ratio[i]
             )
     gravest = CABLE_SOLVED
@@ -107,15 +107,15 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
         statuses[i] = CABLE_SOLVED
         if model.code != CATENARY or not is_ordinary(cables.slackness[i], cables.strain[i]):
             free = free_chord_of(cables, i)
-            length, pull, status = from_tension(model, free, material_of(cables, i), cables.free_tau[i])
+            length, sag_force, status = from_tension(model, free, material_of(cables, i), cables.free_tau[i])
             cables.ratio[i] = length / free.length
-            cables.free_pull[i] = pull
+            cables.free_sag_force[i] = sag_force
             statuses[i] = status
             gravest = max(gravest, status)
     if cables.machine:
         for i in range(m):
-            vertical = cables.free_tau[i] * cables.free_sine[i] + cables.free_pull[i]
-            cables.pull[i] = vertical - cables.tau[i] * cables.sine[i]
+            vertical = cables.free_tau[i] * cables.free_sine[i] + cables.free_sag_force[i]
+            cables.sag_force[i] = vertical - cables.tau[i] * cables.sine[i]
     return gravest
 
 
@@ -123,23 +123,23 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
 def solve_cable_state(
     model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float
 ) -> tuple[float, float, int]:
-    """Free unstrained length [m], pull T_z - tau sin phi [N] and status of one cable at a chord tension."""
-    length, pull, status = from_tension(model, chord, material, tau)
+    """Free unstrained length [m], sag force T_z - tau sin phi [N] and status of one cable at a chord tension."""
+    length, sag_force, status = from_tension(model, chord, material, tau)
     if pulley.radius > 0.0 and model.code == CATENARY:
         horizontal, weight = tau * chord.cosine, material.density * model.gravity
         for _ in range(CONTACTS):
-            vertical_a = tau * chord.sine + pull - weight * length
+            vertical_a = tau * chord.sine + sag_force - weight * length
             tension = math.sqrt(horizontal * horizontal + vertical_a * vertical_a)
             span = free_span(pulley, chord, pulley.entry * vertical_a / tension)
             rise = free_rise(pulley, chord, horizontal / tension)
             line = math.sqrt(span * span + rise * rise)
             free = Chord(line, rise / line, span / line)
             length, own, status = from_tension(model, free, material, horizontal / free.cosine)
-            before = pull
-            pull = horizontal / free.cosine * free.sine + own - tau * chord.sine
-            if not abs(pull - before) > SAME_PULL * tau:
+            before = sag_force
+            sag_force = horizontal / free.cosine * free.sine + own - tau * chord.sine
+            if not abs(sag_force - before) > SAME_SAG_FORCE * tau:
                 break
-    return length, pull, status
+    return length, sag_force, status
 
 
 @kernel
@@ -147,8 +147,8 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
     """Tension at the frame end of a cable's free span at a chord tension [N]."""
     if model.code == STRAIGHT or model.code == ELASTIC:
         return tau
-    length, pull, _status = solve_cable_state(model, chord, material, pulley, tau)
-    return math.hypot(tau * chord.cosine, tau * chord.sine + pull - material.density * model.gravity * length)
+    length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
+    return math.hypot(tau * chord.cosine, tau * chord.sine + sag_force - material.density * model.gravity * length)
 
 
 @kernel
@@ -195,20 +195,20 @@ def taut_at_frame_end(
 
 
 class _CableAtTension(NamedTuple):
-    """A cable that is held at a pose: all of it off the drum [m], what it pulls with [N], and at its frame end [N]."""
+    """A cable that is held at a pose: all of it off the drum [m], its sag force [N], and at its frame end [N]."""
 
     length: float
-    pull: float
+    sag_force: float
     tension: float
 
 
 @kernel
 def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
-    """A cable at a chord tension, with what is on its pulley and behind it; pull: T_z - tau sin phi."""
+    """A cable at a chord tension, with what is on its pulley and behind it; sag force: T_z - tau sin phi."""
     weightless = model.code == STRAIGHT or model.code == ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
-    length, pull, _status = solve_cable_state(model, chord, material, pulley, tau)
-    horizontal, vertical = tau * chord.cosine, tau * chord.sine + pull - weight * length
+    length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
+    horizontal, vertical = tau * chord.cosine, tau * chord.sine + sag_force - weight * length
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
     # cables of the shallow models leave along their chord, and have its tension behind it
     sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
@@ -216,7 +216,7 @@ def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, t
         there = tension
         sine, cosine = horizontal / there, pulley.entry * vertical / there
     rest = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))
-    return _CableAtTension(length + (rest.wrapped + rest.dead), pull, tension)
+    return _CableAtTension(length + (rest.wrapped + rest.dead), sag_force, tension)
 
 
 @entry

@@ -15,7 +15,7 @@ from sagline.core.arrays import Array
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.catenary import slack_series
-from sagline.kernels.cable.models import pull_of_shallow, sag_of_shallow, stretching_tension
+from sagline.kernels.cable.models import sag_of_shallow, shallow_sag_force, stretching_tension
 from sagline.kernels.cable.over_pulleys import across_pulley, energy_over, material_at, stiffness_in_series
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
@@ -115,21 +115,21 @@ def shallow_slopes(
     sine = rise / chord
     density, stiffness = material
     sag = sag_of_shallow(model, density * chord * cosine)
-    pull = pull_of_shallow(model, chord, density) if model.code == EMPIRICAL else 0.0
-    stretch = stretching_tension(tension, sine, cosine, pull)
+    sag_force = shallow_sag_force(model, chord, density) if model.code == EMPIRICAL else 0.0
+    stretch = stretching_tension(tension, sine, cosine, sag_force)
     square = tension * tension
     share = sag / square
-    by_tension = length * (tension + pull * sine) / (stretch * stiffness) + 2.0 * chord * share / tension
-    # what s changes with the chord at fixed tau: through sin phi and through the pull, which is proportional to D
-    by_pull = (pull + tension * sine) / stretch
-    by_sine = tension * pull / stretch
-    stretch_x = by_pull * pull * cosine / chord - by_sine * sine * cosine / chord
-    stretch_z = by_pull * pull * sine / chord + by_sine * cosine * cosine / chord
+    by_tension = length * (tension + sag_force * sine) / (stretch * stiffness) + 2.0 * chord * share / tension
+    # what s changes with the chord at fixed tau: through sin phi and through the sag force, which is proportional to D
+    by_sag_force = (sag_force + tension * sine) / stretch
+    by_sine = tension * sag_force / stretch
+    stretch_x = by_sag_force * sag_force * cosine / chord - by_sine * sine * cosine / chord
+    stretch_z = by_sag_force * sag_force * sine / chord + by_sine * cosine * cosine / chord
     sag_x = 2.0 * sag_of_shallow(model, density) * span / square
     slope_x = (cosine * (1.0 + share) + chord * sag_x - length * stretch_x / stiffness) / by_tension
     slope_z = (sine * (1.0 + share) - length * stretch_z / stiffness) / by_tension
     slope_length = -(1.0 + stretch / stiffness) / by_tension
-    slope_density = (2.0 * chord * share - length * by_pull * pull / stiffness) / (density * by_tension)
+    slope_density = (2.0 * chord * share - length * by_sag_force * sag_force / stiffness) / (density * by_tension)
     slope_stiffness = length * stretch / (stiffness * stiffness * by_tension)
     return _ShallowSlopes(slope_x, slope_z, slope_length, slope_density, slope_stiffness)
 
@@ -144,12 +144,12 @@ def _shallow_stiffness(
     cosine = span / chord
     sine = rise / chord
     across = tension / chord
-    unit_pull = pull_of_shallow(model, 1.0, material.density)
+    unit_sag_force = shallow_sag_force(model, 1.0, material.density)
     return PlaneStiffness(
         slopes.by_x * cosine + across * sine * sine,
         slopes.by_z * cosine - across * sine * cosine,
-        slopes.by_x * sine - across * sine * cosine + unit_pull * cosine,
-        slopes.by_z * sine + across * cosine * cosine + unit_pull * sine,
+        slopes.by_x * sine - across * sine * cosine + unit_sag_force * cosine,
+        slopes.by_z * sine + across * cosine * cosine + unit_sag_force * sine,
     )
 
 

@@ -16,7 +16,7 @@ class Model(NamedTuple):
     """A cable model where it stands."""
 
     code: int  # which equations
-    k_h: float  # the empirical model's constant of the pull
+    k_h: float  # the empirical model's constant of the sag force
     k_p: float  # the empirical model's constant of the sag
     gravity: float  # [m/s^2]
     # whether cables of given lengths may have something behind them; None leaves that out of the machine code, which

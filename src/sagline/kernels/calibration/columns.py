@@ -93,7 +93,7 @@ def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
         for k in range(6):
             share = space.moved[j, k]
             for q in range(slopes.work.shape[1]):
-                slopes.work[j, q] -= share * slopes.pull[k, q]
+                slopes.work[j, q] -= share * slopes.wrench[k, q]
 
 
 @glue
@@ -101,7 +101,7 @@ def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: A
     """Fill how the platform moves by each length, and in the last row by the first of the columns."""
     m = space.by_wrench.shape[0]
     for k in range(6):
-        space.six[k] = slopes.pull[k, 0]
+        space.six[k] = slopes.wrench[k, 0]
     for i in range(m + 1):
         fill_motion_by_wrench(free, space.by_wrench[i] if i < m else space.six, space, motion[i])
         for k in range(6):
@@ -158,8 +158,8 @@ def _in_world_axes(rows: Array, i: int, pair: Pair) -> Triple:
 def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, moment: Triple) -> None:
     """Add to a column a change of the wrench on the platform."""
     for k in range(3):
-        slopes.pull[k, at] += scale * force[k]
-        slopes.pull[3 + k, at] += scale * moment[k]
+        slopes.wrench[k, at] += scale * force[k]
+        slopes.wrench[3 + k, at] += scale * moment[k]
 
 
 @formula

@@ -82,7 +82,7 @@ def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Ar
 
 @glue
 def store_linearization(
-    sensing: Sensing, answer: Linearization, p: int, read: Array, lengths: Array, space: CalibrationArrays
+    sensing: Sensing, answer: Linearization, p: int, reading_arrays: Array, lengths: Array, space: CalibrationArrays
 ) -> None:
     """Write what one pose says."""
     residual, matrix, whole = answer.residual[p], answer.matrix[p], space.whole
@@ -90,7 +90,7 @@ def store_linearization(
     for j in range(readings):
         total = residual[j]
         for i in range(m):
-            total -= space.by_length[i, j] * (read[i] - lengths[i])
+            total -= space.by_length[i, j] * (reading_arrays[i] - lengths[i])
         space.deviation[j] = 0.0 if math.isnan(residual[j]) else total
     for j in range(readings):
         total = 0.0
@@ -111,7 +111,7 @@ def store_linearization(
 
 
 @formula
-def _rotation_between(read: Array, pose: Array, frame: Array) -> Triple:
+def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Triple:
     """Rotation vector, in the measuring system's axes, from the platform's predicted rotation to that read."""
     # what the system should read: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
@@ -120,7 +120,7 @@ def _rotation_between(read: Array, pose: Array, frame: Array) -> Triple:
     az = fw * pose[5] + fz * pose[6] + fx * pose[4] - fy * pose[3]
     aw = fw * pose[6] - fx * pose[3] - fy * pose[4] - fz * pose[5]
     # read * conj(that)
-    rx, ry, rz, rw = read[0], read[1], read[2], read[3]
+    rx, ry, rz, rw = reading_arrays[0], reading_arrays[1], reading_arrays[2], reading_arrays[3]
     x = -rw * ax + rx * aw - ry * az + rz * ay
     y = -rw * ay + ry * aw - rz * ax + rx * az
     z = -rw * az + rz * aw - rx * ay + ry * ax
@@ -161,9 +161,9 @@ def observe(
     model: ForwardTerms,
     given: SampleArrays,
     sensing: SensingArrays,
-    read: ReadingArrays,
-    looked_for: UnknownArrays,
-    room: tuple[Array, Indices],
+    reading_arrays: ReadingArrays,
+    unknown_arrays: UnknownArrays,
+    memory: tuple[Array, Indices],
     found: LinearizationArrays,
 ) -> None:
     """Residuals and derivatives at N equilibria; NaN where the platform has no stable one.
@@ -172,17 +172,17 @@ def observe(
         model: Cable model, the exact or the weightless one, as of `forward_poses`.
         given: `Samples`, its starts the poses, which are equilibria at the lengths.
         sensing: `Sensing`.
-        read: `Readings`.
-        looked_for: `Unknowns`.
-        room: `memory_for` as many cables.
+        reading_arrays: `Readings`.
+        unknown_arrays: `Unknowns`.
+        memory: `memory_for` as many cables.
         found: `Linearization`, filled.
     """
-    batch, sensors, readings = Samples(*given), Sensing(*sensing), Readings(*read)
-    sought, answer = Unknowns(*looked_for), Linearization(*found)
+    batch, sensors, readings = Samples(*given), Sensing(*sensing), Readings(*reading_arrays)
+    sought, answer = Unknowns(*unknown_arrays), Linearization(*found)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     free = batch.freedom
-    space = new_calibration_arrays(Memory(*room), m, free.shape[0], answer.work.shape[0] - 6)
+    space = new_calibration_arrays(Memory(*memory), m, free.shape[0], answer.work.shape[0] - 6)
     slopes = Slopes(answer.work[:-6], answer.work[-6:])
     for axis in range(3):
         unit = unit_vector(axis)

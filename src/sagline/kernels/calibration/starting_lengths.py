@@ -16,7 +16,7 @@ from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import block
 
-ROUNDS = 3  # of balancing: what the cables' weight pulls changes little with the tensions
+ITERATIONS = 3  # of balancing: what the cables' weight sag forces changes little with the tensions
 LEAST = 0.2  # of a tension that was read: balancing takes no more of it away
 
 
@@ -28,7 +28,7 @@ def starting_lengths(
     body: Array,
     poses: Array,
     tension: Array,
-    room: tuple[Array, Indices],
+    memory: tuple[Array, Indices],
     length_out: Array,
 ) -> None:
     """Unstrained lengths off the drums [m] of cables that hold the platform with nearly the tensions given.
@@ -42,19 +42,19 @@ def starting_lengths(
         body: Row of the body_table.
         poses: Pose rows (N, POSE_COLUMNS).
         tension: At the frame ends [N], (N, m).
-        room: `memory_for` as many cables.
+        memory: `memory_for` as many cables.
         length_out: (N, m).
     """
     model = model_of(terms)
     count, m = tension.shape
     n = freedom.shape[0]
-    numbers = room[0]
+    numbers = memory[0]
     rotation, at = block(numbers, 0, 3, 3)
     geometry, at = block(numbers, at, GEOMETRY_ROWS, m)
     along, at = block(numbers, at, m, n)
     matrix, at = block(numbers, at, n, n)
     factor, at = block(numbers, at, n, n)
-    tau, pull, least = numbers[at : at + m], numbers[at + m : at + 2 * m], numbers[at + 2 * m : at + 3 * m]
+    tau, sag_force, least = numbers[at : at + m], numbers[at + m : at + 2 * m], numbers[at + 2 * m : at + 3 * m]
     at += 3 * m
     six, part = numbers[at : at + 6], numbers[at + 6 : at + 6 + n].reshape((n,))
     for p in range(count):
@@ -76,7 +76,7 @@ def starting_lengths(
                 for i in range(m):
                     matrix[j, k] += along[i, j] * along[i, k]
         positive = factor_positive(matrix, 0.0, factor)
-        for _ in range(ROUNDS):
+        for _ in range(ITERATIONS):
             for k in range(6):
                 six[k] = 0.0
             six[2] = body[tables.MASS] * model.gravity
@@ -84,11 +84,11 @@ def starting_lengths(
                 chord = Chord(geometry[g.CHORD, i], geometry[g.SINE, i], geometry[g.COSINE, i])
                 material = Material(cables[i, tables.DENSITY], cables[i, tables.STIFFNESS])
                 held = hold_cable(model, chord, material, pulley_at(cables, i), tau[i])
-                pull[i] = held.pull
+                sag_force[i] = held.sag_force
                 length_out[p, i] = held.length
-                six[2] += pull[i]
-                six[3] += geometry[g.LEVER_Y, i] * pull[i]
-                six[4] -= geometry[g.LEVER_X, i] * pull[i]
+                six[2] += sag_force[i]
+                six[3] += geometry[g.LEVER_Y, i] * sag_force[i]
+                six[4] -= geometry[g.LEVER_X, i] * sag_force[i]
             components_along(freedom, six, part)
             for i in range(m):
                 for j in range(n):

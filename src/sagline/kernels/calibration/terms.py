@@ -67,7 +67,7 @@ class Slopes(NamedTuple):
     """Derivatives by the P numbers at one pose."""
 
     work: Array  # of the readings, first with the platform held, (R, P)
-    pull: Array  # of the wrench on the held platform about its center of mass, (6, P)
+    wrench: Array  # of the wrench on the held platform about its center of mass, (6, P)
 
 
 class CalibrationArrays(NamedTuple):

@@ -128,12 +128,16 @@ def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardA
 
 @entry
 def fit_poses(
-    chained: bool, given: SampleArrays, chain: LastEquilibriumArrays, room: tuple[Array, Indices], found: SolutionArrays
+    chained: bool,
+    given: SampleArrays,
+    chain: LastEquilibriumArrays,
+    memory: tuple[Array, Indices],
+    found: SolutionArrays,
 ) -> None:
     """Fit every sample in turn; arguments as of `forward_poses`. Forces are NaN, energy is half the sum of squares."""
     batch, answer, kept = Samples(*given), Solutions(*found), LastEquilibrium(*chain)
     count, m = batch.lengths.shape
-    space, rest = new_forward_arrays(Memory(*room), kept.rows, kept.factor)
+    space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
     motions, rest = new_motions(rest, batch.freedom.shape[0])
     free, arcs, start, pose = motions
     copy_pose(batch.starts[0], start)

@@ -196,7 +196,7 @@ def forward_poses(
     chained: bool,
     given: SampleArrays,
     chain: LastEquilibriumArrays,
-    room: tuple[Array, Indices],
+    memory: tuple[Array, Indices],
     found: SolutionArrays,
 ) -> None:
     """Solve every sample in turn.
@@ -207,13 +207,13 @@ def forward_poses(
         chained: Whether each sample starts where the last solved one ended, the first at starts[0].
         given: `Samples`.
         chain: `LastEquilibrium`; a chain of samples continues from it where it starts at the remembered pose.
-        room: `memory_for` as many cables.
+        memory: `memory_for` as many cables.
         found: `Solutions`, filled.
     """
     batch, answer, kept = Samples(*given), Solutions(*found), LastEquilibrium(*chain)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
-    space, rest = new_forward_arrays(Memory(*room), kept.rows, kept.factor)
+    space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
     motions, rest = new_motions(rest, batch.freedom.shape[0])
     free, arcs, start, pose = motions
     copy_pose(batch.starts[0], start)

@@ -60,7 +60,7 @@ def _describe_cable(
 def describe_states(
     model: ForwardTerms,
     given: SampleArrays,
-    room: tuple[Array, Indices],
+    memory: tuple[Array, Indices],
     matrices: Array,
     blocks: Array,
     slopes: Array,
@@ -71,7 +71,7 @@ def describe_states(
     Args:
         model: Cable model and the empirical one's constants; whether anything may be behind the cables, or None.
         given: `Samples`, its starts the poses.
-        room: `memory_for` as many cables.
+        memory: `memory_for` as many cables.
         matrices: Filled: stiffness of the platform, (N, 6, 6).
         blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
         slopes: Filled: dT of every cable by its data, (N, DATA, m, 3).
@@ -80,7 +80,7 @@ def describe_states(
     batch = Samples(*given)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
-    numbers = room[0]
+    numbers = memory[0]
     rotation, at = block(numbers, 0, 3, 3)
     rows, at = block(numbers, at, CABLE_ROWS, m)
     gradient = numbers[at : at + 6]

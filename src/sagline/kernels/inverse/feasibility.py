@@ -126,7 +126,7 @@ def decide_poses(
         )
         curves, left = new_curves(model, cables, statuses[p], rest)
         status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide_feasibility(curves, demand, change, left)
-        sag_forces_at(curves, change.tau, change.pull)
+        sag_forces_at(curves, change.tau, change.sag_force)
         if status == POSE_SOLVED:
             status = _pose_status(statuses[p])
         if status == POSE_SOLVED and not covers:
@@ -143,7 +143,7 @@ def decide_poses(
         for k in range(n):
             supplied = demand.right[k]
             for i in range(m):
-                supplied += demand.hanging[k, i] * change.pull[i]
+                supplied += demand.hanging[k, i] * change.sag_force[i]
             needed[p, k] = supplied if k < translations else supplied * lever
             farkas[p, k] = math.nan
             reliefs[p, k] = math.nan
@@ -167,14 +167,14 @@ def _pose_status(statuses: Codes) -> int:
 
 
 @glue
-def _demand_of(platform: Platform, cables: Cables, balance: Balance, room: Demand) -> tuple[Demand, float]:
+def _demand_of(platform: Platform, cables: Cables, balance: Balance, demand: Demand) -> tuple[Demand, float]:
     """Fill what is asked of the cables of a pose, and the lever arm [m] its moments are divided by."""
     n, m = balance.matrix.shape
     lever = 0.0
     for i in range(m):
-        for k in range(room.soft, n):
+        for k in range(demand.soft, n):
             lever = max(lever, abs(balance.matrix[k, i]))
-    column, hanging = balance.needed, room.right
+    column, hanging = balance.needed, demand.right
     for i in range(m):
         for a in range(6):
             column[a] = 0.0
@@ -183,21 +183,21 @@ def _demand_of(platform: Platform, cables: Cables, balance: Balance, room: Deman
         column[4] = -balance.geometry[g.LEVER_X, i]
         along_freedom(platform.freedom, column, hanging)
         for k in range(n):
-            unit = 1.0 if k < room.soft else 1.0 / lever
-            room.matrix[k, i] = balance.matrix[k, i] * unit
-            room.hanging[k, i] = hanging[k] * unit
+            unit = 1.0 if k < demand.soft else 1.0 / lever
+            demand.matrix[k, i] = balance.matrix[k, i] * unit
+            demand.hanging[k, i] = hanging[k] * unit
     size = 0.0
     for i in range(m):
         size = max(size, cables.half_weight[i])
     for k in range(n):
-        room.right[k] = balance.right[k] if k < room.soft else balance.right[k] / lever
+        demand.right[k] = balance.right[k] if k < demand.soft else balance.right[k] / lever
         for i in range(m):
-            room.right[k] -= room.hanging[k, i] * cables.pull[i]
-        size = max(size, abs(room.right[k]))
+            demand.right[k] -= demand.hanging[k, i] * cables.sag_force[i]
+        size = max(size, abs(demand.right[k]))
     if size == 0.0:
         for i in range(m):
             size = max(size, cables.low[i])
-    return Demand(room.matrix, room.hanging, room.right, room.soft, size), lever
+    return Demand(demand.matrix, demand.hanging, demand.right, demand.soft, size), lever
 
 
 @glue
@@ -233,10 +233,10 @@ def polygon_of_pose(
     pose: Array,
     wrench: Array,
     carried: tuple[Array, Array],
-    room: tuple[Array, Indices],
+    memory: tuple[Array, Indices],
     polygon: tuple[Array, Array, Array, Array, Array, Indices],
 ) -> int:
-    """The feasible set of one pose with the pulls that its cables have at given chord tensions; number of corners.
+    """The feasible set of one pose with the sag forces that its cables have at given chord tensions; number of corners.
 
     Args:
         model_terms: As in `inverse_poses`.
@@ -245,18 +245,18 @@ def polygon_of_pose(
         robot_terms: As in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
         wrench: External plus inertial, about the center of mass, (6,).
-        carried: Chord tensions and pulls of the cables, (m,) each; NaN for pulls of first order.
-        room: `memory_for` as many cables.
+        carried: Chord tensions and sag forces of the cables, (m,) each; NaN for sag forces of first order.
+        memory: `memory_for` as many cables.
         polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space
             (r, m); for r = 2 corners and labels as `feasible_polygon`; for r = 1 corners[0, 0] and corners[1, 0] are
             the ends of the interval (infinite where it has none); for r = 0 nothing more.
     """
     distribution = Distribution(*distribution_terms)
     freedom, bodies, robots = robot_terms
-    tensions, pulls = carried
+    tensions, sag_forces = carried
     scale, offset, bounds, null, corners, labels = polygon
     r, m = null.shape
-    cables, rest = new_cables(Memory(*room), m, robots_have_machine(robots))
+    cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, freedom.shape[0])
     platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
     model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY], None)
@@ -264,7 +264,7 @@ def polygon_of_pose(
     if not math.isnan(tensions[0]):
         for i in range(m):
             cables.tau[i] = tensions[i]
-            cables.pull[i] = pulls[i]
+            cables.sag_force[i] = sag_forces[i]
         if distribution.variable == FRAME_END_TENSION:
             linearize_ends(model, distribution, cables, balance)
     fill_needed_wrench(platform, cables, balance)
@@ -292,16 +292,16 @@ def margins_of_poses(
     robot_terms: Robots,
     poses: Array,
     wrenches: Array,
-    pulls: Array,
-    room: tuple[Array, Indices],
+    sag_forces: Array,
+    memory: tuple[Array, Indices],
     margins: Array,
 ) -> None:
-    """Fill the capacity margins [N] (N,) of poses whose cables have given pulls (N, m); NaN where they have none."""
+    """Fill the capacity margins [N] (N,) of poses at given sag forces (N, m); NaN where there are none."""
     limits = TensionLimits(*limit_terms)
     freedom, bodies, robots = robot_terms
-    count, m = pulls.shape
+    count, m = sag_forces.shape
     n = freedom.shape[0]
-    cables, rest = new_cables(Memory(*room), m, robots_have_machine(robots))
+    cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, n)
     weights, at = block(rest.numbers, 0, 1, m)
     weight = weights[0]
@@ -316,8 +316,8 @@ def margins_of_poses(
         platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
         model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
         placed = set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance) != POSE_NO_CHORD
-        if placed and not math.isnan(pulls[p, 0]):
+        if placed and not math.isnan(sag_forces[p, 0]):
             for i in range(m):
-                cables.pull[i] = pulls[p, i]
+                cables.sag_force[i] = sag_forces[p, i]
             fill_needed_wrench(platform, cables, balance)
             margins[p] = capacity_margin(balance.matrix, balance.right, cables.low, cables.high, translations, rest)

@@ -36,7 +36,7 @@ from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nea
 from sagline.kernels.tension.other_methods import distribute_by_other_method
 from sagline.kernels.tension.polygon import WorkArrays, reset_work_arrays
 
-STILL = 1e-9  # relative change of tension at which a distribution in frame-end tensions stands still
+TENSION_CONVERGED = 1e-9  # relative change of tension at which a distribution in frame-end tensions stands still
 SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
 
 
@@ -55,64 +55,64 @@ def linearize_ends(model: Model, distribution: Distribution, cables: Cables, bal
     return factor_balance(balance)
 
 
-ROUNDS = 30
-FREE_ROUNDS = 8  # then a choice that jumps with the last digits of the pulls is held where it is
-SETTLED = 1e-10  # [N]; pulls that change by less, or by 1e-15 of the largest tension, have settled
+ITERATIONS = 30
+FREE_ITERATIONS = 8  # then a choice that jumps with the last digits of the sag forces is held where it is
+CONVERGED = 1e-10  # [N]; sag forces that change by less, or by 1e-15 of the largest tension, have converged
 
 
 @glue
 def distribute_and_solve_cables(
     model: Model, distribution: Distribution, platform: Platform, cables: Cables, balance: Balance,
-    near: ReferencePoint, room: WorkArrays | None, statuses: Codes,
+    near: ReferencePoint, work: WorkArrays | None, statuses: Codes,
 ) -> int:  # fmt: skip
-    """Share the load and hang the cables until their pulls stand still; returns the pose's status.
+    """Distribute the tensions and solve the cables until their sag forces converge; returns the pose's status.
 
-    cables: those of `set_pose`; tensions, ratios and pulls are filled; room: work arrays for the methods that are not
-    projections, and for frame-end tensions; None leaves them out; statuses: filled: status of each cable, (m,).
+    cables: those of `set_pose`; tensions, ratios and sag forces are filled; work: arrays for the methods that are
+    not projections, and for frame-end tensions; None leaves them out; statuses: filled: status of each cable, (m,).
     """
     near.held.labels[0] = 0
-    if room is not None:
-        reset_work_arrays(room)
+    if work is not None:
+        reset_work_arrays(work)
     set_reference(distribution, balance.offset, balance.null, near)
-    hung = False
+    solved = False
     fill_needed_wrench(platform, cables, balance)
     possible = limits_admit_tensions(cables)
     status = POSE_NOT_CONVERGED if possible else POSE_INFEASIBLE
-    for k in range(ROUNDS if possible else 0):
+    for k in range(ITERATIONS if possible else 0):
         start_from_minimum_norm(balance)
-        if room is None:
+        if work is None:
             status = share_nearest(balance.bounds, balance.null, near, balance.tension)
-        elif is_nearest(distribution) or k >= FREE_ROUNDS:
-            if k >= FREE_ROUNDS and not is_nearest(distribution):
+        elif is_nearest(distribution) or k >= FREE_ITERATIONS:
+            if k >= FREE_ITERATIONS and not is_nearest(distribution):
                 fix_reference(balance, near)
             status = share_nearest(balance.bounds, balance.null, near, balance.tension)
         else:
             status = distribute_by_other_method(
-                distribution, balance.bounds, balance.offset, balance.null, near, room, balance.tension
+                distribution, balance.bounds, balance.offset, balance.null, near, work, balance.tension
             )
         if status != POSE_SOLVED:
             break
         moved, largest = take_tensions(cables, balance)
-        gravest = solve_cable_states(model, cables, not hung, hung and moved < NEAR, statuses)
+        gravest = solve_cable_states(model, cables, not solved, solved and moved < NEAR, statuses)
         if gravest == CABLE_TOO_SLACK or gravest == CABLE_NOT_CONVERGED:
             status = POSE_TOO_SLACK if gravest == CABLE_TOO_SLACK else POSE_NOT_CONVERGED
             break
         status = POSE_NOT_CONVERGED
-        stands = model.code != CATENARY or sag_force_change(cables) <= SETTLED + 1e-15 * largest
-        if room is None or distribution.variable != FRAME_END_TENSION:
-            if stands:
+        converged = model.code != CATENARY or sag_force_change(cables) <= CONVERGED + 1e-15 * largest
+        if work is None or distribution.variable != FRAME_END_TENSION:
+            if converged:
                 status = POSE_SOLVED
                 break
         else:
-            if stands and hung and moved <= STILL:
+            if converged and solved and moved <= TENSION_CONVERGED:
                 status = POSE_SOLVED
                 break
             if not linearize_ends(model, distribution, cables, balance):
                 status = POSE_SINGULAR
                 break
             set_reference(distribution, balance.offset, balance.null, near)
-            reset_work_arrays(room)
-        hung = True
+            reset_work_arrays(work)
+        solved = True
         fill_needed_wrench(platform, cables, balance)
     return status
 
@@ -146,29 +146,29 @@ def take_tensions(cables: Cables, balance: Balance) -> tuple[float, float]:
         moved = max(moved, abs(new - cables.tau[i]) / new)
         largest = max(largest, new)
         cables.tau[i] = new
-        cables.last_pull[i] = cables.pull[i]
+        cables.last_sag_force[i] = cables.sag_force[i]
     return moved, largest
 
 
 @glue
 def sag_force_change(cables: Cables) -> float:
-    """Largest change of a pull in this round [N]."""
+    """Largest change of a sag force in this iteration [N]."""
     change = 0.0
     for i in range(cables.tau.size):
-        change = max(change, abs(cables.pull[i] - cables.last_pull[i]))
+        change = max(change, abs(cables.sag_force[i] - cables.last_sag_force[i]))
     return change
 
 
 @glue
 def store_tensions(
-    model: Model, distribution: Distribution, cables: Cables, room: WorkArrays | None, near: ReferencePoint
+    model: Model, distribution: Distribution, cables: Cables, work: WorkArrays | None, near: ReferencePoint
 ) -> None:
     """Keep the tensions, in the variable they were shared in, for the pose that follows."""
     for i in range(cables.tau.size):
         near.previous[i] = cables.tau[i]
         if distribution.variable == HORIZONTAL_TENSION:
             near.previous[i] = cables.tau[i] * cables.cosine[i]
-        elif room is not None and distribution.variable == FRAME_END_TENSION:
+        elif work is not None and distribution.variable == FRAME_END_TENSION:
             near.previous[i] = frame_end_tension(
                 model, chord_of(cables, i), material_of(cables, i), pulley_of(cables, i), cables.tau[i]
             )

@@ -1,7 +1,7 @@
 """Inverse kinematics of a batch of poses: tensions that balance the platform, and the lengths to wind.
 
-docs/model.md, sections 4 and 5. For the exact cable the pulls T_z - tau sin phi depend on the tensions: the balance is
-solved again with the pulls of the last round until they stand still.
+docs/model.md, sections 4 and 5. For the exact cable the sag forces T_z - tau sin phi depend on the tensions: the
+balance is solved again with the sag forces of the last iteration until they converge.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def inverse_poses(
     poses: Array,
     wrenches: Array,
     previous: Array,
-    room: tuple[Array, Indices],
+    memory: tuple[Array, Indices],
     otherwise: bool | None,
     answers: Answers,
     first: int,
@@ -61,7 +61,7 @@ def inverse_poses(
         wrenches: External plus inertial, about the center of mass, (1 or N, 6).
         previous: Tensions in the distribution's variable (m,) to stay close to, NaN for the minimum norm; with
             CLOSEST the last feasible ones on return.
-        room: `memory_for` as many cables.
+        memory: `memory_for` as many cables.
         otherwise: None for the methods that project onto a reference, in chord or horizontal tensions: all others are
             then left out of the machine code. True for any.
         answers: Filled: span and rise of the free spans, length of all cable off the drum, T_x, T_z, tau, and where
@@ -78,7 +78,7 @@ def inverse_poses(
     m = statuses.shape[1]
     n = freedom.shape[0]
     machine = robots_have_machine(robots)
-    cables, rest = new_cables(Memory(*room), m, machine)
+    cables, rest = new_cables(Memory(*memory), m, machine)
     balance, rest = new_balance(rest, m, n)
     near, rest = new_reference_point(rest, previous, m - n)
     others = None if otherwise is None else new_work_arrays(distribution.method, rest, m, m - n)
@@ -134,7 +134,7 @@ def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance,
         results[tables.RISE, p, i] = balance.geometry[g.RISE, i]
         results[tables.LENGTH, p, i] = cables.ratio[i] * cables.free_chord[i] if solved else math.nan
         results[tables.HORIZONTAL, p, i] = tension * cables.cosine[i]
-        results[tables.VERTICAL, p, i] = tension * cables.sine[i] + cables.pull[i]
+        results[tables.VERTICAL, p, i] = tension * cables.sine[i] + cables.sag_force[i]
         results[tables.TENSION, p, i] = tension
     if cables.machine:
         _write_behind(solved, model, cables, results, p)
@@ -149,14 +149,14 @@ def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p:
             results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = math.nan
             results[tables.DEAD, p, i] = results[tables.SINE, p, i] = math.nan
     if solved:
-        tension = cables.last_pull  # where the cables leave; nobody asks for the pulls before any more
+        tension = cables.last_sag_force  # where the cables leave; nobody asks for the sag forces before any more
         for i in range(m):
             tension[i] = cables.tau[i]
         if model.code == CATENARY:
             for i in range(m):
                 x, z = cables.free_tau[i] * cables.free_cosine[i], cables.free_tau[i] * cables.free_sine[i]
                 length = cables.ratio[i] * cables.free_chord[i]
-                z += cables.free_pull[i] - cables.density[i] * model.gravity * length
+                z += cables.free_sag_force[i] - cables.density[i] * model.gravity * length
                 tension[i] = math.sqrt(x * x + z * z)
         for i in range(m):
             results[tables.SPAN, p, i] = cables.free_chord[i] * cables.free_cosine[i]

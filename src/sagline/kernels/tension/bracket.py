@@ -3,7 +3,7 @@
 Feasible is what tensions show that balance it. Infeasible is what a direction proves: along y each cable gives at most
 the largest value of its curve, and where these together fall short of the demand, nothing balances it. Where neither
 is at hand, every direction says of each cable how far from its best it may be, which narrows the ranges of tensions;
-where these stand still, the range of the cable whose pull is least certain is split in two.
+where these stand still, the range of the cable whose sag force is least certain is split in two.
 
 The shortfall lies between the gap of the first proof and what the least change leaves.
 """
@@ -35,9 +35,9 @@ FEASIBLE = 1e-9  # of the largest force at hand: what is left of the balance is 
 CERTAIN = 1e-14  # of the numbers at hand: limits that contradict by less may do so by rounding
 NODES = 300  # ranges looked at before the answer is that there is none
 DEPTH = 40  # ranges that wait at once
-STANDSTILL = 0.7  # pulls that stay this uncertain do not grow more certain by looking again
+STANDSTILL = 0.7  # sag forces that stay this uncertain do not grow more certain by looking again
 
-# Rows of a range (RANGE_ROWS, m): least and largest tensions, and the pulls at them.
+# Rows of a range (RANGE_ROWS, m): least and largest tensions, and the sag forces at them.
 LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3
 RANGE_ROWS = 4
 
@@ -158,7 +158,7 @@ def _narrow_free(
 
 @glue
 def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
-    """The cable whose pull is least certain in a range, and by how much all pulls together are [N]."""
+    """The cable whose sag force is least certain in a range, and by how much all pulls together are [N]."""
     worst = -1
     largest = 0.0
     total = 0.0
@@ -178,12 +178,12 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
             waiting[top + 1, row, j] = waiting[top, row, j]
     low, high = waiting[top, LEAST, i], waiting[top, LARGEST, i]
     middle = math.sqrt(low * high) if low > 0.0 else 0.5 * high
-    pull = sag_force_at(curves, i, middle)
+    sag_force = sag_force_at(curves, i, middle)
     lower, upper = (top + 1, top) if tau <= middle else (top, top + 1)
     waiting[lower, LARGEST, i] = middle
-    waiting[lower, AT_LARGEST, i] = pull
+    waiting[lower, AT_LARGEST, i] = sag_force
     waiting[upper, LEAST, i] = middle
-    waiting[upper, AT_LEAST, i] = pull
+    waiting[upper, AT_LEAST, i] = sag_force
 
 
 @glue
@@ -226,7 +226,7 @@ def _approach_demand(
     if left < math.inf or left != left:
         return left, norm_of_part(trial.residual, first, n) <= FEASIBLE * demand.size
     moments = Demand(demand.matrix[first:], demand.hanging[first:], demand.right[first:], n - first, demand.size)
-    part = TensionChange(trial.tau, trial.pull, trial.residual[first:], trial.direction[first:])
+    part = TensionChange(trial.tau, trial.sag_force, trial.residual[first:], trial.direction[first:])
     least_change(curves, moments, range_, part, memory)
     for k in range(first):
         trial.direction[k] = 0.0

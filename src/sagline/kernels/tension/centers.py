@@ -21,15 +21,15 @@ CENTERED = 1e-18  # square of the Newton decrement at which the center is found
 
 
 @kernel
-def share_at_center(bounds: Array, null: Array, point: Array, room: WorkArrays) -> int:
-    """Move the point (r,) to the analytic center, from that of the round before if there was one."""
-    corners, labels, known = room.corners, room.labels, room.known
-    if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, room.rest, point):
+def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
+    """Move the point (r,) to the analytic center, from that of the iteration before if there was one."""
+    corners, labels, known = work.corners, work.labels, work.known
+    if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
         return POSE_SOLVED
     known[0] = 0
     r, m = null.shape
     if r > 2:
-        status = deepest_point(bounds, null, room, point)
+        status = deepest_point(bounds, null, work, point)
         if status != POSE_SOLVED:
             return status
     else:
@@ -43,7 +43,7 @@ def share_at_center(bounds: Array, null: Array, point: Array, room: WorkArrays) 
         point[0] = x
         if r == 2:
             point[1] = y
-    if not _analytic_center(bounds, null, room.rest, point):
+    if not _analytic_center(bounds, null, work.rest, point):
         return POSE_NOT_CONVERGED
     known[0] = 1
     return POSE_SOLVED
@@ -63,14 +63,14 @@ def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
 
 
 @kernel
-def deepest_point(bounds: Array, null: Array, room: WorkArrays, point: Array) -> int:
+def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) -> int:
     """Fill the point (r,) whose tensions keep farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
-    rows, at = block(room.rest.numbers, 0, r + 1, 2 * m)
+    rows, at = block(work.rest.numbers, 0, r + 1, 2 * m)
     halves, at = block(
-        room.rest.numbers, at, STRIP_ROWS, 2 * m
+        work.rest.numbers, at, STRIP_ROWS, 2 * m
     )  # every side one of its own, which depth makes narrower
-    vectors, at = block(room.rest.numbers, at, 2, r + 1)
+    vectors, at = block(work.rest.numbers, at, 2, r + 1)
     cost, found = vectors[0], vectors[1]
     for i in range(m):
         for k in range(r):
@@ -83,8 +83,8 @@ def deepest_point(bounds: Array, null: Array, room: WorkArrays, point: Array) ->
         cost[k] = 0.0
     cost[r] = -1.0
     slack = TOLERANCE * largest_bound(bounds)
-    room.basis.labels[0] = -1
-    outcome = lowest_point(rows, halves, cost, slack, room.basis, found)
+    work.basis.labels[0] = -1
+    outcome = lowest_point(rows, halves, cost, slack, work.basis, found)
     for k in range(r):
         point[k] = found[k]
     return POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else program_status(outcome)

@@ -39,8 +39,8 @@ class Demand(NamedTuple):
     """Demand on the cables of one pose; moments are divided by the lever arm, so that every row is in newtons."""
 
     matrix: Array  # J, what a chord tension gives, (n, m)
-    hanging: Array  # G, what a pull takes away, (n, m)
-    right: Array  # wrench to be supplied beside the pulls, (n,)
+    hanging: Array  # G, what a sag force takes away, (n, m)
+    right: Array  # wrench to be supplied beside the sag forces, (n,)
     soft: int  # how many of the rows, the first ones, may leave something; the others, hard ones, leave nothing
     size: float  # the largest force at hand [N], by which tolerances are measured
 
@@ -49,7 +49,7 @@ class TensionChange(NamedTuple):
     """A state of the search, for m cables and n rows."""
 
     tau: Array  # chord tensions [N], (m,)
-    pull: Array  # their pulls [N], (m,)
+    sag_force: Array  # their sag forces [N], (m,)
     residual: Array  # what they leave of the demand [N], moments per lever arm, (n,)
     direction: Array  # y, along which the rest is; moments per lever arm, (n,)
 
@@ -57,7 +57,7 @@ class TensionChange(NamedTuple):
 class _Tangents(NamedTuple):
     """One Newton step, with h hard and k soft rows and d = m - h unknowns."""
 
-    matrix: Array  # J - G dpull/dtau, (n, m)
+    matrix: Array  # J - G dsag_force/dtau, (n, m)
     reduced: Array  # its hard rows, then their reflections, (h, m)
     diagonals: Array  # of their factors, (2, h)
     q: Array  # orthogonal factor, and a row to work in, (m + 1, m)
@@ -68,10 +68,10 @@ class _Tangents(NamedTuple):
     bounds: Array  # tensions that are best without limits, and the limits, (3, m)
     unknowns: Array  # A right side, a target of zeros and the point, (3, d)
     held: ActiveSet  # limits that the last point stands on
-    push: Array  # slopes of the pulls, then what the limits push with, (m,)
+    push: Array  # slopes of the sag forces, then what the limits push with, (m,)
     bend: Array  # what the square of a change of each tension weighs, (m,)
     multipliers: Array  # what the step before left, and what its hard rows cost [N], (n,)
-    trial: tuple[Array, Array, Array]  # tensions, (m,), pulls, (m,), and residual of a step that is tried, (n,)
+    trial: tuple[Array, Array, Array]  # tensions, (m,), sag forces, (m,), and residual of a step that is tried, (n,)
 
 
 @glue
@@ -101,13 +101,13 @@ def _new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[_Tangents,
 
 
 @glue
-def _fill_residual(curves: Curves, demand: Demand, tau: Array, pull: Array, residual: Array) -> None:
-    """Fill the pulls (m,) of tensions (m,) and what they leave of the demand (n,)."""
-    sag_forces_at(curves, tau, pull)
+def _fill_residual(curves: Curves, demand: Demand, tau: Array, sag_force: Array, residual: Array) -> None:
+    """Fill the sag forces (m,) of tensions (m,) and what they leave of the demand (n,)."""
+    sag_forces_at(curves, tau, sag_force)
     for k in range(residual.size):
         residual[k] = demand.right[k]
         for i in range(tau.size):
-            residual[k] += demand.hanging[k, i] * pull[i] - demand.matrix[k, i] * tau[i]
+            residual[k] += demand.hanging[k, i] * sag_force[i] - demand.matrix[k, i] * tau[i]
 
 
 @formula
@@ -243,7 +243,7 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
     """
     n, m = demand.matrix.shape
     soft = demand.soft
-    trial, trial_pull, left = step.trial
+    trial, trial_sag_force, left = step.trial
     known = STANDS * demand.size
     price = 1.0
     for k in range(soft, n):
@@ -257,7 +257,7 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
     share = 1.0
     after = math.inf
     for _ in range(HALVINGS):
-        _fill_residual(curves, demand, trial, trial_pull, left)
+        _fill_residual(curves, demand, trial, trial_sag_force, left)
         after = norm_of_part(left, 0, soft) + price * norm_of_part(left, soft, n)
         if after <= before - DECREASE * share * (before - rest) + known:
             break
@@ -268,7 +268,7 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
         return False
     for i in range(m):
         change.tau[i] = trial[i]
-        change.pull[i] = trial_pull[i]
+        change.sag_force[i] = trial_sag_force[i]
     for k in range(n):
         change.residual[k] = left[k]
     return True
@@ -285,7 +285,7 @@ def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionC
     n, m = demand.matrix.shape
     soft = demand.soft
     step, _ = _new_tangents(memory, n, m, n - soft)
-    _fill_residual(curves, demand, change.tau, change.pull, change.residual)
+    _fill_residual(curves, demand, change.tau, change.sag_force, change.residual)
     for k in range(n):
         step.multipliers[k] = 0.0
     for _ in range(NEWTON_STEPS):

@@ -136,7 +136,7 @@ def share_by_norm(
 ) -> int:
     """Fill the point (r,) of near whose tensions have the least p-norm.
 
-    known: whether that point is the answer of a round before, (1,), from which the search then starts.
+    known: whether that point is the answer of the iteration before, (1,), from which the search then starts.
     """
     point = near.point
     slack = TOLERANCE * largest_bound(bounds)

@@ -131,15 +131,15 @@ WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon
 
 @kernel
 def distribute_on_polygon(
-    method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, room: WorkArrays
+    method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
 ) -> int:
     """Fill the point (r,) of near by the centroid or the polygon walk; the last edges are tried first."""
     r, m = null.shape
-    corners, labels, known = room.corners, room.labels, room.known
+    corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
     if count == 0 or not polygon_again(bounds, null, corners, labels, count):
         if method == POLYGON_WALK and r == 2:
-            count = walk_polygon(bounds, null, room.rest, corners, labels)
+            count = walk_polygon(bounds, null, work.rest, corners, labels)
         else:
             count = feasible_corners(bounds, null, corners, labels)
     known[0] = count if r == 2 else 0

@@ -124,7 +124,7 @@ def distribute_by_other_method(
     offset: Array,
     null: Array,
     near: ReferencePoint,
-    room: WorkArrays,
+    work: WorkArrays,
     tension: Array,
 ) -> int:
     """Fill the tensions (m,) in the distribution's variable less its offset; return POSE_SOLVED or a reason.
@@ -138,20 +138,20 @@ def distribute_by_other_method(
         kept = satisfies_limits(bounds, tension, TOLERANCE * largest_bound(bounds))
         status = POSE_SOLVED if kept else POSE_INFEASIBLE
     elif CLOSED_FORM <= method <= PUNCTURE:
-        if not share_near_middle(method, bounds, null, room.rest, tension):
+        if not share_near_middle(method, bounds, null, work.rest, tension):
             status = share_nearest(bounds, null, near, tension)
             status = POSE_NOT_COVERED if status == POSE_SOLVED else status
     else:
         if method == LOWEST_MAXIMUM:
-            status = share_lowest_maximum(bounds, offset, null, near, room.basis, room.rest)
+            status = share_lowest_maximum(bounds, offset, null, near, work.basis, work.rest)
         elif method == LOWEST_SUM:
-            status = share_lowest_sum(bounds, null, near, room.basis, room.rest)
+            status = share_lowest_sum(bounds, null, near, work.basis, work.rest)
         elif method == P_NORM:
-            status = share_by_norm(parameter, bounds, offset, null, near, room.known, room.rest)
+            status = share_by_norm(parameter, bounds, offset, null, near, work.known, work.rest)
         elif method == ANALYTIC_CENTER:
-            status = share_at_center(bounds, null, near.point, room)
+            status = share_at_center(bounds, null, near.point, work)
         elif method == CENTROID or method == POLYGON_WALK:
-            status = distribute_on_polygon(method, parameter, bounds, null, near, room)
+            status = distribute_on_polygon(method, parameter, bounds, null, near, work)
         if status == POSE_SOLVED:
             set_point(bounds, null, near.point, tension)
     return status

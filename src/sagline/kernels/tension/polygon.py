@@ -235,8 +235,8 @@ class WorkArrays(NamedTuple):
 
     corners: Array  # of the feasible polygon, (2m + SPARE_CORNERS, 2)
     labels: Indices  # of its sides, (2m + SPARE_CORNERS,)
-    known: Indices  # how many corners the polygon of the last round had, (1,); 0 for none
-    basis: Basis  # of the linear program of the last round
+    known: Indices  # how many corners the polygon of the last iteration had, (1,); 0 for none
+    basis: Basis  # of the linear program of the last iteration
     rest: Memory  # memory that keeps nothing
 
 
@@ -253,7 +253,7 @@ def new_work_arrays(method: int, memory: Memory, m: int, r: int) -> WorkArrays:
 
 
 @glue
-def reset_work_arrays(room: WorkArrays) -> None:
+def reset_work_arrays(work: WorkArrays) -> None:
     """A new pose: nothing is known from the one before."""
-    room.known[0] = 0
-    room.basis.labels[0] = -1
+    work.known[0] = 0
+    work.basis.labels[0] = -1

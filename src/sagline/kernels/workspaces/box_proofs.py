@@ -12,12 +12,12 @@ from sagline.kernels.jit import formula, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.box_tensions import Centered, Ranges, factor_normal, in_wrench_space, spread_of_slopes
 from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange, most_of_linear, norm3
-from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, pull_slope, rise, rise_rate
+from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, rise, rise_rate, sag_force_slope
 from sagline.kernels.workspaces.wrench_set import Loads, dot6, reach_of_loads
 
 POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which nothing is proved: the place is all but singular
 HEADROOM = 1.2  # a box of tensions is tried that much larger than a first estimate
-ROUNDS = 3  # of that estimate
+ITERATIONS = 3  # of that estimate
 
 
 class Precision(NamedTuple):
@@ -48,7 +48,7 @@ def proves_inside(
     hanging, at = block(memory.numbers, at, m, m)
     rows, at = block(memory.numbers, at, 7, m)
     slopes, _ = block(memory.numbers, at, MOTIONS + 2, 6)
-    slack, sum_, trial, low, pull, size, weight = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
+    slack, sum_, trial, low, sag_force, size, weight = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
     along, coefficients = slopes[MOTIONS], slopes[MOTIONS + 1]
     tau = centered.tau
     for i in range(m):
@@ -109,7 +109,7 @@ def proves_inside(
             z = along[2] + along[3] * place.lever[1, j] - along[4] * place.lever[0, j]
             length = norm3(x, y, z)
             bends += tau[j] * (length * place.bent[j] + arm * (place.swung[j] * place.turned[j] + place.curled[j]))
-            bends += abs(ranges.pull[j]) * arm * place.curled[j]
+            bends += abs(ranges.sag_force[j]) * arm * place.curled[j]
             change[i, j] = precision.bends * (length * place.turned[j] + arm * place.swung[j]) + inexact
             hanging[i, j] = abs(z) + arm * place.swung[j]
         most = reach_of_loads(loads, along)
@@ -122,7 +122,7 @@ def proves_inside(
         return False
     for i in range(m):
         trial[i] = sum_[i]
-    for _ in range(ROUNDS):
+    for _ in range(ITERATIONS):
         for i in range(m):
             low[i] = sum_[i]
             for j in range(m):
@@ -133,12 +133,12 @@ def proves_inside(
         trial[i] = min(slack[i], HEADROOM * trial[i])
         low[i] = tau[i] - trial[i]
     for j in range(m):
-        moved = place.way[j] * pull_slope(curves, j, place.way[j], low[j])
-        pull[j] = moved + trial[j] * max(fall_rate(curves, j, low[j]), rise_rate(curves, j, low[j]))
+        moved = place.way[j] * sag_force_slope(curves, j, place.way[j], low[j])
+        sag_force[j] = moved + trial[j] * max(fall_rate(curves, j, low[j]), rise_rate(curves, j, low[j]))
     for i in range(m):
         total = sum_[i]
         for j in range(m):
-            total += change[i, j] * trial[j] + hanging[i, j] * pull[j]
+            total += change[i, j] * trial[j] + hanging[i, j] * sag_force[j]
         possible = possible and total * (1.0 + precision.rounding) < trial[i]
     return possible
 
@@ -218,10 +218,10 @@ def proves_outside(
         for i in range(m):
             if abs(value[i]) < spread[i] + bend[i]:
                 goal = -bend[i] - value[i]
-                room = ranges.highest[i] - ranges.lowest[i]
+                width = ranges.highest[i] - ranges.lowest[i]
                 goal += (
-                    spread[i] * ((tau[i] - ranges.lowest[i]) - (ranges.highest[i] - tau[i])) / room
-                    if room < math.inf
+                    spread[i] * ((tau[i] - ranges.lowest[i]) - (ranges.highest[i] - tau[i])) / width
+                    if width < math.inf
                     else -spread[i]
                 )
                 for k in range(n):
@@ -255,10 +255,10 @@ def proves_outside(
 
 @kernel
 def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, turning: Array, rows: Array) -> None:
-    """Fill what a newton of each cable and of its pull count along a direction, and how that goes in a box.
+    """Fill what a newton of each cable and of its sag force count along a direction, and how that goes in a box.
 
     direction: y at the middle, (6,); turning: its slopes with each motion, (MOTIONS, 6); rows: filled: along a column
-    the value at the middle, what is left of it by its slopes, and how far these lead; the same along a pull.
+    the value at the middle, what is left of it by its slopes, and how far these lead; the same along a sag force.
     """
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3
@@ -325,19 +325,19 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
 
 
 @formula
-def _most_of_run(slope: float, rate: float, most: float, room: float) -> float:
+def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
     """Largest t slope + min(t rate, most) for t from 0 to room; rate and most are >= 0."""
-    if slope >= 0.0 or room == 0.0:
-        return room * slope + min(rate * room, most) if room > 0.0 else 0.0
+    if slope >= 0.0 or width == 0.0:
+        return width * slope + min(rate * width, most) if width > 0.0 else 0.0
     if rate + slope <= 0.0:
         return 0.0
-    turn = min(most / rate, room)
+    turn = min(most / rate, width)
     return turn * (rate + slope)
 
 
 @kernel
 def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
-    """Most that a cable gives along y at any tension, anywhere in a box, beyond what one tension and its pull give."""
+    """Upper bound over a box of a cable's gain along y at any tension over that at one tension and its sag force."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)
@@ -367,6 +367,6 @@ def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: floa
     largest = max(largest, fall(curves, i, low, tau), rise(curves, i, low, tau), rise(curves, i, tau, high))
     if high < math.inf:
         largest = max(largest, fall(curves, i, tau, high))
-    moved = place.way[i] * pull_slope(curves, i, place.way[i], low)
+    moved = place.way[i] * sag_force_slope(curves, i, place.way[i], low)
     gain += tau * bend + weight * moved + (rows[HANGING_SPREAD, i] + rows[HANGING_BENT, i]) * (largest + moved)
-    return gain + abs(ranges.pull[i]) * rows[HANGING_BENT, i]
+    return gain + abs(ranges.sag_force[i]) * rows[HANGING_BENT, i]

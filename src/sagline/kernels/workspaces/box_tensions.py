@@ -20,7 +20,7 @@ from sagline.kernels.codes import CATENARY, LIMITS_OF_CHORD
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
-from sagline.kernels.workspaces.sag_force_bounds import has_sag, most_pull, pull_slope
+from sagline.kernels.workspaces.sag_force_bounds import has_sag, largest_sag_force, sag_force_slope
 
 STEPS = 40
 REDUCTION = 0.1  # of the smoothing, at most, with each step
@@ -165,9 +165,9 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
 
 
 SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
-SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the pull
-LEAST_ROOM = 0.05  # share of their range that a set of wrenches leaves to the tensions in the search for a center
-ROUNDS = 2  # of tensions and their pulls
+SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the sag force
+LEAST_WIDTH = 0.05  # share of their range that a set of wrenches leaves to the tensions in the search for a center
+ITERATIONS = 2  # of tensions and their sag forces
 LEAST_WAY = 1e-4  # of a chord: a smaller box is smoothed as one so large
 
 
@@ -178,7 +178,7 @@ class Ranges(NamedTuple):
     high: Array  # what no limit falls below, nor stretches a cable to more than twice its length; may be infinite
     lowest: Array  # what no limit falls below: for outside
     highest: Array  # what no limit exceeds, or no load can cause; may be infinite
-    pull: Array  # pulls at the centered tensions
+    sag_force: Array  # sag forces at the centered tensions
 
 
 @kernel
@@ -202,14 +202,14 @@ def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges
 def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> None:
     """Take the limits of a cable's frame end, as chord limits at the middle, apart by how far they move in a box.
 
-    They move as its pull does where it is not slack. A limit that is, anywhere in the box, is the least of those that
-    are not for what has to keep it, and none at all for the proof that nothing does.
+    They move as its sag force does where it is not slack. A limit that is, anywhere in the box, is the least of those
+    that are not for what has to keep it, and none at all for the proof that nothing does.
     """
     cables = curves.cables
     way = place.way[i]
     tight = cables.half_weight[i] * (1.0 + way / cables.chord[i]) / SLACK
     low, high = max(cables.low[i], tight), max(cables.high[i], tight)
-    moves = way * pull_slope(curves, i, way, tight)
+    moves = way * sag_force_slope(curves, i, way, tight)
     ranges.low[i] = low + moves
     ranges.lowest[i] = low - moves if cables.low[i] - moves > tight else 0.0
     if high < math.inf:
@@ -221,10 +221,10 @@ def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> 
 def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, ranges: Ranges) -> None:
     """Take from the largest tensions what no load on cables that all pull up could cause.
 
-    Along the vertical they balance weight, load and pulls, of which each is at most the rest.
+    Along the vertical they balance weight, load and sag forces, of which each is at most the rest.
 
     freedom: rows that pick the free motions, (n, 6); upward: most vertical force that the cables have to give beside
-    their pulls [N].
+    their sag forces [N].
     """
     free = 0.0
     for k in range(freedom.shape[0]):
@@ -234,8 +234,8 @@ def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, r
     for i in range(place.way.size):
         up = place.full[2, i] - place.turned[i]
         least = min(least, up)
-        moves = place.way[i] * pull_slope(curves, i, place.way[i], ranges.lowest[i])
-        total += most_pull(curves, i, ranges.lowest[i]) + moves - up * ranges.lowest[i]
+        moves = place.way[i] * sag_force_slope(curves, i, place.way[i], ranges.lowest[i])
+        total += largest_sag_force(curves, i, ranges.lowest[i]) + moves - up * ranges.lowest[i]
     if free > 1.0 - 1e-12 and least > 0.0:
         for i in range(place.way.size):
             most = ranges.lowest[i] + max(total, 0.0) / (place.full[2, i] - place.turned[i])
@@ -244,7 +244,7 @@ def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, r
 
 @kernel
 def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ranges: Ranges, slopes: Array) -> None:
-    """Fill how the wrench that the centered tensions and their pulls give goes with each motion, (MOTIONS, 6)."""
+    """Fill how the wrench that the centered tensions and their sag forces give goes with each motion, (MOTIONS, 6)."""
     m = place.way.size
     for motion in range(MOTIONS):
         for a in range(6):
@@ -255,14 +255,14 @@ def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ran
         for a in range(6):
             for i in range(m):
                 slopes[motion, a] += centered.tau[i] * columns[a, i]
-        for i in range(m):  # a pull's lever goes with rotation
+        for i in range(m):  # a sag force's lever goes with rotation
             if motion == 3:
-                slopes[motion, 3] += ranges.pull[i] * place.lever[2, i]
+                slopes[motion, 3] += ranges.sag_force[i] * place.lever[2, i]
             elif motion == 4:
-                slopes[motion, 4] += ranges.pull[i] * place.lever[2, i]
+                slopes[motion, 4] += ranges.sag_force[i] * place.lever[2, i]
             elif motion == 5:
-                slopes[motion, 3] -= ranges.pull[i] * place.lever[0, i]
-                slopes[motion, 4] -= ranges.pull[i] * place.lever[1, i]
+                slopes[motion, 3] -= ranges.sag_force[i] * place.lever[0, i]
+                slopes[motion, 4] -= ranges.sag_force[i] * place.lever[1, i]
 
 
 @formula
@@ -278,18 +278,18 @@ def in_wrench_space(rows: Array, vector: Array, full: Array) -> None:
 def _fill_demand(
     curves: Curves, place: CablesInBox, center: Array, load: Array, centered: Centered, ranges: Ranges
 ) -> None:
-    """Fill what the chord tensions have to supply, with the pulls at the present ones.
+    """Fill what the chord tensions have to supply, with the sag forces at the present ones.
 
-    load: wrench, (6,); centered: tensions; filled; ranges: its pulls are filled.
+    load: wrench, (6,); centered: tensions; filled; ranges: its sag forces are filled.
     """
     n, m = place.matrix.shape
-    sag_forces_at(curves, centered.tau, ranges.pull)
+    sag_forces_at(curves, centered.tau, ranges.sag_force)
     z = center[tables.MASS] * center[tables.GRAVITY] - load[2]
     x, y = -load[3], -load[4]
     for i in range(m):
-        z += ranges.pull[i]
-        x += place.lever[1, i] * ranges.pull[i]
-        y -= place.lever[0, i] * ranges.pull[i]
+        z += ranges.sag_force[i]
+        x += place.lever[1, i] * ranges.sag_force[i]
+        y -= place.lever[0, i] * ranges.sag_force[i]
     for k in range(n):
         row = place.rows[k]
         centered.right[k] = (
@@ -318,7 +318,7 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
         low = ranges.low[i]
         high = min(ranges.high[i], ranges.highest[i], low + FARTHEST * (size + low))
         possible = possible and low < high
-        share = min(taken[i], 0.5 * (1.0 - LEAST_ROOM) * (high - low))
+        share = min(taken[i], 0.5 * (1.0 - LEAST_WIDTH) * (high - low))
         centered.low[i] = low + share
         centered.high[i] = high - share
     return possible
@@ -328,16 +328,16 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
 def center_tensions(
     place: CablesInBox, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
 ) -> tuple[float, float]:
-    """Let tensions between the limits of the search balance a wrench (6,), with their own pulls.
+    """Let tensions between the limits of the search balance a wrench (6,), with their own sag forces.
 
     Returns the square of what they leave [N^2], and the smoothing.
     """
-    rounds = ROUNDS if curves.model.code == CATENARY else 1
+    iterations = ITERATIONS if curves.model.code == CATENARY else 1
     square, smoothing = 0.0, 0.0
     for i in range(centered.tau.size):
         if not centered.low[i] < centered.tau[i] < centered.high[i]:
             centered.tau[i] = 0.5 * (centered.low[i] + centered.high[i])
-    for _ in range(rounds):
+    for _ in range(iterations):
         _fill_demand(curves, place, body, wrench, centered, ranges)
         smoothing = _smoothing_of(place, geometry, centered.tau)
         find_center(place.matrix, smoothing, centered)

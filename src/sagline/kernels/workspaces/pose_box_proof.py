@@ -34,14 +34,14 @@ from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_load
 
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn
-ROUNDS = 3  # of tensions, and what a set of wrenches takes of their limits
+ATTEMPTS = 3  # of tensions, and what a set of wrenches takes of their limits
 BEYOND = 2.0  # of the smoothing, a cable: a demand that leaves more is out of reach
 
 LoadTerms = tuple[Array, Array, Array, Array, Indices]  # Loads
 PrecisionTerms = tuple[float, float]  # Precision
 
 
-def room_for(cables: int) -> tuple[Array, Indices]:
+def memory_for_proofs(cables: int) -> tuple[Array, Indices]:
     """Memory in which proofs work with so many cables."""
     return np.empty(14 * cables * cables + 500 * cables + 800), np.empty(10 * cables + 40, dtype=np.int64)
 
@@ -54,7 +54,7 @@ def prove_boxes(
     load_terms: LoadTerms,
     boxes: Array,
     precision_terms: PrecisionTerms,
-    room: tuple[Array, Indices],
+    memory: tuple[Array, Indices],
     answers: tuple[Codes, Codes],
 ) -> None:
     """Try to prove of each of N boxes of poses that a robot can work at all of its poses, or at none.
@@ -67,7 +67,7 @@ def prove_boxes(
         load_terms: The wrenches to bear: `Loads`.
         boxes: Rows: pose at the middle, half edges [m], largest turn from there [rad], (N, BOX_COLUMNS).
         precision_terms: `Precision`.
-        room: `room_for` as many cables.
+        memory: `proof_memory` as many cables.
         answers: Filled: OPEN, INSIDE or OUTSIDE, (N,); and statuses to work in, (m,).
     """
     limits = TensionLimits(*limit_terms)
@@ -78,7 +78,7 @@ def prove_boxes(
     body, robot = bodies[0], robots[0]
     n, m = freedom.shape[0], robot.shape[0]
     model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
-    cables, rest = new_cables(Memory(*room), m, False)
+    cables, rest = new_cables(Memory(*memory), m, False)
     place, rest = new_cables_in_box(rest, m, n)
     centered, rest = new_centered(rest, m, n)
     curves, rest = new_curves(model, cables, statuses, rest)
@@ -115,7 +115,7 @@ def prove_boxes(
             continue
         square, smoothing = center_tensions(place, curves, geometry, body, wrench, centered, ranges)
         outside = square > BEYOND * m * smoothing
-        for attempt in range(ROUNDS if several else 1):
+        for attempt in range(ATTEMPTS if several else 1):
             if outside:
                 break
             if proves_inside(place, box, curves, loads, centered, ranges, precision, rest):

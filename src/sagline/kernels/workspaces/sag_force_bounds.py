@@ -19,14 +19,14 @@ from sagline.kernels.memory import Memory
 # What the formula of `range_between_ends` is good for, on two million random cables.
 SLACKEST, STRETCHED = 0.3, 0.15  # largest X and e
 BY_STRETCH, BY_SAG = 0.334, 0.023  # its remainder, of eX and of X^3
-FROM_MOST, BEFORE_MOST = 0.85, 1.8  # of X_M: the pull turns at 0.89 to 1.72 of it
+FROM_MOST, BEFORE_MOST = 0.85, 1.8  # of X_M: the sag force turns at 0.89 to 1.72 of it
 BEFORE_LEAST, AFTER_LEAST = 0.25, 1.05  # of |sin phi|/cos^2 phi: and turns again at 0.28 to 1.03 of that
 
 # Rows of the bands (BAND_ROWS, m).
 LOW, HIGH = 0, 1  # chord tensions [N]; the upper one may be infinite
 TAUT = 2  # the largest one that sagging cables are looked at: where there is no limit they are stretched to twice
-PULL_LOW, PULL_HIGH = 3, 4  # pulls at LOW and TAUT [N]
-LEAST, MOST = 5, 6  # least and largest pull between them [N]
+SAG_FORCE_LOW, SAG_FORCE_HIGH = 3, 4  # sag forces at LOW and TAUT [N]
+LEAST, MOST = 5, 6  # least and largest sag force between them [N]
 BAND_ROWS = 7
 
 
@@ -34,8 +34,8 @@ BAND_ROWS = 7
 def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
     """Fill the bands of the cables in place; False where one is too slack to hang, whatever its tension.
 
-    Tensions below which a cable's X = wD/(2 tau) is above LOOSEST are left out: with a least tension of zero the pull
-    has no largest value.
+    Tensions below which a cable's X = wD/(2 tau) is above LOOSEST are left out: with a least tension of zero the sag
+    force has no largest value.
     """
     cables = curves.cables
     m = cables.low.size
@@ -50,11 +50,11 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
             bands[LOW, i] = min(max(cables.low[i], cables.half_weight[i] / LOOSEST), bands[TAUT, i])
     if not exact:
         for i in range(m):
-            pull = cables.pull[i]  # of first order, and the same at every tension
-            bands[PULL_LOW, i] = bands[PULL_HIGH, i] = bands[LEAST, i] = bands[MOST, i] = pull
+            sag_force = cables.sag_force[i]  # of first order, and the same at every tension
+            bands[SAG_FORCE_LOW, i] = bands[SAG_FORCE_HIGH, i] = bands[LEAST, i] = bands[MOST, i] = sag_force
         return True
-    sag_forces_at(curves, bands[LOW], bands[PULL_LOW])
-    sag_forces_at(curves, bands[TAUT], bands[PULL_HIGH])
+    sag_forces_at(curves, bands[LOW], bands[SAG_FORCE_LOW])
+    sag_forces_at(curves, bands[TAUT], bands[SAG_FORCE_HIGH])
     hang = True
     sought = False
     for i in range(m):
@@ -64,7 +64,7 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
         find_extrema(curves, bands[LOW], bands[TAUT], memory)
         for i in range(m):
             if not bands[LEAST, i] <= bands[MOST, i]:
-                section = Section(bands[LOW, i], bands[TAUT, i], bands[PULL_LOW, i], bands[PULL_HIGH, i])
+                section = Section(bands[LOW, i], bands[TAUT, i], bands[SAG_FORCE_LOW, i], bands[SAG_FORCE_HIGH, i])
                 bands[LEAST, i], bands[MOST, i] = sag_force_range(curves, i, section)
             hang = hang and bands[LEAST, i] <= bands[MOST, i]
     return hang
@@ -72,14 +72,14 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
 
 @formula
 def range_between_ends(cables: Cables, i: int, bands: Array) -> tuple[float, float]:
-    """Least and largest pull of a cable from those at its ends, where first order tells; else NaN, to look for turns.
+    """Least and largest sag force of a cable from those at its ends; NaN where first order does not decide.
 
-    With X = wD/(2 tau) and e = tau/EA, pull/(wD/2) = 1/(1 + e) - X/3 |sin phi|/(1 + e)^2 + X^2/6 cos^2 phi to
+    With X = wD/(2 tau) and e = tau/EA, sag force/(wD/2) = 1/(1 + e) - X/3 |sin phi|/(1 + e)^2 + X^2/6 cos^2 phi to
     0.334 eX + 0.023 X^3 for a cable below its frame end, e <= 0.15 and X <= 1. It turns twice at most: there is a
     largest value near X_M, where e = X/3 |sin phi|, and at larger X a least one; docs/model.md, section 5.
     """
     half_weight = cables.half_weight[i]
-    at_low, at_high = bands[PULL_LOW, i], bands[PULL_HIGH, i]
+    at_low, at_high = bands[SAG_FORCE_LOW, i], bands[SAG_FORCE_HIGH, i]
     least, most = min(at_low, at_high), max(at_low, at_high)
     s, c2 = -cables.sine[i], cables.cosine[i] * cables.cosine[i]
     x, tautest = half_weight / bands[LOW, i], half_weight / bands[TAUT, i]
@@ -130,14 +130,14 @@ def has_sag(curves: Curves, i: int) -> bool:
 
 
 @kernel
-def pull_slope(curves: Curves, i: int, way: float, tension: float) -> float:
-    """Most that a pull changes with the position of the platform end [N/m], at one chord tension of so much or more.
+def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float:
+    """Largest change of a sag force with the platform end's position [N/m], at a chord tension of so much or more.
 
     way: how far its platform end may be from where the curves are [m]; tension: least chord tension [N].
     """
     cables = curves.cables
     if curves.model.code != CATENARY:
-        return abs(cables.pull[i]) / cables.chord[i]
+        return abs(cables.sag_force[i]) / cables.chord[i]
     per_length = cables.half_weight[i] / cables.chord[i]
     if per_length == 0.0:
         return 0.0
@@ -150,18 +150,18 @@ def pull_slope(curves: Curves, i: int, way: float, tension: float) -> float:
 
 
 @kernel
-def most_pull(curves: Curves, i: int, tension: float) -> float:
-    """Upper bound of a pull [N], at a chord tension of so much or more."""
+def largest_sag_force(curves: Curves, i: int, tension: float) -> float:
+    """Upper bound of a sag force [N], at a chord tension of so much or more."""
     cables = curves.cables
     if not has_sag(curves, i):
-        return cables.pull[i]
+        return cables.sag_force[i]
     x = cables.half_weight[i] / tension
     return cables.half_weight[i] * (_sinh_ratio(x) + max(cables.sine[i], 0.0) * min(x / 3.0, 1.0))
 
 
 @kernel
 def fall_rate(curves: Curves, i: int, tension: float) -> float:
-    """Most by which a pull falls for a newton of chord tension more, above a tension."""
+    """Most by which a sag force falls for a newton of chord tension more, above a tension."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -174,7 +174,7 @@ def fall_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def rise_rate(curves: Curves, i: int, tension: float) -> float:
-    """Most by which a pull rises for a newton of chord tension more, above a tension."""
+    """Most by which a sag force rises for a newton of chord tension more, above a tension."""
     if not has_sag(curves, i):
         return 0.0
     x = curves.cables.half_weight[i] / tension
@@ -183,7 +183,7 @@ def rise_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def fall(curves: Curves, i: int, low: float, high: float) -> float:
-    """Most by which a pull falls from one chord tension to a higher one [N]."""
+    """Most by which a sag force falls from one chord tension to a higher one [N]."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -195,7 +195,7 @@ def fall(curves: Curves, i: int, low: float, high: float) -> float:
 
 @kernel
 def rise(curves: Curves, i: int, low: float, high: float) -> float:
-    """Most by which a pull rises from one chord tension to a higher one [N]."""
+    """Most by which a sag force rises from one chord tension to a higher one [N]."""
     if not has_sag(curves, i):
         return 0.0
     half = curves.cables.half_weight[i]

@@ -1,9 +1,9 @@
 """Signed margin of a pose over a whole set of loads; negative: the excess of the set.
 
 docs/model.md, section 13: the least distance of the set to the facets of what the cables can exert, signed. Weight
-makes the pulls of the cables uncertain while their tensions are: with the pulls that hurt the margin is a lower end,
-with those that help an upper one, and between them lies that of the end tensions with their own pulls, which is
-continuous.
+makes the sag forces of the cables uncertain while their tensions are: with the sag forces that hurt the margin is a
+lower end, with those that help an upper one, and between them lies that of the end tensions with their own sag forces,
+which is continuous.
 
 Source:
     Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of wrenches";
@@ -52,8 +52,8 @@ from sagline.kernels.workspaces.sag_force_bounds import (
     LEAST,
     LOW,
     MOST,
-    PULL_HIGH,
-    PULL_LOW,
+    SAG_FORCE_HIGH,
+    SAG_FORCE_LOW,
     fill_bands,
 )
 from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSetArrays, new_set, place_set, reach_of_set
@@ -63,8 +63,8 @@ PURE = 1e-9  # force part of a normal of length 1, moments times the lever arm, 
 
 # Rows of what counts of the cables (COUNT_ROWS, m).
 WIDTH = 0  # half the range of the tensions
-SLOPE = 1  # half of how far the pull grows from end to end
-UNSURE = 2  # half the range of the pull
+SLOPE = 1  # half of how far the sag force grows from end to end
+UNSURE = 2  # half the range of the sag force
 LEVER_X, LEVER_Y = 3, 4
 COLUMN = 5  # of the structure matrix, six rows
 COUNT_ROWS = 11
@@ -77,7 +77,7 @@ TOGETHER = 64
 OF_A_SUBSET = 20  # of the other columns: so many normals at most, 6 over 3
 NORMAL = 0  # six rows
 ROUNDING = 6 * TOGETHER
-BY_ENDS, BY_TENSIONS, BY_PULLS = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # what the cables give about the points
+BY_ENDS, BY_TENSIONS, BY_SAG_FORCES = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # what the cables give about the points
 AGAINST, FOR = 10 * TOGETHER, 11 * TOGETHER  # how far the set reaches to either side
 UP, DOWN = 12 * TOGETHER, 13 * TOGETHER  # the most that a cable without limit counts to either side
 WORK = 14 * TOGETHER  # two rows
@@ -92,7 +92,7 @@ VALUE, BELOW, ABOVE = 0, 1, 2  # rows of the margins (3, N) [N]
 ModelTerms = tuple[int, float, float]  # code, k_h, k_p
 LimitTerms = tuple[int, float]  # Limits
 Robots = tuple[Array, Array, Array]  # freedom, bodies, robots
-Room = tuple[Array, Indices, Codes]
+MarginMemory = tuple[Array, Indices, Codes]
 Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 6), cables (N,), statuses (N,)
 
 
@@ -100,7 +100,7 @@ class _FacetWeights(NamedTuple):
     """Weights of the facets of one pose."""
 
     rows: Array  # of the cables, (COUNT_ROWS, m)
-    # what the cables give in the middle of their ends, and of their pulls' ranges, less the demand, (2, 6)
+    # what the cables give in the middle of their ends, and of their sag forces' ranges, less the demand, (2, 6)
     points: Array
     high: Array  # upper limits [N], (m,)
     endless: bool  # whether a cable has none
@@ -116,7 +116,7 @@ def signed_margins(
     set_terms: SetTerms,
     arms: tuple[Array, Array],
     poses: Array,
-    room: Room,
+    memory: MarginMemory,
     margins: Margins,
     first: int,
     last: int,
@@ -131,7 +131,7 @@ def signed_margins(
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
-        room: `memory_for` as many cables and FACET_SIZE numbers more, and codes of the cables (m,).
+        memory: `memory_for` as many cables and FACET_SIZE numbers more, and codes of the cables (m,).
         margins: Filled: value, lower and upper end [N], (3, N); normal of the facet of the value, along which the
             cables give too little first, in world axes, of length 1 where moments are divided by the lever arm, (N, 6);
             the cable whose limit moves it fastest, -1 for none, (N,); what the bracket says, (N,).
@@ -143,7 +143,7 @@ def signed_margins(
     values, directions, limiting, statuses = margins
     inertias = set_terms[7]
     count, m, n = poses.shape[0], robots.shape[1], freedom.shape[0]
-    cables, rest = new_cables(Memory(room[0], room[1]), m, robots_have_machine(robots))
+    cables, rest = new_cables(Memory(memory[0], memory[1]), m, robots_have_machine(robots))
     facets, rest = new_facets(rest, n, m)
     wrenches, rest = new_set(set_terms, rest)
     rotation, at = block(rest.numbers, 0, 3, 3)
@@ -171,7 +171,7 @@ def signed_margins(
         if not choose_basis(facets, n, m, lever):
             statuses[p] = MARGIN_SINGULAR
             continue
-        curves, left = new_curves(model, cables, room[2], rest)
+        curves, left = new_curves(model, cables, memory[2], rest)
         if not fill_bands(curves, bands, left):
             statuses[p] = MARGIN_TOO_SLACK
             continue
@@ -210,7 +210,7 @@ def _fill_weights(body: Array, center: Array, geometry: Array, bands: Array, row
         limited = bands[HIGH, i] < math.inf
         endless = endless or not limited
         rows[WIDTH, i] = 0.5 * (bands[HIGH, i] - bands[LOW, i]) if limited else 0.0
-        rows[SLOPE, i] = 0.5 * (bands[PULL_HIGH, i] - bands[PULL_LOW, i]) if limited else 0.0
+        rows[SLOPE, i] = 0.5 * (bands[SAG_FORCE_HIGH, i] - bands[SAG_FORCE_LOW, i]) if limited else 0.0
         rows[UNSURE, i] = 0.5 * (bands[MOST, i] - bands[LEAST, i])
         x, y = geometry[g.LEVER_X, i], geometry[g.LEVER_Y, i]
         rows[LEVER_X, i] = x
@@ -219,17 +219,17 @@ def _fill_weights(body: Array, center: Array, geometry: Array, bands: Array, row
             given = rows[COLUMN + a, i] * (bands[LOW, i] + rows[WIDTH, i])
             points[ENDS, a] += given
             points[RANGES, a] += given
-        _subtract_sag_force(points[ENDS], bands[PULL_LOW, i] + rows[SLOPE, i], x, y)
+        _subtract_sag_force(points[ENDS], bands[SAG_FORCE_LOW, i] + rows[SLOPE, i], x, y)
         _subtract_sag_force(points[RANGES], 0.5 * (bands[LEAST, i] + bands[MOST, i]), x, y)
     return endless
 
 
 @glue
-def _subtract_sag_force(point: Array, pull: float, x: float, y: float) -> None:
-    """Take what a cable's pull hangs on the platform at a lever from what the cables give, (6,)."""
-    point[2] -= pull
-    point[3] -= pull * y
-    point[4] += pull * x
+def _subtract_sag_force(point: Array, sag_force: float, x: float, y: float) -> None:
+    """Take what a cable's sag force hangs on the platform at a lever from what the cables give, (6,)."""
+    point[2] -= sag_force
+    point[3] -= sag_force * y
+    point[4] += sag_force * x
 
 
 @glue
@@ -329,7 +329,7 @@ def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
     """Fill what the cables give to either side of the points along the normals held."""
     rows = counts.rows
     for b in range(held):
-        measured[BY_ENDS + b] = measured[BY_TENSIONS + b] = measured[BY_PULLS + b] = 0.0
+        measured[BY_ENDS + b] = measured[BY_TENSIONS + b] = measured[BY_SAG_FORCES + b] = 0.0
         measured[UP + b] = measured[DOWN + b] = 0.0
     for i in range(rows.shape[1]):
         width, slope, unsure = rows[WIDTH, i], rows[SLOPE, i], rows[UNSURE, i]
@@ -351,7 +351,7 @@ def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
             hanging = vertical + y * about_x - x * about_y
             measured[BY_ENDS + b] += abs(along * width - hanging * slope)
             measured[BY_TENSIONS + b] += abs(along) * width
-            measured[BY_PULLS + b] += abs(hanging) * unsure
+            measured[BY_SAG_FORCES + b] += abs(hanging) * unsure
             measured[WORK + b] = along
         if counts.high[i] == math.inf:
             for b in range(held):
@@ -387,8 +387,8 @@ def _measure_sides(points: Array, held: int, measured: Array) -> None:
         inverse = measured[LENGTH + b]
         spare = measured[BY_TENSIONS + b] + min(ranges - against, -ranges - other)
         measured[MARGINS + b] = (measured[BY_ENDS + b] + min(ends - against, -ends - other)) * inverse
-        measured[MARGINS + TOGETHER + b] = (spare - measured[BY_PULLS + b]) * inverse
-        measured[MARGINS + 2 * TOGETHER + b] = (spare + measured[BY_PULLS + b]) * inverse
+        measured[MARGINS + TOGETHER + b] = (spare - measured[BY_SAG_FORCES + b]) * inverse
+        measured[MARGINS + 2 * TOGETHER + b] = (spare + measured[BY_SAG_FORCES + b]) * inverse
 
 
 @glue
