@@ -1,5 +1,4 @@
 import re
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +39,7 @@ def edited(**changes: Any) -> str:
 
 
 def arrays_of(robot: Robot) -> dict[str, Any]:
-    values = {field.name: getattr(robot, field.name) for field in fields(robot)}
+    values = {field.name: getattr(robot, field.name) for field in attrs.fields(Robot)}
     cables, box, winches = values.pop("cables"), values.pop("test_box"), values.pop("winches")
     values |= {f"tolerances.{key}": field for key, field in values.pop("tolerances").items()}
     if (known := values.pop("calibration")) is not None:

@@ -25,7 +25,14 @@ class Cable:
         diameter: Diameter of the rope [m], shape (...), > 0; None where it is not known. What is wound on a drum needs
             it, and nothing that hangs.
         expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None where it is not
-    XX fiber of 67 g/m and 44 kN, and two cables at once:
+            known.
+
+    Raises:
+        InvalidValueError: If a density is negative, a stiffness or diameter not positive, or the shapes do not
+            broadcast.
+
+    Examples:
+        A fiber of 67 g/m and 44 kN, and two cables at once:
 
         >>> import sagline as sl
         >>> cable = sl.Cable(linear_density=0.067, axial_stiffness=44e3)

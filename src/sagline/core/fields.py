@@ -9,7 +9,7 @@ ranges in the same way.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from attrs import fields
@@ -26,6 +26,16 @@ def given(value: ArrayLike) -> Array:
 
 def if_known(value: ArrayLike | None) -> Array | None:
     """A value or None as it is: the converter of a field that need not be known."""
+    return value  # type: ignore[return-value]
+
+
+def given_or_none(value: ArrayLike | None) -> Array:
+    """A value or None as it is: the converter of a field whose check fills in what is missing."""
+    return value  # type: ignore[return-value]
+
+
+def given_by_name(value: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
+    """Values by name as they are."""
     return value  # type: ignore[return-value]
 
 
@@ -69,7 +79,8 @@ class NumberFields:
 def reduced(value: Any) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
     """Reduction for pickle: through the constructor, so that a loaded value is checked and locked too."""
     kind = type(value)
-    return _constructed, (kind, {about.name: getattr(value, about.name) for about in fields(kind)})
+    values = {about.name: getattr(value, about.name) for about in fields(kind)}
+    return _constructed, (kind, {name: dict(own) if isinstance(own, Mapping) else own for name, own in values.items()})
 
 
 def _constructed(kind: type[Any], values: dict[str, Any]) -> Any:

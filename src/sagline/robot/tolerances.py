@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from attrs import field, frozen
 from numpy.typing import ArrayLike
 
 from sagline.core.arguments import brief, choice, text
 from sagline.core.arrays import Array, checked, locked, numbers
 from sagline.core.errors import InvalidValueError
+from sagline.core.fields import given_by_name, reduced
+from sagline.core.results import set_fields
 
 
 class Uncertain(NamedTuple):
@@ -134,7 +136,7 @@ def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
     return np.asarray(array * np.abs(value))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@frozen(eq=False, weakref_slot=False)
 class Provenance:
     """The calibration that found some of a robot's numbers.
 
@@ -144,52 +146,36 @@ class Provenance:
         standard_error: Name of what was found -> standard error of the robot's number, in the shape of the field and
             its SI unit; infinite where neither reading nor prior told of it. The names are those of tolerances.
         note: What else a user should know.
+
+    Raises:
+        InvalidValueError: If one is of the wrong kind, or the date is none.
     """
 
     log: str
     date: str
-    standard_error: Mapping[str, Array]
-    note: str
+    standard_error: Mapping[str, Array] = field(default=MappingProxyType({}), converter=given_by_name)
+    note: str = ""
 
-    def __init__(
-        self,
-        log: str,
-        date: str,
-        standard_error: Mapping[str, ArrayLike] = MappingProxyType({}),
-        note: str = "",
-    ) -> None:
-        """Check what does not need the robot; the robot checks names and shapes.
-
-        Args:
-            log: See the attributes.
-            date: See the attributes.
-            standard_error: See the attributes.
-            note: See the attributes.
-
-        Raises:
-            InvalidValueError: If one is of the wrong kind, or the date is none.
-        """
-        given: Any = standard_error  # a caller without types gives anything
+    def __attrs_post_init__(self) -> None:
+        """Check what does not need the robot; the robot checks names and shapes."""
+        given: Any = self.standard_error  # a caller without types gives anything
         if not isinstance(given, Mapping):
             allowed, step = "names of fields and standard errors", 'Give {"frame_anchors": 0.001}, in SI.'
             raise InvalidValueError("calibration: standard_error", brief(given), allowed, step)
-        values = {
-            "log": text(log, "calibration: log"),
-            "date": _date(date),
-            "standard_error": MappingProxyType({name: _numbers(name, value) for name, value in given.items()}),
-            "note": text(note, "calibration: note"),
-        }
-        for field, value in values.items():
-            object.__setattr__(self, field, value)
+        set_fields(
+            self,
+            log=text(self.log, "calibration: log"),
+            date=_date(self.date),
+            standard_error=MappingProxyType({name: _numbers(name, value) for name, value in given.items()}),
+            note=text(self.note, "calibration: note"),
+        )
 
     def _of(self, cables: int) -> Provenance:
         """The same, every standard error in the shape of its field in a robot of so many cables."""
         errors = deviations(self.standard_error, "calibration: standard_error", cables, low=0.0)
         return Provenance(self.log, self.date, errors, self.note)
 
-    def __reduce__(self) -> tuple[type[Provenance], tuple[Any, ...]]:
-        """Pickle through the constructor."""
-        return Provenance, (self.log, self.date, dict(self.standard_error), self.note)
+    __reduce__ = reduced
 
 
 def _numbers(name: Any, value: ArrayLike) -> Array:

@@ -13,7 +13,7 @@ SAME = {
     "free_sine": "sine",
     "free_cosine": "cosine",
     "free_tau": "tau",
-    "free_pull": "sag force",
+    "free_sag_force": "sag_force",
 }
 
 
