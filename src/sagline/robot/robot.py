@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from attrs import evolve, field, frozen
@@ -79,8 +79,6 @@ class Robot(Shown):
         >>> sl.inverse(tripod, sl.Pose([0, 0, 1], np.eye(3))).chord_tension.round(1)
         array([72.6, 52.3, 52.3])
     """
-
-    __slots__: ClassVar[tuple[str, ...]]  # the names of the fields, in order
 
     name: str
     frame_anchors: Array = field(converter=given)
