@@ -15,21 +15,13 @@ from sagline.core.memory import check_memory
 
 
 class Problem(NamedTuple):
-    """Checked operands of a batch.
+    """Checked operands of a batch."""
 
-    Attributes:
-        shape: The batch's shape, (...).
-        gravity: Gravitational acceleration [m/s^2].
-        span: Horizontal distances between the ends [m]; broadcasts with the shape.
-        rise: Heights of the platform ends above the frame ends [m]; broadcasts with the shape.
-        operands: Span, rise, linear density, axial stiffness and what is given, flat: each as long as the batch, or of
-            length 1.
-    """
-
-    shape: tuple[int, ...]
-    gravity: float
-    span: Array
-    rise: Array
+    shape: tuple[int, ...]  # the batch's shape, (...)
+    gravity: float  # gravitational acceleration [m/s^2]
+    span: Array  # horizontal distances between the ends [m]; broadcasts with the shape
+    rise: Array  # heights of the platform ends above the frame ends [m]; broadcasts with the shape
+    # span, rise, linear density, axial stiffness and what is given, flat: each as long as the batch, or of length 1
     operands: tuple[Array, Array, Array, Array, Array]
 
     @classmethod

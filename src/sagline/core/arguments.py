@@ -83,11 +83,7 @@ class _Brief(Repr):
 def brief(value: object) -> str:
     """A value as a message shows it: one short line, whatever it is.
 
-    Args:
-        value: Anything.
-
-    Returns:
-        Its text, or its kind where the text is long or not to be had.
+    Returns its text, or its kind where the text is long or not to be had.
     """
     if isinstance(value, type):
         return f"the class {value.__name__}"
@@ -98,55 +94,19 @@ def brief(value: object) -> str:
 
 
 def instance(value: object, kind: type[T], item: str) -> T:
-    """An argument of one of our kinds, as it is.
-
-    Args:
-        value: What was given.
-        kind: What it must be.
-        item: The name a message uses.
-
-    Returns:
-        The value.
-
-    Raises:
-        InvalidValueError: If it is of another kind; the message says how to come by one.
-    """
+    """An argument of one of our kinds, as it is."""
     if isinstance(value, kind):
         return value
     raise InvalidValueError(item, brief(value), _a(kind.__name__), _step_to(value, kind))
 
 
 def optional(value: object, kind: type[T], item: str) -> T | None:
-    """An argument of one of our kinds, or None, which leaves it out.
-
-    Args:
-        value: What was given.
-        kind: What it must be.
-        item: The name a message uses.
-
-    Returns:
-        The value.
-
-    Raises:
-        InvalidValueError: If it is neither.
-    """
+    """An argument of one of our kinds, or None, which leaves it out."""
     return None if value is None else instance(value, kind, item)
 
 
 def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
-    """One of a few words.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        allowed: The words.
-
-    Returns:
-        The value.
-
-    Raises:
-        InvalidValueError: If it is none of them.
-    """
+    """One of a few words."""
     words = tuple(allowed)
     if isinstance(value, str) and value in words:
         return str(value)  # numpy has a kind of its own
@@ -156,18 +116,7 @@ def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
 
 
 def text(value: Any, item: str) -> str:
-    """A text, of several lines perhaps, that a terminal can show.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-
-    Returns:
-        The text.
-
-    Raises:
-        InvalidValueError: If it is none, or has control characters or what cannot be encoded.
-    """
+    """A text, of several lines perhaps, that a terminal can show."""
     if not isinstance(value, str):
         raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
     if (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
@@ -176,18 +125,7 @@ def text(value: Any, item: str) -> str:
 
 
 def label(value: Any, item: str) -> str:
-    """A name: one line of text that a terminal, a figure and a file name can show.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-
-    Returns:
-        The name.
-
-    Raises:
-        InvalidValueError: If it is no such text, empty, or longer than 100 letters.
-    """
+    """A name: one line of text that a terminal, a figure and a file name can show."""
     if isinstance(value, str) and not value.strip():
         raise InvalidValueError(item, "empty" if not value else "blank", "a text to call it by", f"Give a {item}.")
     if not isinstance(value, str) or len(value) > LONGEST_TITLE or value != printable(value):
@@ -199,11 +137,7 @@ def label(value: Any, item: str) -> str:
 def integer(value: Any) -> int | None:
     """The integer that a value is; truth values are none, and arrays of one number are no number either.
 
-    Args:
-        value: Anything.
-
-    Returns:
-        The integer, or None.
+    Returns the integer, or None.
     """
     if isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.ndim):
         return None
@@ -216,17 +150,8 @@ def integer(value: Any) -> int | None:
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
     """A whole number.
 
-    Args:
-        value: What was given: an integer of Python or numpy; a truth value is none.
-        item: The name a message uses.
-        low: The smallest allowed.
-        high: The largest allowed; by default the largest that counts anything.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If it is none, or out of range.
+    value: what was given: an integer of Python or numpy; a truth value is none; high: the largest allowed; by default
+    the largest that counts anything.
     """
     number = integer(value)
     if number is not None and low <= number <= high:
@@ -238,18 +163,7 @@ def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> in
 
 
 def callback(value: Any, item: str) -> Any:
-    """A function to call, or None.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-
-    Returns:
-        The value.
-
-    Raises:
-        InvalidValueError: If it cannot be called.
-    """
+    """A function to call, or None."""
     if value is None or (callable(value) and not isinstance(value, type)):
         return value
     raise InvalidValueError(item, brief(value), "a function of two numbers: done, of how many", "Give one, or None.")
@@ -258,17 +172,7 @@ def callback(value: Any, item: str) -> Any:
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
     """The path of a file or folder.
 
-    Args:
-        file: What was given: a text or a path object.
-        item: The name a message uses.
-        folder: Whether it may be a folder.
-
-    Returns:
-        The path.
-
-    Raises:
-        InvalidValueError: If it is neither.
-        FileError: If it is empty, or no name that a file can have.
+    file: what was given: a text or a path object.
     """
     given = os.fspath(file) if isinstance(file, os.PathLike) and not isinstance(file, type) else file
     if not isinstance(given, str):

@@ -46,23 +46,10 @@ def checked(
 ) -> Array:
     """A locked float64 copy of a caller's value, or an error that names what is wrong.
 
-    Args:
-        value: Number or array of numbers.
-        item: The name a message uses.
-        unit: Unit of the value, for the message; "" for none.
-        shape: Trailing axes the array must have; None stands for any length. Leading axes are free.
-            None (the default) accepts every shape.
-        low: Smallest allowed value.
-        above: Every value must be strictly larger than this.
-        infinite: Whether infinities may pass.
-        missing: Whether NaN may pass.
-
-    Returns:
-        Array of float64, C-contiguous, write-locked, with memory of its own; an array that already is
-        all this down to its memory, such as a result of ours, is taken as it is.
-
-    Raises:
-        InvalidValueError: If the value is no number, has the wrong shape, or is out of range.
+    unit: unit of the value, for the message; "" for none; shape: trailing axes the array must have; None stands for any
+    length. Leading axes are free. None (the default) accepts every shape; above: every value must be strictly larger
+    than this; missing: whether NaN may pass. Returns array of float64, C-contiguous, write-locked, with memory of its
+    own; an array that already is all this down to its memory, such as a result of ours, is taken as it is.
     """
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
@@ -75,16 +62,8 @@ def checked(
 def numbers(value: ArrayLike, item: str, unit: str) -> Array:
     """A float64 copy of a caller's numbers in C order, of any shape and range; NaN may be among them.
 
-    Args:
-        value: Number or array of numbers: real ones, without a unit of their own, none masked.
-        item: The name a message uses.
-        unit: Unit of the value, for the message.
-
-    Returns:
-        Array with memory of its own.
-
-    Raises:
-        InvalidValueError: If the value is something else, or too large for the memory of this machine.
+    value: number or array of numbers: real ones, without a unit of their own, none masked; unit: unit of the value, for
+    the message.
     """
     if type(value) in (float, np.float64):
         return np.array(value)
@@ -109,38 +88,13 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
 def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
     """A single finite number.
 
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        unit: Its unit, for the message.
-        low: Smallest allowed value.
-        above: The value must be strictly larger than this.
-
-    Returns:
-        The number.
-
-    Raises:
-        InvalidValueError: If it is not; the message names the item.
+    above: the value must be strictly larger than this.
     """
     return float(exactly(value, item, unit, (), low=low, above=above))
 
 
 def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """An array of exactly one shape, without batch axes.
-
-    Args:
-        value: What was given.
-        item: The name a message uses.
-        unit: Its unit, for the message.
-        shape: The whole shape.
-        **limits: As of `checked`.
-
-    Returns:
-        Array of that shape, write-locked.
-
-    Raises:
-        InvalidValueError: If the shape is another, or a value is out of range.
-    """
+    """An array of exactly one shape, without batch axes."""
     array = checked(value, item, unit, **limits)
     if array.shape != shape:
         raise InvalidValueError(
@@ -165,15 +119,7 @@ def spread(array: Array, shape: tuple[int, ...]) -> Array:
 def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
     """The shape to which several arrays broadcast.
 
-    Args:
-        item: What the arrays are, for the message.
-        *shapes: Theirs.
-
-    Returns:
-        The shape.
-
-    Raises:
-        InvalidValueError: If they do not broadcast.
+    item: what the arrays are, for the message.
     """
     try:
         return np.broadcast_shapes(*shapes)

@@ -120,13 +120,8 @@ class FileError(SaglineError):
 def printable(text: str, kept: str = "") -> str:
     r"""A text as a terminal may be given it: nothing in it moves the cursor, hides a letter or cannot be written.
 
-    Args:
-        text: Any text, from a file for instance.
-        kept: Characters that may stay, line ends for instance.
-
-    Returns:
-        The text, with control characters, line ends, lone surrogates and all else that is not seen written out as
-        Python writes them.
+    text: any text, from a file for instance; kept: characters that may stay, line ends for instance. Returns the text,
+    with control characters, line ends, lone surrogates and all else that is not seen written out as Python writes them.
 
     Examples:
         >>> from sagline.core.errors import printable
@@ -141,11 +136,7 @@ def printable(text: str, kept: str = "") -> str:
 def is_seen(character: str) -> bool:
     """True for a character that is visible, or a space of any width.
 
-    Args:
-        character: One character.
-
-    Returns:
-        Whether; marks that only steer how others are read, such as U+200E and U+200B, do not show.
+    Marks that only steer how others are read, such as U+200E and U+200B, do not show.
     """
     return character.isprintable() or unicodedata.category(character) == "Zs"
 
@@ -153,12 +144,7 @@ def is_seen(character: str) -> bool:
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known word that somebody may have meant, for "Did you mean".
 
-    Args:
-        word: What was given.
-        known: What would have done.
-
-    Returns:
-        The nearest known word; None where none is near.
+    Returns the nearest known word; None where none is near.
 
     Examples:
         >>> from sagline.core.errors import nearest
@@ -171,15 +157,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def shortened(parts: Sequence[str], room: int) -> list[str]:
-    """Texts that fit together on one line: what does not print is written out, the middle of the longest left out.
-
-    Args:
-        parts: The texts.
-        room: Letters they may have together.
-
-    Returns:
-        As many texts.
-    """
+    """Texts that fit together on one line: what does not print is written out, the middle of the longest left out."""
     texts = [printable(part) for part in parts]
     while (excess := sum(map(len, texts)) - room) > 0:
         k = max(range(len(texts)), key=lambda k: len(texts[k]))

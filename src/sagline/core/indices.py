@@ -14,17 +14,9 @@ from sagline.core.errors import NoBatchError, NoSuchEntryError
 def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
     """An index along the first axis of a batch, checked.
 
-    Args:
-        index: A number, which may count from the end; a slice; or numbers or booleans, in a list or an array.
-        shape: Of the batch; () for a single entry.
-        single: What a single entry is called, "single pose" for instance.
-
-    Returns:
-        An integer, a slice, or an array of integers or booleans.
-
-    Raises:
-        NoBatchError: If there is a single entry.
-        NoSuchEntryError: If it is no such index, or names no entry.
+    index: a number, which may count from the end; a slice; or numbers or booleans, in a list or an array; shape: of the
+    batch; () for a single entry; single: what a single entry is called, "single pose" for instance. Returns an integer,
+    a slice, or an array of integers or booleans.
     """
     if not shape:
         raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; take it as it is.")
@@ -44,15 +36,7 @@ def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
 def length_of(shape: tuple[int, ...], single: str) -> int:
     """Number of entries along the first axis of a batch.
 
-    Args:
-        shape: Of the batch; () for a single entry.
-        single: What a single entry is called, "single pose" for instance.
-
-    Returns:
-        The number.
-
-    Raises:
-        NoBatchError: If there is a single entry.
+    shape: of the batch; () for a single entry; single: what a single entry is called, "single pose" for instance.
     """
     if not shape:
         raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; take it as it is.")

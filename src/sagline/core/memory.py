@@ -21,13 +21,8 @@ _GROUPS: Final = (  # limit and use of a container
 def check_memory(item: str, size: float, next_step: str) -> None:
     """Refuse what would not fit into memory, before it is begun.
 
-    Args:
-        item: What asks for it, for the message: "a path of 2e+08 samples".
-        size: Bytes that it needs at the peak; less than 64 MB are not asked about.
-        next_step: How to need less.
-
-    Raises:
-        InvalidValueError: If less is free; the message gives both numbers.
+    item: what asks for it, for the message: "a path of 2e+08 samples"; size: bytes that it needs at the peak; less than
+    64 MB are not asked about.
     """
     if size > UNASKED and size > (free := free_memory()):
         digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)  # that tell the two apart
@@ -38,13 +33,7 @@ def check_memory(item: str, size: float, next_step: str) -> None:
 def check_poses(count: int, cable_count: int, behind: bool) -> None:
     """Refuse to solve, forward or inverse, for more poses than there is memory.
 
-    Args:
-        count: How many poses.
-        cable_count: Number of cables m of the robot.
-        behind: Whether anything is behind the cables.
-
-    Raises:
-        InvalidValueError: If all together need more than is free; the message says how much.
+    cable_count: number of cables m of the robot.
     """
     cable = _CABLE_BYTES + (_BEHIND_BYTES if behind else 0.0)
     check_memory(f"a batch of {count:,} poses", count * (_POSE_BYTES + cable * cable_count), "Take them in parts.")
@@ -53,8 +42,7 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 def free_memory() -> float:
     """Memory that this process can still take [bytes]; infinite where the system does not tell.
 
-    Returns:
-        The least of what the machine has free, what its container is allowed and what the process is.
+    Returns the least of what the machine has free, what its container is allowed and what the process is.
     """
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf

@@ -33,16 +33,11 @@ def n(
     1 and 1000, and where there is none a power of ten is written out. A minus is a true one, a space before a unit
     does not break.
 
-    Args:
-        value: The number, in the unit; "–" stands for what is not finite.
-        form: How its digits are formatted, as in `format`; not used with an uncertainty.
-        unit: Its unit, such as "mm", "kg/m", "%"; "" for none.
-        uncertainty: Standard uncertainty, in the unit, written behind the last digits of the value to two digits:
-            43.98(10) is 43.98 ± 0.10. None for none.
-        size: Of what the value is a difference, in the unit: a value that is `ROUNDING` of it is "0 (rounding)".
-
-    Returns:
-        The text.
+    value: the number, in the unit; "–" stands for what is not finite; form: how its digits are formatted, as in
+    `format`; not used with an uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" for none; uncertainty:
+    standard uncertainty, in the unit, written behind the last digits of the value to two digits: 43.98(10) is 43.98 ±
+    0.10. None for none; size: of what the value is a difference, in the unit: a value that is `ROUNDING` of it is "0
+    (rounding)".
 
     Source:
         ISO 80000-1:2022, 7.2 (prefixes); JCGM 100:2008, 7.2.2 (uncertainty in parentheses).
@@ -67,14 +62,8 @@ def n(
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
     """A number with its standard error, both to the two digits of the error that count: "512 ± 12 kN".
 
-    Args:
-        value: The number, in the unit.
-        error: Its standard error, in the unit; one that is not finite is told as "not told by anything".
-        unit: Its unit; "" for none.
-        prefixed: Whether the unit takes the prefix it reads best with; in a column of a table none does.
-
-    Returns:
-        The text.
+    error: its standard error, in the unit; one that is not finite is told as "not told by anything"; prefixed: whether
+    the unit takes the prefix it reads best with; in a column of a table none does.
     """
     number, own = float(value), float(error)
     if not (isfinite(number) and isfinite(own) and own > 0.0):
@@ -90,9 +79,7 @@ def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, pr
 def counted(count: int, noun: str) -> str:
     """A number of things, "1 pose" or "1,200 poses".
 
-    Args:
-        count: How many.
-        noun: One of them; several have an s, or es.
+    noun: one of them; several have an s, or es.
     """
     return f"{count:,} {noun}{'' if count == 1 else 'es' if noun.endswith(('ch', 'x')) else 's'}"
 

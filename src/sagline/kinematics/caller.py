@@ -22,14 +22,7 @@ WHOLE: Final = slice(None)
 def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
     """Write a caller's numbers into memory of ours; that they are finite is for the solver to tell.
 
-    Args:
-        memory: A `memoryview` of float64 numbers, shape (k,).
-        given: What the caller gave: k numbers.
-        item: The name a message uses.
-        unit: Its unit, for the message.
-
-    Raises:
-        InvalidValueError: If they are no such numbers.
+    memory: a `memoryview` of float64 numbers, shape (k,).
     """
     try:
         if given.__class__ is ARRAY:
@@ -46,13 +39,7 @@ def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
 def copy_out(values: Array, out: Any, item: str) -> None:
     """Write an answer to a caller's memory.
 
-    Args:
-        values: The answer, shape (k,).
-        out: The caller's array.
-        item: The name a message uses.
-
-    Raises:
-        InvalidValueError: If it is no writable array of float64 of that shape.
+    values: the answer, shape (k,).
     """
     try:
         if out.dtype is FLOAT or out.dtype == FLOAT:

@@ -115,15 +115,8 @@ def forward(
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
     """The caller's lengths, shape (m,) or (N, m), positive and beyond the dead cable, or whole rows of NaN.
 
-    Args:
-        robot: Gives the number of cables, their dead cable, and its name to messages; or one a sample.
-        lengths: What the caller gave [m].
-
-    Returns:
-        Write-locked array of shape (m,) or (N, m).
-
-    Raises:
-        InvalidValueError: If they are not; the message names the cable and, of many, the sample.
+    robot: gives the number of cables, their dead cable, and its name to messages; or one a sample; lengths: what the
+    caller gave [m]. Returns write-locked array of shape (m,) or (N, m).
     """
     array = numbers(lengths, "unstrained_length", "m")
     shared, dead = first_of(robot), dead_cable(robot)
@@ -155,12 +148,8 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
 def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
     """The error of a length that would not reach from drum to pulley.
 
-    Args:
-        lengths: Unstrained lengths [m], shape (m,) or (N, m).
-        dead: Dead cable [m], of the same shape; no less than one of the lengths.
-
-    Returns:
-        The error, to be raised: it names the cable and, of many, the sample.
+    lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead cable [m], of the same shape; no less than one of
+    the lengths. Returns the error, to be raised: it names the cable and, of many, the sample.
     """
     index = tuple(int(i) for i in np.argwhere((lengths <= dead) & (dead > 0.0))[0])
     sample = f"sample {index[0]}, " if lengths.ndim == 2 else ""
@@ -175,15 +164,7 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
 def start_rows(start: Pose, lengths: Array) -> Array:
     """Pose rows to begin at.
 
-    Args:
-        start: One pose, or one a sample.
-        lengths: The samples, shape (m,) or (N, m).
-
-    Returns:
-        Array of shape (1 or N, POSE_COLUMNS).
-
-    Raises:
-        InvalidValueError: If the counts of poses and samples differ.
+    lengths: the samples, shape (m,) or (N, m). Returns array of shape (1 or N, POSE_COLUMNS).
     """
     if start.shape and start.shape != lengths.shape[:-1]:
         allowed = f"one pose, or {len(lengths)}" if lengths.ndim == 2 else "one pose, for one sample"

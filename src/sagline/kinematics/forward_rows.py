@@ -154,12 +154,8 @@ class ForwardRows(NamedTuple):
     ) -> ForwardSolution:
         """The batch in the caller's shape, () or (N,).
 
-        Args:
-            robot: The robot, or one a sample.
-            model: Cable model.
-            load: External plus inertial wrench, shape (6,) or (N, 6).
-            shape: () for a single sample, (N,) for a batch.
-            covariance: Of the poses, shape (N, 6, 6), or None.
+        load: external plus inertial wrench, shape (6,) or (N, 6); shape: () for a single sample, (N,) for a batch;
+        covariance: of the poses, shape (N, 6, 6), or None.
         """
         pose = Pose._adopt(self.poses[:, :3].reshape(*shape, 3), self.poses[:, 3:].reshape(*shape, 4))
         whole = locked(np.ascontiguousarray(np.broadcast_to(load, (*shape, 6))))
@@ -189,18 +185,9 @@ def solve_forward_rows(
 ) -> ForwardRows:
     """Run the kernel over samples, in blocks.
 
-    Args:
-        robot: The robot, or one a sample.
-        model: Cable model; straight cables are fitted.
-        lengths: Unstrained lengths (N, m).
-        starts: Pose rows (1 or N, POSE_COLUMNS).
-        wrenches: External plus inertial (1 or N, 6).
-        chained: Whether each sample starts where the last one ended.
-        freedom: Motions to allow (n, 6); None for those of the robot.
-        progress: Told after each block how many samples are done, of how many.
-
-    Returns:
-        The answers.
+    lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial (1 or
+    N, 6); chained: whether each sample starts where the last one ended; freedom: motions to allow (n, 6); None for
+    those of the robot; progress: told after each block how many samples are done, of how many.
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom

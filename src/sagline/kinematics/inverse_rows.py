@@ -72,17 +72,9 @@ def solve_inverse_rows(
 ) -> InverseRows:
     """Run the kernel over poses.
 
-    Args:
-        robot: The robot, or one a pose.
-        method: How the load is shared.
-        options: Of `kernel_options`, for the same method.
-        rows: Pose rows (N, POSE_COLUMNS).
-        loads: External plus inertial wrenches (1 or N, 6).
-        reference: Tensions that `Closest` starts from, in its variable (m,), or NaN; the last feasible ones on return.
-        progress: Told after each block how many poses are solved, without those left open, of how many.
-
-    Returns:
-        The answers.
+    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: tensions that
+    `Closest` starts from, in its variable (m,), or NaN; the last feasible ones on return; progress: told after each
+    block how many poses are solved, without those left open, of how many.
     """
     shared = first_of(robot)
     behind = has_routing(robot)
@@ -100,22 +92,15 @@ def solve_inverse_rows(
 
 
 class Verdicts(NamedTuple):
-    """Proofs of infeasible poses; arrays lead with the N poses.
+    """Proofs of infeasible poses; arrays lead with the N poses."""
 
-    Attributes:
-        brackets: What is proved, and what suffices, of the smallest change of the force [N], (N, 2): 0 where a pose is
-            solved, NaN where the load is not the reason that it is not.
-        reliefs: The force that suffices [N], along the free motions, (N, n), NaN where none is needed or known.
-        farkas: Farkas vectors along the free motions, (N, n).
-        blocking: Cables whose limits stand against the needed wrench, (N, m).
-        at_border: Poses that were solved here, and not by the way of sharing, (N,).
-    """
-
+    # what is proved, and what suffices, of the smallest change of the force [N], (N, 2): 0 where a pose is solved, NaN
+    # where the load is not the reason that it is not
     brackets: Array
-    reliefs: Array
-    farkas: Array
-    blocking: Flags
-    at_border: Flags
+    reliefs: Array  # the force that suffices [N], along the free motions, (N, n), NaN where none is needed or known
+    farkas: Array  # Farkas vectors along the free motions, (N, n)
+    blocking: Flags  # cables whose limits stand against the needed wrench, (N, m)
+    at_border: Flags  # poses that were solved here, and not by the way of sharing, (N,)
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
@@ -143,9 +128,7 @@ class Verdicts(NamedTuple):
 def covers_all(method: int, redundant: int) -> bool:
     """True if a distribution method finds tensions wherever there are any; formulas without limits do not.
 
-    Args:
-        method: Its code.
-        redundant: Number of cables beyond the degrees of freedom.
+    redundant: number of cables beyond the degrees of freedom.
     """
     return redundant == 0 or not codes.CLOSED_FORM <= method <= codes.PUNCTURE
 
@@ -155,16 +138,8 @@ def decide_rows(
 ) -> Verdicts:
     """Decide the poses that the iterations left open; fill the results of the feasible ones.
 
-    Args:
-        robot: The robot, or one a pose.
-        options: Of `kernel_options`.
-        rows: Pose rows (N, POSE_COLUMNS).
-        loads: External plus inertial wrenches (1 or N, 6).
-        found: The answers.
-        progress: Told after each block how many poses are done, the feasible ones among them, of how many.
-
-    Returns:
-        The verdicts.
+    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); progress: told after each
+    block how many poses are done, the feasible ones among them, of how many.
     """
     count, n = found.needed.shape
     m = found.cable_status.shape[1]

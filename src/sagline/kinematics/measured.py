@@ -56,18 +56,9 @@ def fit_measurements(
     Every sample by itself: Gauss-Newton in the lengths, L_true, that minimize
     sum ((L_true - L)/sigma_L)^2 + sum ((T_A - reading)/sigma_T)^2 while the platform stays in equilibrium.
 
-    Args:
-        robot: The robot, or one a sample.
-        model: Cable model with forces.
-        found: Equilibria at the measured lengths (N samples), where the search begins; changed in place.
-        loads: External plus inertial wrenches (1 or N, 6).
-        measured: The readings and the deviations.
-
-    Returns:
-        Covariance of displacement of the center of mass and rotation vector, (N, 6, 6); NaN without an answer.
-
-    Raises:
-        InvalidValueError: If the model knows no forces, or a measurement is of the wrong shape.
+    found: equilibria at the measured lengths (N samples), where the search begins; changed in place; loads: external
+    plus inertial wrenches (1 or N, 6). Returns covariance of displacement of the center of mass and rotation vector,
+    (N, 6, 6); NaN without an answer.
     """
     if model.code == codes.STRAIGHT:
         raise InvalidValueError("model", "Straight()", "a model with forces", "Use Catenary() with measured tensions.")

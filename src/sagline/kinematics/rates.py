@@ -28,33 +28,31 @@ LONGEST = 1e-2  # of the time between samples
 _CONSTANT = 1e-9  # of the largest part of a wrench: what differs by less does not change
 
 
-class Instant(NamedTuple):
+class _Instant(NamedTuple):
     """Poses, a batch of N, and external plus inertial wrenches (N, 6), at one moment near every sample."""
 
     pose: Pose
     wrench: Array
 
-    def part(self, samples: Indices) -> Instant:
+    def part(self, samples: Indices) -> _Instant:
         """Those near some of the samples, (k,)."""
-        return Instant(self.pose[samples], self.wrench[samples])
+        return _Instant(self.pose[samples], self.wrench[samples])
 
 
-class Instants(NamedTuple):
+class _Instants(NamedTuple):
     """Moments one step [s] before, one step after and two steps after every sample."""
 
-    before: Instant
-    after: Instant
-    later: Instant
+    before: _Instant
+    after: _Instant
+    later: _Instant
     step: float
 
 
-def instants(robot: Robots, path: Path, wrench: Array) -> Instants:
+def _instants(robot: Robots, path: Path, wrench: Array) -> _Instants:
     """Poses and wrenches a step before and after each sample of a path, the step chosen by its speed.
 
-    Args:
-        robot: The robot, or one a sample.
-        path: The path; without a jerk, that is taken from a spline through its accelerations.
-        wrench: External plus inertial wrench at the samples (N, 6); the external part is interpolated by a spline.
+    path: the path; without a jerk, that is taken from a spline through its accelerations; wrench: external plus
+    inertial wrench at the samples (N, 6); the external part is interpolated by a spline.
     """
     jerk = path.jerk if path.jerk is not None else _rate(path.time, path.twist_rate)
     external = wrench - inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
@@ -62,13 +60,13 @@ def instants(robot: Robots, path: Path, wrench: Array) -> Instants:
     external_rate = _rate(path.time, external) if changing else np.zeros_like(external)
     step = _step(path, jerk)
 
-    def at(h: float) -> Instant:
+    def at(h: float) -> _Instant:
         pose = _poses_later(path, jerk, h)
         twist = path.twist + h * (path.twist_rate + 0.5 * h * jerk)
         inertial = inertial_wrench(robot, pose, twist, path.twist_rate + h * jerk)
-        return Instant(pose, inertial + external + h * external_rate)
+        return _Instant(pose, inertial + external + h * external_rate)
 
-    return Instants(at(-step), at(step), at(2.0 * step), step)
+    return _Instants(at(-step), at(step), at(2.0 * step), step)
 
 
 def _rate(time: Array, values: Array) -> Array:
@@ -100,23 +98,16 @@ AT_LIMIT = 1e-8  # of a tension: as near to its limit it is at it
 OUTWARD = 1e-9  # of the largest rate: a slower one does not leave a limit
 
 
-class PlacedCables(NamedTuple):
-    """Cables of given chord tensions at given poses, and the matrices of their forces.
+class _PlacedCables(NamedTuple):
+    """Cables of given chord tensions at given poses, and the matrices of their forces."""
 
-    Attributes:
-        cables: Their state, fields of shape (N, m).
-        pull: T_z - tau sin phi [N], shape (N, m).
-        structure: Structure matrix J, shape (N, n, m).
-        hanging: The same for forces straight up, shape (N, n, m).
-    """
-
-    cables: CableState
-    pull: Array
-    structure: Array
-    hanging: Array
+    cables: CableState  # their state, fields of shape (N, m)
+    pull: Array  # T_z - tau sin phi [N], shape (N, m)
+    structure: Array  # structure matrix J, shape (N, n, m)
+    hanging: Array  # the same for forces straight up, shape (N, n, m)
 
 
-def cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> PlacedCables:
+def _cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> _PlacedCables:
     """The cables of a batch of N at other poses and chord tensions [N], (N, m)."""
     anchors, body, shared = anchors_of(state.robot), bodies_of(state.robot), first_of(state.robot)
     turn = np.swapaxes(pose.matrix, -1, -2)
@@ -130,34 +121,32 @@ def cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> PlacedCab
         shared.freedom @ np.swapaxes(np.concatenate((force, np.cross(lever, force)), axis=-1), -1, -2)
         for force in (toward, up)
     )
-    return PlacedCables(cables, cables.vertical_force - chord_tension * rise / cables.chord, structure, hanging)
+    return _PlacedCables(cables, cables.vertical_force - chord_tension * rise / cables.chord, structure, hanging)
 
 
-def closest_rates(state: Equilibrium, method: TensionMethod, before: Instant, after: Instant, step: float) -> Array:
+def _held_limit_rates(
+    state: Equilibrium, method: TensionMethod, before: _Instant, after: _Instant, step: float
+) -> Array:
     """Rates of the chord tensions of `Closest` as the platform moves on.
 
     Each set of tensions is the one nearest to the set before: in the limit, of all rates that keep the balance and do
     not leave the limits, the smallest in the sharing's variable. Where cables are at limits that the smallest rates
     would leave, they are held there, the worst first.
 
-    Args:
-        state: A batch of N with tensions.
-        method: `Closest` with its variable and bound.
-        before: Poses and wrenches a step before.
-        after: The same, a step after.
-        step: The step [s].
-
-    Returns:
-        d(tau)/dt [N/s], shape (N, m).
+    step: the step [s]. Returns d(tau)/dt [N/s], shape (N, m).
     """
     tension = state.cables.chord_tension
     change = np.maximum(TENSION_STEP * tension, LEAST_STEP)
     low, high = np.maximum(tension - change, 0.0), tension + change
-    here = cables_at(state, state.pose, tension)
-    by_tension = cables_at(state, state.pose, low), cables_at(state, state.pose, high), high - low
-    by_time = cables_at(state, before.pose, tension), cables_at(state, after.pose, tension), np.full((1, 1), 2.0 * step)
+    here = _cables_at(state, state.pose, tension)
+    by_tension = _cables_at(state, state.pose, low), _cables_at(state, state.pose, high), high - low
+    by_time = (
+        _cables_at(state, before.pose, tension),
+        _cables_at(state, after.pose, tension),
+        np.full((1, 1), 2.0 * step),
+    )
 
-    def slopes(values: Callable[[PlacedCables], Array]) -> tuple[Array, Array]:
+    def slopes(values: Callable[[_PlacedCables], Array]) -> tuple[Array, Array]:
         """d/d(tau) at a held place, and d/dt at held tensions."""
         by_tau, drift = ((values(last) - values(first)) / by for first, last, by in (by_tension, by_time))
         return by_tau, drift
@@ -179,25 +168,15 @@ def closest_rates(state: Equilibrium, method: TensionMethod, before: Instant, af
 
 
 class _RateConditions(NamedTuple):
-    """Conditions on the rates x of the chord tensions.
+    """Conditions on the rates x of the chord tensions."""
 
-    Attributes:
-        structure: J, whose rows the rates of the sharing's variable are made of, shape (N, n, m).
-        matrix: The balance is kept where matrix x = right, shape (N, n, m).
-        right: Shape (N, n).
-        scale: The sharing's variable changes by scale x + drift, which is to be small, shape (N, m).
-        drift: Shape (N, m).
-        gap_slope: The distance to the nearest limit changes by gap_slope x + gap_drift, shape (N, m).
-        gap_drift: Shape (N, m).
-    """
-
-    structure: Array
-    matrix: Array
-    right: Array
-    scale: Array
-    drift: Array
-    gap_slope: Array
-    gap_drift: Array
+    structure: Array  # J, whose rows the rates of the sharing's variable are made of, shape (N, n, m)
+    matrix: Array  # the balance is kept where matrix x = right, shape (N, n, m)
+    right: Array  # shape (N, n)
+    scale: Array  # the sharing's variable changes by scale x + drift, which is to be small, shape (N, m)
+    drift: Array  # shape (N, m)
+    gap_slope: Array  # the distance to the nearest limit changes by gap_slope x + gap_drift, shape (N, m)
+    gap_drift: Array  # shape (N, m)
 
     def solved(self, held: Flags) -> Array:
         """The smallest rates, (N, m), with some cables held at their limits."""
@@ -242,7 +221,7 @@ def _variable_tension(cables: CableState, method: TensionMethod) -> Array:
     return cables.horizontal_tension if method.variable == "horizontal" else cables.chord_tension
 
 
-def _supplied_wrench(cables: PlacedCables, tension: Array) -> Array:
+def _supplied_wrench(cables: _PlacedCables, tension: Array) -> Array:
     """Wrench of the cables along the free motions, (N, n)."""
     forces = cables.structure @ tension[..., None] - cables.hanging @ cables.pull[..., None]
     found: Array = forces[..., 0]
@@ -250,12 +229,12 @@ def _supplied_wrench(cables: PlacedCables, tension: Array) -> Array:
 
 
 def _nearest_limits(
-    here: PlacedCables, state: Equilibrium, method: TensionMethod
-) -> tuple[Array, Callable[[PlacedCables], Array]]:
+    here: _PlacedCables, state: Equilibrium, method: TensionMethod
+) -> tuple[Array, Callable[[_PlacedCables], Array]]:
     """Distance of each cable from its nearest limit (N, m), and that distance as a function of other cables."""
     limits = limits_of(state.robot)
 
-    def gaps(at: PlacedCables) -> Array:
+    def gaps(at: _PlacedCables) -> Array:
         """Distances to all limits (N, m, 2 or 3), positive within."""
         cables = at.cables
         limited = limited_tension(state.robot, cables)
@@ -271,7 +250,7 @@ def _nearest_limits(
 
     nearest = np.abs(gaps(here)).argmin(axis=-1)[..., None]
 
-    def nearest_gap(at: PlacedCables) -> Array:
+    def nearest_gap(at: _PlacedCables) -> Array:
         return np.take_along_axis(gaps(at), nearest, axis=-1)[..., 0]
 
     return nearest_gap(here), nearest_gap
@@ -285,20 +264,15 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     the tensions it has, so that its tensions' rates are solved for: of all that keep the balance, the smallest, with
     cables held at the limits that they would cross. Over pulleys the path is followed for two more steps instead.
 
-    Args:
-        state: Robot, poses, wrench and cables along the path.
-        path: The path; where it knows no jerk, a spline through its accelerations gives it.
-        tension: How the load was shared.
-        feasible: Which samples have an answer, shape (N,).
-
-    Returns:
-        dL/dt [m/s], shape (N, m): good to 1e-8 of its largest value; NaN where the plan has no answer. Where the rate
-        jumps, as where a cable reaches a limit, it is one of the two sides'.
+    state: robot, poses, wrench and cables along the path; path: the path; where it knows no jerk, a spline through its
+    accelerations gives it; feasible: which samples have an answer, shape (N,). Returns dL/dt [m/s], shape (N, m): good
+    to 1e-8 of its largest value; NaN where the plan has no answer. Where the rate jumps, as where a cable reaches a
+    limit, it is one of the two sides'.
 
     Source:
         docs/model.md, section 7.
     """
-    near = instants(state.robot, path, state.wrench)
+    near = _instants(state.robot, path, state.wrench)
     kept = np.flatnonzero(feasible)
     rates = np.full(state.cables.shape, np.nan)
     if not isinstance(tension, Closest):
@@ -310,7 +284,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
     return locked(rates)
 
 
-def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
+def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: _Instants) -> Array:
     """Rates from poses solved again an instant before and after; to one side, where the path leaves the feasible."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     none = np.full(first_of(state.robot).cable_count, np.nan)
@@ -328,7 +302,7 @@ def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: Instants) 
     return rates
 
 
-def _one_sided_rates(state: Equilibrium, tension: TensionMethod, near: Instants) -> Array:
+def _one_sided_rates(state: Equilibrium, tension: TensionMethod, near: _Instants) -> Array:
     """Rates of `Closest` over pulleys, from two steps on: backward it would leave the limits that hold it."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     held, moments = shared_tension(state, tension.variable), (near.after, near.later)
@@ -347,7 +321,7 @@ def _one_sided_rates(state: Equilibrium, tension: TensionMethod, near: Instants)
     return rates
 
 
-def _total_lengths(state: Equilibrium, moment: Instant, found: InverseRows) -> Array:
+def _total_lengths(state: Equilibrium, moment: _Instant, found: InverseRows) -> Array:
     """Unstrained lengths of solved poses, with the guides and friction of the state."""
     if state.contact is None:
         lengths: Array = found.results[tables.LENGTH]
@@ -359,12 +333,12 @@ def _total_lengths(state: Equilibrium, moment: Instant, found: InverseRows) -> A
     return with_routing(there, state.contact.winding).unstrained_length
 
 
-def _closest_rates(state: Equilibrium, tension: TensionMethod, near: Instants, kept: Indices) -> Array:
+def _closest_rates(state: Equilibrium, tension: TensionMethod, near: _Instants, kept: Indices) -> Array:
     """Rates of `Closest`, at the samples that have an answer: the state is theirs."""
     before, after = (moment.part(kept) for moment in (near.before, near.after))
-    rates = closest_rates(state, tension, before, after, near.step)
+    rates = _held_limit_rates(state, tension, before, after, near.step)
     lengths = [
-        cables_at(state, moment.pose, state.cables.chord_tension + h * rates).cables.unstrained_length
+        _cables_at(state, moment.pose, state.cables.chord_tension + h * rates).cables.unstrained_length
         for moment, h in ((before, -near.step), (after, near.step))
     ]
     found: Array = (lengths[1] - lengths[0]) / (2.0 * near.step)

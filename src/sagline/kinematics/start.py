@@ -33,15 +33,8 @@ def search(
     answer is not a stable equilibrium within the tension limits are tried again from tilted starts; the best answer
     counts: the better status, then fewer cables outside their limits, then the lower energy.
 
-    Args:
-        robot: The robot, or one a sample.
-        model: Cable model.
-        lengths: Unstrained lengths (N, m), rows of NaN are left out.
-        wrenches: External plus inertial (1 or N, 6).
-        progress: Told after each block how many samples are done, of how many.
-
-    Returns:
-        The best answer to each sample.
+    lengths: unstrained lengths (N, m), rows of NaN are left out; wrenches: external plus inertial (1 or N, 6);
+    progress: told after each block how many samples are done, of how many.
     """
     count, m = lengths.shape
     found = ForwardRows.empty(count, m, has_routing(robot))
@@ -74,15 +67,8 @@ def from_orientations(
 ) -> ForwardRows:
     """From the middle of the frame: first the position alone, then all motions.
 
-    Args:
-        robot: The robot, or one a sample.
-        model: Cable model.
-        lengths: Unstrained lengths (N, m).
-        wrenches: External plus inertial (1 or N, 6).
-        quaternion: Orientation to begin with (x, y, z, w), shape (4,), or one a sample (N, 4).
-
-    Returns:
-        The answers.
+    lengths: unstrained lengths (N, m); wrenches: external plus inertial (1 or N, 6); quaternion: orientation to begin
+    with (x, y, z, w), shape (4,), or one a sample (N, 4).
     """
     shared = first_of(robot)
     freedom = shared.freedom
@@ -99,13 +85,8 @@ def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Arra
 
     Not in the middle itself, because the two ends of a single cable must not coincide.
 
-    Args:
-        robot: The robot, or one a sample.
-        lengths: Unstrained lengths (N, m).
-        quaternion: Orientation of the platform, shape (4,) or (N, 4).
-
-    Returns:
-        Positions of the platform origin [m], shape (N, 3).
+    lengths: unstrained lengths (N, m); quaternion: orientation of the platform, shape (4,) or (N, 4). Returns positions
+    of the platform origin [m], shape (N, 3).
     """
     freedom = first_of(robot).freedom
     depth = _DEPTH * np.nan_to_num(lengths.mean(axis=1, keepdims=True), nan=1.0)
@@ -116,12 +97,8 @@ def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Arra
 def centered_positions(robot: Robots, quaternion: Array) -> Array:
     """Position at which the middle of the platform ends is in the middle of the frame ends.
 
-    Args:
-        robot: The robot, or one a sample.
-        quaternion: Orientation of the platform, shape (4,) or (N, 4).
-
-    Returns:
-        Position of the platform origin [m], shape (3,) or (N, 3).
+    quaternion: orientation of the platform, shape (4,) or (N, 4). Returns position of the platform origin [m], shape
+    (3,) or (N, 3).
     """
     anchors = anchors_of(robot)
     ends = anchors.platform.mean(axis=-2)
@@ -134,11 +111,7 @@ def centered_positions(robot: Robots, quaternion: Array) -> Array:
 def start_quaternions(robot: Robot) -> Array:
     """Orientations to start from: level, then tilted about each axis that the robot can turn about, both ways.
 
-    Args:
-        robot: The robot.
-
-    Returns:
-        Quaternions (K, 4), scalar last.
+    Returns quaternions (K, 4), scalar last.
     """
     rows = [np.array([0.0, 0.0, 0.0, 1.0])]
     if robot.motion_pattern in ROTATING:
@@ -151,13 +124,7 @@ def start_quaternions(robot: Robot) -> Array:
 def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indices:
     """Number of cables of each sample outside their robot's tension limits.
 
-    Args:
-        robot: The robot, or one a sample.
-        model: Cable model.
-        found: Answers to N samples.
-
-    Returns:
-        Counts (N,); 0 for straight cables, whose tensions are not known.
+    Returns counts (N,); 0 for straight cables, whose tensions are not known.
     """
     limits = limits_of(robot)
     cables, contact = cables_of_results(robot, model, found.results, found.cable_status, found.pose_status.shape)

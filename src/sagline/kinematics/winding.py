@@ -28,16 +28,8 @@ _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
 def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> Array:
     """Directions of winding, one a cable.
 
-    Args:
-        winding: What the caller gave: +1, -1 and 0.
-        shape: () for a single pose, (N,) for N.
-        cables: Number of cables m.
-
-    Returns:
-        Array of shape (m,) or (N, m).
-
-    Raises:
-        InvalidValueError: If they are not.
+    winding: what the caller gave: +1, -1 and 0; shape: () for a single pose, (N,) for N. Returns array of shape (m,) or
+    (N, m).
     """
     array = checked(winding, "winding", "")
     shapes = [(cables,)] + [(*shape, cables)] * bool(shape)
@@ -57,16 +49,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
     """The robot, refused where its cables hang between guides.
 
-    Args:
-        robot: The robot.
-        solver: What does not take them, for the message.
-        instead: What does.
-
-    Returns:
-        The same robot.
-
-    Raises:
-        InvalidValueError: If its winches have guides.
+    solver: what does not take them, for the message.
     """
     if robot.winches is None or robot.winches.guides is None:
         return robot
@@ -87,17 +70,11 @@ def iterate_routing(
 
     Kernels get the lengths less what guides and friction add at the tensions of the round before, until that stays.
 
-    Args:
-        robot: The robot, or one a sample.
-        model: Cable model.
-        found: Equilibria over a straight guided run without friction, at the lengths less what is taken for the rest.
-        lengths: Unstrained lengths (N, m).
-        loads: External plus inertial wrenches (1 or N, 6).
-        winding: Directions of friction, shape (m,) or (N, m), or None.
-        taken: What they were solved with for what guides and friction add [m], (N, m); None for nothing.
-
-    Returns:
-        The answers; NOT_CONVERGED where that does not settle, or a cable is too slack to hang between its guides.
+    found: equilibria over a straight guided run without friction, at the lengths less what is taken for the rest;
+    lengths: unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of
+    friction, shape (m,) or (N, m), or None; taken: what they were solved with for what guides and friction add [m], (N,
+    m); None for nothing. Returns the answers; NOT_CONVERGED where that does not settle, or a cable is too slack to hang
+    between its guides.
     """
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
     past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # what was taken, and what it missed

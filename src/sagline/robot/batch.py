@@ -27,15 +27,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
     Several robots may differ in anything but what a batch has once: number of cables, motion pattern with its plane,
     the tension that is limited, and gravity.
 
-    Args:
-        robot: A robot, or a sequence of them.
-
-    Returns:
-        The robot, or a tuple.
-
-    Raises:
-        InvalidValueError: If there is none, or one of them (the message names it) cannot stand in a batch with the
-            first.
+    robot: a robot, or a sequence of them.
     """
     if isinstance(robot, Robot):
         return robot
@@ -107,55 +99,39 @@ def has_routing(robot: Robots) -> bool:
     return any(one.winches is not None and one.winches.anything_behind for one in robots)
 
 
-class Bodies(NamedTuple):
-    """Inertia of the platform, once for all poses or, for several robots, with a leading axis N.
+class _Bodies(NamedTuple):
+    """Inertia of the platform, once for all poses or, for several robots, with a leading axis N."""
 
-    Attributes:
-        mass: [kg], shape () or (N,).
-        center_of_mass: In the platform frame [m], shape (3,) or (N, 3).
-        inertia: About the center of mass in the platform frame [kg m^2], shape (3, 3) or (N, 3, 3).
-    """
-
-    mass: Array
-    center_of_mass: Array
-    inertia: Array
+    mass: Array  # [kg], shape () or (N,)
+    center_of_mass: Array  # in the platform frame [m], shape (3,) or (N, 3)
+    inertia: Array  # about the center of mass in the platform frame [kg m^2], shape (3, 3) or (N, 3, 3)
 
 
-def bodies_of(robot: Robots) -> Bodies:
+def bodies_of(robot: Robots) -> _Bodies:
     """Mass, center of mass and inertia of the platform or platforms."""
-    return Bodies(*_each(robot, lambda one: (np.asarray(one.mass), one.center_of_mass, one.inertia)))
+    return _Bodies(*_each(robot, lambda one: (np.asarray(one.mass), one.center_of_mass, one.inertia)))
 
 
-class Anchors(NamedTuple):
-    """Anchors of the cables.
+class _Anchors(NamedTuple):
+    """Anchors of the cables."""
 
-    Attributes:
-        frame: Frame anchors in the world [m], shape (m, 3) or, for several robots, (N, m, 3).
-        platform: Platform anchors in the platform frame [m], of the same shape.
-    """
-
-    frame: Array
-    platform: Array
+    frame: Array  # frame anchors in the world [m], shape (m, 3) or, for several robots, (N, m, 3)
+    platform: Array  # platform anchors in the platform frame [m], of the same shape
 
 
-def anchors_of(robot: Robots) -> Anchors:
+def anchors_of(robot: Robots) -> _Anchors:
     """Anchors of the robot or robots."""
-    return Anchors(*_each(robot, lambda one: (one.frame_anchors, one.platform_anchors)))
+    return _Anchors(*_each(robot, lambda one: (one.frame_anchors, one.platform_anchors)))
 
 
-class Pulleys(NamedTuple):
-    """The pulleys of the cables; of radius 0, and entered from below, where there are none.
+class _Pulleys(NamedTuple):
+    """The pulleys of the cables; of radius 0, and entered from below, where there are none."""
 
-    Attributes:
-        radius: R [m], shape (m,) or, for several robots, (N, m).
-        entry: +1 where a cable comes from below, -1 from above, of the same shape.
-    """
-
-    radius: Array
-    entry: Array
+    radius: Array  # R [m], shape (m,) or, for several robots, (N, m)
+    entry: Array  # +1 where a cable comes from below, -1 from above, of the same shape
 
 
-def pulleys_of(robot: Robots) -> Pulleys:
+def pulleys_of(robot: Robots) -> _Pulleys:
     """Pulleys of the robot or robots."""
 
     def own(one: Robot) -> tuple[Array, ...]:
@@ -163,24 +139,19 @@ def pulleys_of(robot: Robots) -> Pulleys:
             return np.zeros(one.cable_count), np.ones(one.cable_count)
         return one.winches.pulley_radius, one.winches.swivel_axis[:, 2]
 
-    return Pulleys(*_each(robot, own))
+    return _Pulleys(*_each(robot, own))
 
 
-class Limits(NamedTuple):
-    """Tension limits of the cables.
+class _Limits(NamedTuple):
+    """Tension limits of the cables."""
 
-    Attributes:
-        low: Lower limits [N], shape (m,) or, for several robots, (N, m).
-        high: Upper limits [N], of the same shape.
-    """
-
-    low: Array
-    high: Array
+    low: Array  # lower limits [N], shape (m,) or, for several robots, (N, m)
+    high: Array  # upper limits [N], of the same shape
 
 
-def limits_of(robot: Robots) -> Limits:
+def limits_of(robot: Robots) -> _Limits:
     """Tension limits of the robot or robots."""
-    return Limits(*_each(robot, lambda one: (one.tension_min, one.tension_max)))
+    return _Limits(*_each(robot, lambda one: (one.tension_min, one.tension_max)))
 
 
 def _each(robot: Robots, own: Callable[[Robot], tuple[Array, ...]]) -> tuple[Array, ...]:
@@ -220,13 +191,9 @@ def outward(robot: Robots, pose: Pose) -> Array:
 def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
     """Points on the pulleys, from where the cables enter them.
 
-    Args:
-        robot: The robot, or one a pose.
-        pose: One pose, or a batch of N: the pulleys have turned towards the platform ends.
-        angle: Along the cable from the frame anchor [rad], shape (..., m); the wrap angle gives the exit point.
-
-    Returns:
-        Points in the world [m], shape (..., m, 3); frame anchors where there is no pulley.
+    pose: one pose, or a batch of N: the pulleys have turned towards the platform ends; angle: along the cable from the
+    frame anchor [rad], shape (..., m); the wrap angle gives the exit point. Returns points in the world [m], shape
+    (..., m, 3); frame anchors where there is no pulley.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]

@@ -26,17 +26,7 @@ def robot_names() -> tuple[str, ...]:
 
 
 def preset_text(name: str) -> str:
-    """Text of a preset's robot file.
-
-    Args:
-        name: One of `robot_names`.
-
-    Returns:
-        YAML, as `load_robot` reads it.
-
-    Raises:
-        InvalidValueError: If there is no such preset; the message suggests one that is near.
-    """
+    """Text of a preset's robot file."""
     names = robot_names()
     if name not in names:
         near = nearest(name, names)

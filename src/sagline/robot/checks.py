@@ -79,16 +79,8 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
     the other two together. What a planar platform has about the axes in its plane may be zero, as other tools write it;
     so may everything where nothing turns.
 
-    Args:
-        given: Inertia [kg m^2], or None.
-        pattern: The motion pattern, which says whether the platform turns.
-        normal: Unit normal of the plane of a planar pattern, shape (3,); None for the others.
-
-    Returns:
-        Matrix of shape (3, 3).
-
-    Raises:
-        InvalidValueError: If it is missing for a platform that turns, not symmetric, or no body's.
+    given: inertia [kg m^2], or None; pattern: the motion pattern, which says whether the platform turns; normal: unit
+    normal of the plane of a planar pattern, shape (3,); None for the others. Returns matrix of shape (3, 3).
     """
     if given is None and pattern in ROTATING:
         raise InvalidValueError(

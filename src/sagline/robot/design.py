@@ -142,11 +142,7 @@ class Design:
     def placed(self, share: float) -> PoseBox:
         """The middle of the frame, a share of each of its edges.
 
-        Args:
-            share: Of each edge of the frame that the platform leaves free, 0 to 1.
-
-        Returns:
-            PoseBox without tilt.
+        share: of each edge of the frame that the platform leaves free, 0 to 1.
         """
         middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
         half = 0.5 * share * (self.frame - self.platform)

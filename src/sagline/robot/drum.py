@@ -50,14 +50,8 @@ class Drums:
     def turns(self, length: Array) -> tuple[Array, Array]:
         """Turns on the drums, and their travel.
 
-        Args:
-            length: Lengths off the drums [m], shape (N, m); NaN is answered by NaN.
-
-        Returns:
-            Turns, and by how much one of them changes the length [m], both of shape (N, m).
-
-        Raises:
-            InvalidValueError: If a drum cannot hold what is left, or has not so much cable.
+        length: lengths off the drums [m], shape (N, m); NaN is answered by NaN. Returns turns, and by how much one of
+        them changes the length [m], both of shape (N, m).
         """
         turns, travel = self._turns(length)
         if (wrong := self._off(turns)) is not None:
@@ -75,23 +69,14 @@ class Drums:
         return length
 
     def counts(self, length: Array) -> Array:
-        """Counts of the encoders at lengths off the drums, both of shape (N, m), not rounded.
-
-        Raises:
-            InvalidValueError: If a field is missing that counts need, or a drum cannot hold what is left or has not so
-                much cable.
-        """
+        """Counts of the encoders at lengths off the drums, both of shape (N, m), not rounded."""
         zero, rate = self.zero_and_rate()
         turns, _ = self.turns(length)
         found: Array = self.winches.count_zero + (zero - turns) * rate
         return found
 
     def lengths_at(self, counts: Array) -> Array:
-        """Lengths off the drums [m] at counts of the encoders, both of shape (N, m).
-
-        Raises:
-            InvalidValueError: If a field is missing, or counts run off a drum.
-        """
+        """Lengths off the drums [m] at counts of the encoders, both of shape (N, m)."""
         zero, rate = self.zero_and_rate()
         turns = zero - (counts - self.winches.count_zero) / rate
         if (wrong := self._off(turns)) is not None:
@@ -104,11 +89,7 @@ class Drums:
     def zero_and_rate(self) -> tuple[Array, Array]:
         """Turns on the drums at the zeros of their counts, and counts for a turn let out.
 
-        Returns:
-            Both of shape (m,).
-
-        Raises:
-            InvalidValueError: If a field is missing that counts need, or the zero is off a drum.
+        Returns both of shape (m,).
         """
         per_turn, length = _given(self.winches, "counts_per_turn"), _given(self.winches, "length_zero", _ZERO_STEP)
         turns, _ = self._turns(length[None])
@@ -151,15 +132,8 @@ class Drums:
 def drums_of(robot: Robot) -> Drums:
     """The drums of a robot.
 
-    Args:
-        robot: The robot. Its winches need drum_radius and groove_pitch, its cables a diameter; several layers need
-            drum_width too, and these or a wandering exit cable_length.
-
-    Returns:
-        Drums.
-
-    Raises:
-        InvalidValueError: If data are missing, the message names them; or they do not fit together.
+    robot: the robot. Its winches need drum_radius and groove_pitch, its cables a diameter; several layers need
+    drum_width too, and these or a wandering exit cable_length.
     """
     winches, diameter = robot.winches, robot.cables.diameter
     names = ["drum_radius", "groove_pitch"]
@@ -179,11 +153,8 @@ def drums_of(robot: Robot) -> Drums:
 def not_given(names: Sequence[str]) -> tuple[str, str]:
     """Item and value of a message on missing data.
 
-    Args:
-        names: Of one or more, "winches: drum_radius" for instance, those of one kind in a row.
-
-    Returns:
-        Item and value: of several the kind is named once.
+    names: of one or more, "winches: drum_radius" for instance, those of one kind in a row. Returns item and value: of
+    several the kind is named once.
     """
     if len(names) == 1:
         return names[0], "not given"
@@ -241,12 +212,8 @@ def drum_tension(state: Equilibrium) -> Array:
     Along an exact cable without friction T + T^2/(2 EA) - w z is constant, z the height. Cables of the other models
     weigh nothing behind their pulleys, and have the chord tension there.
 
-    Args:
-        state: Robot with winches, and its cables.
-
-    Returns:
-        Tensions [N], shape (m,) or (N, m); negative where a slack cable hangs down from a drum, NaN where one
-        would be pressed to less than no length.
+    Returns tensions [N], shape (m,) or (N, m); negative where a slack cable hangs down from a drum, NaN where one would
+    be pressed to less than no length.
 
     Source:
         docs/model.md, section 10.
@@ -270,15 +237,8 @@ def drum_tension(state: Equilibrium) -> Array:
 def warmth(robot: Robot, temperature: Any) -> Array | float:
     """Factor of thermal elongation of the cables.
 
-    Args:
-        robot: The robot.
-        temperature: Difference to there [K], a number or one a cable.
-
-    Returns:
-        1 + expansion times the difference, shape (m,) or a number.
-
-    Raises:
-        InvalidValueError: If the temperature is wrong, or the expansion of the cables is not known.
+    temperature: difference to there [K], a number or one a cable. Returns 1 + expansion times the difference, shape
+    (m,) or a number.
     """
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
@@ -321,16 +281,8 @@ def _at(item: str, sample: int, cable: int, samples: int) -> str:
 def drum_lever(robot: Robot, length: Array) -> Array:
     """Length of cable for a radian of its drum, at given lengths off the drums [m].
 
-    Args:
-        robot: With winches.
-        length: Unstrained lengths off the drums [m], (m,) or (N, m).
-
-    Returns:
-        That of the layer at these lengths where the drums are known, else drum_radius and half the cable's diameter; of
-        the shape of the lengths.
-
-    Raises:
-        InvalidValueError: If drum_radius is not given.
+    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns that of the layer at these lengths where the
+    drums are known, else drum_radius and half the cable's diameter; of the shape of the lengths.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

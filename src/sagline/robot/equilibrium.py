@@ -51,11 +51,7 @@ class Contact(Result):
     def part(self, index: Index) -> Contact:
         """Contact of a part of a batch.
 
-        Args:
-            index: As of an array.
-
-        Returns:
-            Contact of the poses that the index names.
+        Returns contact of the poses that the index names.
         """
         known = {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
         return Contact(**{name: locked(field[index, ...]) for name, field in known.items()})
@@ -167,13 +163,8 @@ class Equilibrium(Result):
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:
     """The tension that a robot's limits name: along the chord, or at the frame end.
 
-    Args:
-        robot: The robot, or several that fit together.
-        cables: State of their cables, fields of shape (m,) or (N, m).
-        contact: What is behind them, or None.
-
-    Returns:
-        Tensions [N], of the shape of the cables' fields.
+    robot: the robot, or several that fit together; cables: state of their cables, fields of shape (m,) or (N, m);
+    contact: what is behind them, or None. Returns tensions [N], of the shape of the cables' fields.
     """
     if first_of(robot).tension_limits_of == "frame_end":
         return cables.frame_end_tension
@@ -185,12 +176,8 @@ def cables_of_results(
 ) -> tuple[CableState, Contact | None]:
     """State of the free spans of solved poses, and of their routing, or None without pulleys and dead cable.
 
-    Args:
-        robot: The robot, or one a pose.
-        model: Cable model.
-        results: Rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m).
-        status: Status of each cable, (N, m).
-        shape: () for a single pose, (N,) for a batch.
+    results: rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: ()
+    for a single pose, (N,) for a batch.
     """
     m = results.shape[2]
 

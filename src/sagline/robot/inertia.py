@@ -15,14 +15,8 @@ if TYPE_CHECKING:
 def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
     """A solid box, its edges along the platform's axes.
 
-    Args:
-        mass: [kg].
-        x: Edge along x [m].
-        y: Edge along y [m].
-        z: Edge along z [m].
-
-    Returns:
-        Inertia about the center of mass [kg m^2], shape (3, 3).
+    mass: [kg]; x: edge along x [m]; y: edge along y [m]; z: edge along z [m]. Returns inertia about the center of mass
+    [kg m^2], shape (3, 3).
     """
     return np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) * (mass / 12.0)
 
@@ -30,13 +24,7 @@ def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
 def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
     """A solid cylinder, its axis along the platform's z.
 
-    Args:
-        mass: [kg].
-        radius: [m].
-        height: [m].
-
-    Returns:
-        Inertia about the center of mass [kg m^2], shape (3, 3).
+    mass: [kg]; radius: [m]; height: [m]. Returns inertia about the center of mass [kg m^2], shape (3, 3).
     """
     across = (3.0 * radius * radius + height * height) / 12.0
     return np.diag([across, across, 0.5 * radius * radius]) * mass
@@ -45,14 +33,6 @@ def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
 def with_mass(robot: Robot, mass: float) -> Robot:
     """A robot with another mass, spread as its own is: the inertia grows in proportion.
 
-    Args:
-        robot: The robot.
-        mass: Of the platform with its load [kg], > 0.
-
-    Returns:
-        The robot with that mass.
-
-    Raises:
-        InvalidValueError: If it is no such mass.
+    mass: of the platform with its load [kg], > 0.
     """
     return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))

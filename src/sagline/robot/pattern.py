@@ -18,13 +18,10 @@ _SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
 def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
     """Rows that pick the free motions out of (force, moment) or (velocity, angular velocity), world axes.
 
-    Args:
-        pattern: "3R3T" (all six), "3T" (a point mass), "1R2T" (a plane), "2T" (a plane without rotation).
-        plane_normal: Unit normal of the plane, shape (3,); None for the spatial patterns.
-
-    Returns:
-        Array of shape (n, 6) with orthonormal rows. A planar pattern's translations are e1 and e2 with
-        e1 x e2 = plane_normal, e1 horizontal and e2 as far up as the plane allows, then the rotation about the normal.
+    pattern: "3R3T" (all six), "3T" (a point mass), "1R2T" (a plane), "2T" (a plane without rotation); plane_normal:
+    unit normal of the plane, shape (3,); None for the spatial patterns. Returns array of shape (n, 6) with orthonormal
+    rows. A planar pattern's translations are e1 and e2 with e1 x e2 = plane_normal, e1 horizontal and e2 as far up as
+    the plane allows, then the rotation about the normal.
     """
     if plane_normal is None:
         return _SPATIAL[pattern]

@@ -29,11 +29,7 @@ def unit(vectors: Array) -> Array:
 
     Files, pickles and copies pass here again and must not drift. Zero vectors give NaN: check lengths first.
 
-    Args:
-        vectors: Shape (..., k).
-
-    Returns:
-        Array of the same shape; the same array where nothing was to be done.
+    vectors: shape (..., k). Returns array of the same shape; the same array where nothing was to be done.
     """
     length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., np.newaxis]
     if (np.abs(length - 1.0) <= _ROUNDING).all():

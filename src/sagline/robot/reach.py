@@ -23,13 +23,8 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
     A platform that does not turn keeps its orientation, whichever that is; a planar one turns about the normal of its
     plane alone, and stays in one plane, whichever of the parallel ones.
 
-    Args:
-        robot: The robot, or the first of several that share their pattern.
-        pose: One pose, which is always in reach, or a batch; NaN passes.
-        item: The name a message uses.
-
-    Raises:
-        InvalidValueError: If one cannot be reached from the first; the message names it and says by how much.
+    robot: the robot, or the first of several that share their pattern; pose: one pose, which is always in reach, or a
+    batch; NaN passes.
     """
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
@@ -53,13 +48,8 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
     """The part of the rotation from an orientation to that of each pose that the robot's motion pattern does not have.
 
-    Args:
-        robot: The robot.
-        pose: One pose or a batch of N.
-        other: The orientation, a unit quaternion, shape (4,).
-
-    Returns:
-        Sine of half the angle times the axis, shape (N, 3); zeros where all motions are free.
+    pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sine of half the
+    angle times the axis, shape (N, 3); zeros where all motions are free.
     """
     own = np.atleast_2d(pose.quaternion)
     if robot.motion_pattern == "3R3T":
@@ -73,11 +63,7 @@ def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
 def in_words(turn: Array) -> str:
     """A turn as a person reads it.
 
-    Args:
-        turn: Sine of half the angle times the axis, shape (3,), more than zero.
-
-    Returns:
-        Angle and axis.
+    turn: sine of half the angle times the axis, shape (3,), more than zero.
     """
     sine = float(np.linalg.norm(turn))
     axis = ", ".join(f"{x:.3g}" for x in np.round(turn / sine, 9) + 0.0)
@@ -87,13 +73,8 @@ def in_words(turn: Array) -> str:
 def out_of_plane(robot: Robot, pose: Pose) -> Array:
     """Distance of the cables of a planar robot, if they lie in one plane, from it.
 
-    Args:
-        robot: The robot.
-        pose: One pose or a batch of N.
-
-    Returns:
-        Distance of the platform ends from the plane of the frame ends [m], shape (N,); zeros where the robot is not
-        planar, or its ends are not in one plane each.
+    pose: one pose or a batch of N. Returns distance of the platform ends from the plane of the frame ends [m], shape
+    (N,); zeros where the robot is not planar, or its ends are not in one plane each.
     """
     away = np.zeros(len(np.atleast_2d(pose.position)))
     if robot.plane_normal is None:
@@ -114,11 +95,7 @@ def bounds(robot: Robot) -> tuple[Array, Array]:
     Frames stand: their top is where the highest anchors are. Where all anchors hang at the top and no frame is given,
     the box reaches down to the floor, or to the lowest pose that the robot is meant for.
 
-    Args:
-        robot: The robot.
-
-    Returns:
-        The two corners, shape (3,) each.
+    Returns the two corners, shape (3,) each.
     """
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
     if robot.frame_size is not None:
@@ -132,10 +109,6 @@ def bounds(robot: Robot) -> tuple[Array, Array]:
 
 
 def home_pose(robot: Robot) -> Pose:
-    """The middle of the poses that a robot is meant for, or of its box.
-
-    Args:
-        robot: The robot.
-    """
+    """The middle of the poses that a robot is meant for, or of its box."""
     low, high = bounds(robot) if robot.test_box is None else (robot.test_box.low, robot.test_box.high)
     return Pose(0.5 * (low + high), np.eye(3))

@@ -34,46 +34,27 @@ _STEP: Final = 1e-6  # of the tension, for its slope
 _TINY: Final = 1e-300
 
 
-class Routing(NamedTuple):
-    """Cable behind the exit points, arrays of shape (N, m).
+class _Routing(NamedTuple):
+    """Cable behind the exit points, arrays of shape (N, m)."""
 
-    Attributes:
-        wrapped: Unstrained length on the pulleys [m].
-        dead: Unstrained length between pulleys and drums [m]; NaN where the cable is too slack to hang there.
-        drum_tension: Where the cables leave the drums [N].
-    """
-
-    wrapped: Array
-    dead: Array
-    drum_tension: Array
+    wrapped: Array  # unstrained length on the pulleys [m]
+    dead: Array  # unstrained length between pulleys and drums [m]; NaN where the cable is too slack to hang there
+    drum_tension: Array  # where the cables leave the drums [N]
 
 
 class _ExitState(NamedTuple):
-    """Cables where they leave their pulleys, arrays of shape (K,) for those that are looked at.
+    """Cables where they leave their pulleys, arrays of shape (K,) for those that are looked at."""
 
-    Attributes:
-        tension: T_A at P [N].
-        weight: w [N/m]; 0 where the model has no weight there.
-        stiffness: EA [N].
-        wrap: Psi [rad].
-        sine: sin psi.
-        tangent: Unit tangent there, toward the platform, shape (K, 3).
-        radius: R [m].
-        entry: +1 where a cable comes from below, -1 from above.
-        friction: mu, with the sign of the winding.
-        rolling: 1 + f while winding in, 1 - f while paying out, else 1.
-    """
-
-    tension: Array
-    weight: Array
-    stiffness: Array
-    wrap: Array
-    sine: Array
-    tangent: Array
-    radius: Array
-    entry: Array
-    friction: Array
-    rolling: Array
+    tension: Array  # T_A at P [N]
+    weight: Array  # w [N/m]; 0 where the model has no weight there
+    stiffness: Array  # EA [N]
+    wrap: Array  # psi [rad]
+    sine: Array  # sin psi
+    tangent: Array  # unit tangent there, toward the platform, shape (K, 3)
+    radius: Array  # R [m]
+    entry: Array  # +1 where a cable comes from below, -1 from above
+    friction: Array  # mu, with the sign of the winding
+    rolling: Array  # 1 + f while winding in, 1 - f while paying out, else 1
 
     def entering(self, bend: Array) -> Array:
         """Tension behind the pulley [N], after a further bend of its frame anchor [rad]."""
@@ -85,9 +66,7 @@ class _ExitState(NamedTuple):
 def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
     """True if the routing differs from a straight guided run without friction.
 
-    Args:
-        robot: The robot, or one a pose.
-        winding: +1, -1 and 0, or None.
+    winding: +1, -1 and 0, or None.
     """
     winches = [one.winches for one in ((robot,) if isinstance(robot, Robot) else robot) if one.winches is not None]
     rubs = winding is not None and bool(winding.any())
@@ -100,13 +79,9 @@ def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
 def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
     """An equilibrium of the kernels with the actual routing behind its pulleys.
 
-    Args:
-        state: Robot, pose and cables as kernels have them.
-        winding: +1 winding in, -1 paying out, 0 standing, shape (m,) or (N, m); None: nothing rubs.
-
-    Returns:
-        The equilibrium with other wrapped and dead lengths, NaN where a cable is too slack to hang between guides; the
-        same one where nothing is behind its frame anchors.
+    state: robot, pose and cables as kernels have them; winding: +1 winding in, -1 paying out, 0 standing, shape (m,) or
+    (N, m); None: nothing rubs. Returns the equilibrium with other wrapped and dead lengths, NaN where a cable is too
+    slack to hang between guides; the same one where nothing is behind its frame anchors.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -128,35 +103,31 @@ def kernel_length(state: Equilibrium) -> Array:
     return locked(state.free_length + (modeled.wrapped + modeled.dead))
 
 
-def actual_routing(state: Equilibrium) -> Routing:
+def actual_routing(state: Equilibrium) -> _Routing:
     """The part behind the pulleys, with its guides, and friction where the state's contact knows the winding.
 
-    Args:
-        state: An equilibrium with something behind its frame anchors.
-
-    Returns:
-        Routing, of the shape of the state's cables.
+    state: an equilibrium with something behind its frame anchors. Returns routing, of the shape of the state's cables.
     """
     return _routing(state, guided=False)
 
 
-def _routing(state: Equilibrium, *, guided: bool) -> Routing:
+def _routing(state: Equilibrium, *, guided: bool) -> _Routing:
     """The part behind; of several robots one by one. guided: as if it were a straight guided run."""
     if isinstance(state.robot, Robot):
         return _routing_of_robot(state, state.robot, guided=guided)
     parts = [_routing_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
-    return Routing(*(np.stack(each) for each in zip(*parts, strict=True)))
+    return _Routing(*(np.stack(each) for each in zip(*parts, strict=True)))
 
 
-def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> Routing:
+def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Routing:
     contact, winches, shape = state.contact, robot.winches, state.cables.shape
     assert contact is not None
     if winches is None or not winches.anything_behind:
-        return Routing(np.zeros(shape), np.zeros(shape), _exit_tension(state))
+        return _Routing(np.zeros(shape), np.zeros(shape), _exit_tension(state))
     if state.cables.model.code == codes.STRAIGHT:  # does not stretch, whatever rubs
         dead = np.broadcast_to(winches.dead_cable, shape)
-        return Routing(winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state))
-    found = Routing(*(np.full(shape, np.nan) for _ in Routing._fields))
+        return _Routing(winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state))
+    found = _Routing(*(np.full(shape, np.nan) for _ in _Routing._fields))
     known = np.isfinite(_exit_tension(state))
     if not known.any():
         return found

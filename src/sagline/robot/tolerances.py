@@ -18,46 +18,34 @@ from sagline.core.fields import given_by_name, reduced
 from sagline.core.results import set_fields
 
 
-class Uncertain(NamedTuple):
-    """A number of a robot that may be off.
+class _Uncertain(NamedTuple):
+    """A number of a robot that may be off."""
 
-    Attributes:
-        place: Where a robot has it, as a dotted attribute.
-        unit: Its unit in SI.
-        each: Whether every cable has its own.
-        axes: Whether it has three components, along x, y and z.
-        share: Whether a file may give its tolerance as a share of it, in percent.
-    """
-
-    place: str
-    unit: str
-    each: bool = True
-    axes: bool = False
-    share: bool = False
+    place: str  # where a robot has it, as a dotted attribute
+    unit: str  # its unit in SI
+    each: bool = True  # whether every cable has its own
+    axes: bool = False  # whether it has three components, along x, y and z
+    share: bool = False  # whether a file may give its tolerance as a share of it, in percent
 
     def shape(self, cables: int) -> tuple[int, ...]:
-        """Its shape in a robot of so many cables.
-
-        Args:
-            cables: Number of cables m.
-        """
+        """Its shape in a robot of so many cables."""
         return (*((cables,) if self.each else ()), *((3,) if self.axes else ()))
 
 
-UNCERTAIN: Final[Mapping[str, Uncertain]] = MappingProxyType(
+UNCERTAIN: Final[Mapping[str, _Uncertain]] = MappingProxyType(
     {
-        "frame_anchors": Uncertain("frame_anchors", "m", axes=True),
-        "platform_anchors": Uncertain("platform_anchors", "m", axes=True),
-        "length_zero": Uncertain("winches.length_zero", "m"),
-        "drum_radius": Uncertain("winches.drum_radius", "m", share=True),
-        "linear_density": Uncertain("cables.linear_density", "kg/m", share=True),
-        "axial_stiffness": Uncertain("cables.axial_stiffness", "N", share=True),
-        "pulley_radius": Uncertain("winches.pulley_radius", "m"),
-        "dead_cable": Uncertain("winches.dead_cable", "m"),
-        "load_cell_gain": Uncertain("winches.load_cell_gain", "", share=True),
-        "load_cell_bias": Uncertain("winches.load_cell_bias", "N"),
-        "mass": Uncertain("mass", "kg", each=False, share=True),
-        "center_of_mass": Uncertain("center_of_mass", "m", each=False, axes=True),
+        "frame_anchors": _Uncertain("frame_anchors", "m", axes=True),
+        "platform_anchors": _Uncertain("platform_anchors", "m", axes=True),
+        "length_zero": _Uncertain("winches.length_zero", "m"),
+        "drum_radius": _Uncertain("winches.drum_radius", "m", share=True),
+        "linear_density": _Uncertain("cables.linear_density", "kg/m", share=True),
+        "axial_stiffness": _Uncertain("cables.axial_stiffness", "N", share=True),
+        "pulley_radius": _Uncertain("winches.pulley_radius", "m"),
+        "dead_cable": _Uncertain("winches.dead_cable", "m"),
+        "load_cell_gain": _Uncertain("winches.load_cell_gain", "", share=True),
+        "load_cell_bias": _Uncertain("winches.load_cell_bias", "N"),
+        "mass": _Uncertain("mass", "kg", each=False, share=True),
+        "center_of_mass": _Uncertain("center_of_mass", "m", each=False, axes=True),
     }
 )
 
@@ -67,19 +55,9 @@ def deviations(
 ) -> Mapping[str, Array]:
     """Standard deviations of a robot's numbers, each in the shape of its field.
 
-    Args:
-        given: Of some names of `UNCERTAIN`: one number for all of the field, three along the axes where it has them,
-            or the whole field.
-        item: The name a message uses.
-        cables: Number of cables m.
-        low: The least allowed; it may be infinite, where nothing is known.
-        above: A bound they must exceed.
-
-    Returns:
-        The same names, in the same order.
-
-    Raises:
-        InvalidValueError: If it is no mapping, has another name, or a value of another shape or out of range.
+    given: of some names of `UNCERTAIN`: one number for all of the field, three along the axes where it has them, or the
+    whole field; low: the least allowed; it may be infinite, where nothing is known. Returns the same names, in the same
+    order.
     """
     if not isinstance(given, Mapping):
         allowed = "names of fields and standard deviations"
@@ -101,12 +79,7 @@ def deviations(
 def value_of(robot: object, name: str) -> Array | None:
     """The number of a robot that a tolerance is about.
 
-    Args:
-        robot: The robot.
-        name: Of `UNCERTAIN`.
-
-    Returns:
-        Its value in SI, shape () or that of the field; None where the robot does not have it.
+    Returns its value in SI, shape () or that of the field; None where the robot does not have it.
     """
     found: Any = robot
     for part in UNCERTAIN[name].place.split("."):
@@ -117,16 +90,8 @@ def value_of(robot: object, name: str) -> Array | None:
 def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
     """Standard deviation of a number, from a share of it.
 
-    Args:
-        share: The share, shape () or that of the number.
-        value: The number, or None where it is not known.
-        item: The name a message uses.
-
-    Returns:
-        In the unit of the number, in its shape.
-
-    Raises:
-        InvalidValueError: If the number is not known, or of another shape.
+    share: the share, shape () or that of the number; value: the number, or None where it is not known. Returns in the
+    unit of the number, in its shape.
     """
     if value is None:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")

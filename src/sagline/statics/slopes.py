@@ -29,29 +29,17 @@ _TINY = 1e-300
 
 
 class CableSlopes(NamedTuple):
-    """Derivatives of every cable's force on its platform end, world axes.
+    """Derivatives of every cable's force on its platform end, world axes."""
 
-    Attributes:
-        matrix: Derivative of the platform's unbalance by its motion, shape (..., 6, 6).
-        blocks: dT/dB, shape (..., m, 3, 3) [N/m].
-        by_length: dT/dL, shape (..., m, 3) [N/m].
-        by_density: dT/d(rho), shape (..., m, 3) [N m/kg].
-        by_stiffness: dT/d(EA), shape (..., m, 3) [1].
-        by_radius: dT/dR of the pulley, shape (..., m, 3) [N/m].
-        by_dead: dT by the length of the dead cable, shape (..., m, 3) [N/m].
-        levers: From the center of mass to the platform ends, shape (..., m, 3) [m].
-        force: T, on the platform ends, shape (..., m, 3) [N].
-    """
-
-    matrix: Array
-    blocks: Array
-    by_length: Array
-    by_density: Array
-    by_stiffness: Array
-    by_radius: Array
-    by_dead: Array
-    levers: Array
-    force: Array
+    matrix: Array  # derivative of the platform's unbalance by its motion, shape (..., 6, 6)
+    blocks: Array  # dT/dB, shape (..., m, 3, 3) [N/m]
+    by_length: Array  # dT/dL, shape (..., m, 3) [N/m]
+    by_density: Array  # dT/d(rho), shape (..., m, 3) [N m/kg]
+    by_stiffness: Array  # dT/d(EA), shape (..., m, 3) [1]
+    by_radius: Array  # dT/dR of the pulley, shape (..., m, 3) [N/m]
+    by_dead: Array  # dT by the length of the dead cable, shape (..., m, 3) [N/m]
+    levers: Array  # from the center of mass to the platform ends, shape (..., m, 3) [m]
+    force: Array  # T, on the platform ends, shape (..., m, 3) [N]
 
 
 def cable_slopes(state: Equilibrium) -> CableSlopes:
@@ -127,16 +115,11 @@ _LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a 
 
 
 class TensionSlopes(NamedTuple):
-    """Derivatives of the tension at each cable's frame end.
+    """Derivatives of the tension at each cable's frame end."""
 
-    Attributes:
-        by_motion: By (displacement of the center of mass, rotation vector) at fixed lengths, shape (..., m, 6)
-            [N/m, N/rad].
-        by_length: By the cable's own length, the platform held, shape (..., m) [N/m].
-    """
-
+    # by (displacement of the center of mass, rotation vector) at fixed lengths, shape (..., m, 6) [N/m, N/rad]
     by_motion: Array
-    by_length: Array
+    by_length: Array  # by the cable's own length, the platform held, shape (..., m) [N/m]
 
 
 def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:

@@ -24,17 +24,11 @@ _TINY = 1e-300
 
 
 class Strings(NamedTuple):
-    """The cables of N states.
+    """The cables of N states."""
 
-    Attributes:
-        table: Columns as in `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS).
-        axes: Of each cable in the world: level along its plane, normal to the plane, upward, shape (N, m, 3, 3).
-        taut: Which have linear vibrations: neither folded nor slack, shape (N, m).
-    """
-
-    table: Array
-    axes: Array
-    taut: Flags
+    table: Array  # columns as in `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS)
+    axes: Array  # of each cable in the world: level along its plane, normal to the plane, upward, shape (N, m, 3, 3)
+    taut: Flags  # which have linear vibrations: neither folded nor slack, shape (N, m)
 
 
 def strings_of(state: Equilibrium) -> Strings:

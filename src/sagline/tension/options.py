@@ -19,17 +19,11 @@ LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_
 
 
 class Options(NamedTuple):
-    """Model, method and limits as kernels take them first.
+    """Model, method and limits as kernels take them first."""
 
-    Attributes:
-        model: Code, k_h, k_p.
-        sharing: Method, parameter, variable, root weights and goals of the cables.
-        limits: Which quantity is limited, and the article's T_adj [N] or NaN.
-    """
-
-    model: ModelTerms
-    sharing: DistributionTerms
-    limits: LimitTerms
+    model: ModelTerms  # code, k_h, k_p
+    sharing: DistributionTerms  # method, parameter, variable, root weights and goals of the cables
+    limits: LimitTerms  # which quantity is limited, and the article's T_adj [N] or NaN
 
 
 def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> Options:
