@@ -28,48 +28,28 @@ MOST_RATE: Final = 100.0  # samples a second; of twice as many and more a page k
 
 
 class Verdict(NamedTuple):
-    """Verdict on a sample.
+    """Verdict on a sample."""
 
-    Attributes:
-        good: Whether all is well; None where there is nothing to judge.
-        words: The sentence.
-    """
-
-    good: bool | None
-    words: str
+    good: bool | None  # whether all is well; None where there is nothing to judge
+    words: str  # the sentence
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """N samples of a robot in motion.
-
-    Attributes:
-        robot: The robot.
-        kind: What it is, in a word.
-        time: From 0 on [s], shape (N,).
-        position: Of the platform's origin [m], shape (N, 3); NaN where it is not known.
-        quaternion: Its rotation, scalar last, shape (N, 4).
-        tension: What is told and colored [N], shape (N, m).
-        quantity: Which tension that is.
-        chord_tension: With which cables are drawn [N], shape (N, m); NaN draws a straight line.
-        length: Unstrained, off the drum [m], shape (N, m).
-        verdict: Which of the verdicts, shape (N,).
-        verdicts: All that are said.
-        notes: What is to be known of the page.
-    """
+    """N samples of a robot in motion."""
 
     robot: Robot
-    kind: str
-    time: Array
-    position: Array
-    quaternion: Array
-    tension: Array
-    quantity: str
-    chord_tension: Array
-    length: Array
-    verdict: NDArray[np.intp]
-    verdicts: tuple[Verdict, ...]
-    notes: tuple[str, ...] = ()
+    kind: str  # what it is, in a word
+    time: Array  # from 0 on [s], shape (N,)
+    position: Array  # of the platform's origin [m], shape (N, 3); NaN where it is not known
+    quaternion: Array  # its rotation, scalar last, shape (N, 4)
+    tension: Array  # what is told and colored [N], shape (N, m)
+    quantity: str  # which tension that is
+    chord_tension: Array  # with which cables are drawn [N], shape (N, m); NaN draws a straight line
+    length: Array  # unstrained, off the drum [m], shape (N, m)
+    verdict: NDArray[np.intp]  # which of the verdicts, shape (N,)
+    verdicts: tuple[Verdict, ...]  # all that are said
+    notes: tuple[str, ...] = ()  # what is to be known of the page
 
     def pose_at(self, index: int) -> Pose | None:
         """Pose of the platform at a sample; None if it is not known."""

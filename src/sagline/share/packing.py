@@ -19,19 +19,12 @@ _LEVEL: Final = 9
 
 
 class Channel(NamedTuple):
-    """Something that a page knows over time.
+    """Something that a page knows over time."""
 
-    Attributes:
-        name: As the page knows it.
-        values: Shape (N,) or (N, k); NaN where there is none.
-        step: Of the numbers that are kept, in the values' unit; relative ones as share of the value.
-        scale: "linear", or "relative" of values above zero.
-    """
-
-    name: str
-    values: Array
-    step: float
-    scale: Literal["linear", "relative"] = "linear"
+    name: str  # as the page knows it
+    values: Array  # shape (N,) or (N, k); NaN where there is none
+    step: float  # of the numbers that are kept, in the values' unit; relative ones as share of the value
+    scale: Literal["linear", "relative"] = "linear"  # "linear", or "relative" of values above zero
 
 
 def encode_channels(channels: Sequence[Channel]) -> tuple[dict[str, object], str]:

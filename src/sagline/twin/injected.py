@@ -14,25 +14,15 @@ from sagline.core.errors import InvalidValueError, nearest
 
 
 class Kind(NamedTuple):
-    """One kind of fault.
+    """One kind of fault."""
 
-    Attributes:
-        item: Kind of part ("cell").
-        numbered: Whether there are several, told apart by a number.
-        words: The fault, with # in place of its value.
-        unit: Of that value in texts.
-        scale: To SI.
-        for_good: Whether it cannot end by itself.
-        sense: Meaning, in words.
-    """
-
-    item: str
-    numbered: bool
-    words: str
-    unit: str
-    scale: float
-    for_good: bool
-    sense: str
+    item: str  # kind of part ("cell")
+    numbered: bool  # whether there are several, told apart by a number
+    words: str  # the fault, with # in place of its value
+    unit: str  # of that value in texts
+    scale: float  # to SI
+    for_good: bool  # whether it cannot end by itself
+    sense: str  # meaning, in words
 
 
 KINDS: Final = MappingProxyType(

@@ -46,19 +46,12 @@ class Order(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Limits of the winches of a PLC.
+    """Limits of the winches of a PLC."""
 
-    Attributes:
-        least: Shortest set points [m].
-        most: Longest [m].
-        speed: Largest rates [m/s].
-        tension: Largest at which cable is taken in, and that may be expected [N].
-    """
-
-    least: list[float]
-    most: list[float]
-    speed: list[float]
-    tension: list[float]
+    least: list[float]  # shortest set points [m]
+    most: list[float]  # longest [m]
+    speed: list[float]  # largest rates [m/s]
+    tension: list[float]  # largest at which cable is taken in, and that may be expected [N]
 
 
 class Program:

@@ -166,15 +166,10 @@ SWITCHING_ON: Final = 60.0  # s, at most; kernels may have to be read from the d
 
 
 class RemoteMachine(NamedTuple):
-    """Machine in another process.
+    """Machine in another process."""
 
-    Attributes:
-        addresses: "host:port" of each group's PLC.
-        place: Shared with it: the true position of the platform's origin [m].
-    """
-
-    addresses: tuple[str, ...]
-    place: Any
+    addresses: tuple[str, ...]  # "host:port" of each group's PLC
+    place: Any  # shared with it: the true position of the platform's origin [m]
 
     def position(self) -> Array:
         """Position of the platform's origin after the last scan [m], shape (3,)."""

@@ -79,17 +79,11 @@ REACH: Final = 2.0  # of the largest distance between frame anchors: no cable is
 
 
 class Start(NamedTuple):
-    """Machine before it is switched on.
+    """Machine before it is switched on."""
 
-    Attributes:
-        state: The true robot at rest.
-        nominal: Scale of the encoders in the PLCs.
-        true: True scale.
-    """
-
-    state: Equilibrium
-    nominal: EncoderScale
-    true: EncoderScale
+    state: Equilibrium  # the true robot at rest
+    nominal: EncoderScale  # scale of the encoders in the PLCs
+    true: EncoderScale  # true scale
 
 
 def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:

@@ -31,22 +31,16 @@ BEYOND: Final = 0.5  # how far a field without an end goes on, of the size of wh
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DotField:
-    """Drawing of the feasible tensions.
+    """Drawing of the feasible tensions."""
 
-    Attributes:
-        polygon: All of them.
-        corners: Of what is drawn, in coordinates of the null space [N], shape (h, r), r 1 or 2; where the polygon has
-            no end the drawing has.
-        sides: The limit that each side of it is, from corner k to corner k + 1 (at corner k for an interval).
-        low: Lowest coordinates of the drawing [N], shape (r,).
-        high: Highest [N], shape (r,).
-    """
-
-    polygon: TensionPolygon
+    polygon: TensionPolygon  # all of them
+    # of what is drawn, in coordinates of the null space [N], shape (h, r), r 1 or 2; where the polygon has no end the
+    # drawing has
     corners: Array
+    # the limit that each side of it is, from corner k to corner k + 1 (at corner k for an interval)
     sides: tuple[Side | None, ...]
-    low: Array
-    high: Array
+    low: Array  # lowest coordinates of the drawing [N], shape (r,)
+    high: Array  # highest [N], shape (r,)
 
     @classmethod
     def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:

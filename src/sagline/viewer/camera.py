@@ -15,19 +15,12 @@ from sagline.viewer.solids import Solid
 
 
 class Camera(NamedTuple):
-    """Position, axes and lens of a camera.
+    """Position, axes and lens of a camera."""
 
-    Attributes:
-        place: Position [m], shape (3,).
-        axes: Right, down and forward, one a column, shape (3, 3).
-        reach: Half of the picture's width and height at a distance of 1, shape (2,).
-        pixels: Width and height of the picture [px], shape (2,).
-    """
-
-    place: Array
-    axes: Array
-    reach: Array
-    pixels: Array
+    place: Array  # position [m], shape (3,)
+    axes: Array  # right, down and forward, one a column, shape (3, 3)
+    reach: Array  # half of the picture's width and height at a distance of 1, shape (2,)
+    pixels: Array  # width and height of the picture [px], shape (2,)
 
     @classmethod
     def of(cls, camera: Any) -> Camera | None:

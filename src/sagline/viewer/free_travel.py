@@ -21,25 +21,15 @@ NAMES: Final = ("+x", "+y", "+z", "−x", "−y", "−z")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeTravel:
-    """Free travel from a position in directions of the axes, at one orientation.
+    """Free travel from a position in directions of the axes, at one orientation."""
 
-    Attributes:
-        start: The position [m], shape (3,).
-        inside: Whether it is within the workspace.
-        margin: Capacity margin there [N].
-        which: Directions in which this robot can move, indices of `DIRECTIONS`, shape (K,).
-        distance: Distance to the boundary, or to the end of the box [m], shape (K,).
-        crossed: Whether the boundary is reached, shape (K,).
-        cable: The cable that limits there, -1 where none does, shape (K,).
-    """
-
-    start: Array
-    inside: bool
-    margin: float
-    which: Indices
-    distance: Array
-    crossed: Flags
-    cable: Indices
+    start: Array  # the position [m], shape (3,)
+    inside: bool  # whether it is within the workspace
+    margin: float  # capacity margin there [N]
+    which: Indices  # directions in which this robot can move, indices of `DIRECTIONS`, shape (K,)
+    distance: Array  # distance to the boundary, or to the end of the box [m], shape (K,)
+    crossed: Flags  # whether the boundary is reached, shape (K,)
+    cable: Indices  # the cable that limits there, -1 where none does, shape (K,)
 
     @property
     def ends(self) -> Array:

@@ -32,19 +32,12 @@ OPACITY: Final = 0.35  # the robot inside is seen
 
 
 class Patch(NamedTuple):
-    """Faces of one color.
+    """Faces of one color."""
 
-    Attributes:
-        vertices: Corners, each in a face [m], shape (V, 3).
-        faces: Shape (F, 3).
-        color: Red, green and blue, 0 to 255.
-        opacity: 0 to 1.
-    """
-
-    vertices: Array
-    faces: Indices
-    color: tuple[int, int, int]
-    opacity: float = OPACITY
+    vertices: Array  # corners, each in a face [m], shape (V, 3)
+    faces: Indices  # shape (F, 3)
+    color: tuple[int, int, int]  # red, green and blue, 0 to 255
+    opacity: float = OPACITY  # 0 to 1
 
     @classmethod
     def of(cls, vertices: Array, faces: Indices, color: tuple[int, int, int]) -> Patch:
@@ -78,19 +71,12 @@ LEAST: Final = 0.005  # of the wall: what limits less is not written
 
 
 class WorkspaceQuery(NamedTuple):
-    """Robot, orientation, cable model and loads of a workspace.
+    """Robot, orientation, cable model and loads of a workspace."""
 
-    Attributes:
-        robot: The robot, as the settings have changed it.
-        quaternion: Orientation of the platform, shape (4,).
-        model: Cable model.
-        wrenches: Loads to be borne.
-    """
-
-    robot: Robot
-    quaternion: Array
+    robot: Robot  # the robot, as the settings have changed it
+    quaternion: Array  # orientation of the platform, shape (4,)
     model: CableModel
-    wrenches: WrenchSet
+    wrenches: WrenchSet  # loads to be borne
 
     @property
     def orientations(self) -> Orientations:
@@ -105,27 +91,16 @@ class WorkspaceQuery(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hull:
-    """Boundary of a region.
+    """Boundary of a region."""
 
-    Attributes:
-        vertices: Corners [m], shape (V, 3).
-        faces: Shape (F, 3).
-        margin: At the vertices [N], shape (V,).
-        owner: The cable that limits at each face, -1 where none does, shape (F,).
-        on_box: Which faces are those of the robot's box, shape (F,).
-        text: HTML that describes it.
-        by_cable: The faces by their owners.
-        longest: The longest edge of a face [m]; 0 without any.
-    """
-
-    vertices: Array
-    faces: Indices
-    margin: Array
-    owner: Indices
-    on_box: Flags
-    text: str
-    by_cable: list[Patch]
-    longest: float
+    vertices: Array  # corners [m], shape (V, 3)
+    faces: Indices  # shape (F, 3)
+    margin: Array  # at the vertices [N], shape (V,)
+    owner: Indices  # the cable that limits at each face, -1 where none does, shape (F,)
+    on_box: Flags  # which faces are those of the robot's box, shape (F,)
+    text: str  # HTML that describes it
+    by_cable: list[Patch]  # the faces by their owners
+    longest: float  # the longest edge of a face [m]; 0 without any
 
     @classmethod
     def of(cls, vertices: Array, faces: Indices, margin: Array, cable: Indices, on_box: Flags, text: str) -> Hull:

@@ -32,15 +32,10 @@ _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
 
 class AtLimit(NamedTuple):
-    """A cable at a limit.
+    """A cable at a limit."""
 
-    Attributes:
-        cable: Its number.
-        lower: Whether it is the lower one; else the upper.
-    """
-
-    cable: int
-    lower: bool
+    cable: int  # its number
+    lower: bool  # whether it is the lower one; else the upper
 
     @property
     def name(self) -> str:
@@ -50,17 +45,11 @@ class AtLimit(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Missing:
-    """Smallest wrench with which a pose is feasible, a force alone where one suffices.
+    """Smallest wrench with which a pose is feasible, a force alone where one suffices."""
 
-    Attributes:
-        wrench: About the center of mass, world axes [N, N m], shape (6,).
-        state: The equilibrium with it, the blocking cables at their limits.
-        limits: The cables at limits.
-    """
-
-    wrench: Array
-    state: Equilibrium
-    limits: tuple[AtLimit, ...]
+    wrench: Array  # about the center of mass, world axes [N, N m], shape (6,)
+    state: Equilibrium  # the equilibrium with it, the blocking cables at their limits
+    limits: tuple[AtLimit, ...]  # the cables at limits
 
     @property
     def force(self) -> Array:
@@ -130,17 +119,11 @@ INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # of the region's size: the border its
 
 
 class NearestFeasible(NamedTuple):
-    """The nearest feasible pose.
-
-    Attributes:
-        pose: The pose.
-        distance: Distance to it [m].
-        turned: Whether the orientation differs too.
-    """
+    """The nearest feasible pose."""
 
     pose: Pose
-    distance: float
-    turned: bool
+    distance: float  # distance to it [m]
+    turned: bool  # whether the orientation differs too
 
 
 def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestFeasible | None:

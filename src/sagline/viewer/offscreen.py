@@ -51,20 +51,13 @@ _FIRST: Final = 32  # px, of a picture that is thrown away
 
 
 class Shot(NamedTuple):
-    """A picture that a client's page is asked for.
+    """A picture that a client's page is asked for."""
 
-    Attributes:
-        height: Its rows.
-        width: Its columns.
-        field: Upright field of view [rad].
-        pixel: Size of its pixels where the robot is [m].
-        forward: How far before the client's camera it is taken, for a robot so large that its end is too far away [m].
-    """
-
-    height: int
-    width: int
-    field: float
-    pixel: float
+    height: int  # its rows
+    width: int  # its columns
+    field: float  # upright field of view [rad]
+    pixel: float  # size of its pixels where the robot is [m]
+    # how far before the client's camera it is taken, for a robot so large that its end is too far away [m]
     forward: float
 
     @classmethod
@@ -172,15 +165,10 @@ TOPIC: Final = "picture"
 
 
 class Paper(NamedTuple):
-    """A size of print.
+    """A size of print."""
 
-    Attributes:
-        width: Of the picture [in].
-        dots: An inch.
-    """
-
-    width: float
-    dots: int
+    width: float  # of the picture [in]
+    dots: int  # an inch
 
     @property
     def pixels(self) -> int:

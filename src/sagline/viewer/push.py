@@ -26,15 +26,10 @@ AT_LIMIT: Final = 1e-9  # of the largest tension: a tension this little beyond i
 
 
 class Push(NamedTuple):
-    """A force on the platform.
+    """A force on the platform."""
 
-    Attributes:
-        force: World axes [N], shape (3,).
-        at: Point at which it acts, platform frame [m], shape (3,).
-    """
-
-    force: Array
-    at: Array
+    force: Array  # world axes [N], shape (3,)
+    at: Array  # point at which it acts, platform frame [m], shape (3,)
 
     def wrench(self, state: Equilibrium, factor: Array | float = 1.0) -> Array:
         """Wrench on the platform at an equilibrium, the force scaled by a factor, shape (..., 6)."""
@@ -44,38 +39,24 @@ class Push(NamedTuple):
 
 
 class Reserve(NamedTuple):
-    """Largest force in a direction.
+    """Largest force in a direction."""
 
-    Attributes:
-        force: Its magnitude [N]; infinite where no limit was found.
-        cable: The cable that reaches its limit first; None where not known.
-        upper: Whether that is its upper limit.
-    """
-
-    force: float
-    cable: int | None = None
-    upper: bool = False
+    force: float  # its magnitude [N]; infinite where no limit was found
+    cable: int | None = None  # the cable that reaches its limit first; None where not known
+    upper: bool = False  # whether that is its upper limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PushResponse:
-    """Response of a platform to a force, the unstrained lengths kept.
+    """Response of a platform to a force, the unstrained lengths kept."""
 
-    Attributes:
-        push: The force.
-        state: The equilibrium without it.
-        loaded: The equilibrium with it; None where none was found.
-        reserve: Largest force before a tension is at its limit, the lengths kept.
-        redistributed: Largest force before no tensions within the limits hold this pose; None where not known yet.
-        compliance: Of the point at which it acts, world axes [m/N], shape (3, 3); NaN where not known.
-    """
-
-    push: Push
-    state: Equilibrium
-    loaded: Equilibrium | None
-    reserve: Reserve
+    push: Push  # the force
+    state: Equilibrium  # the equilibrium without it
+    loaded: Equilibrium | None  # the equilibrium with it; None where none was found
+    reserve: Reserve  # largest force before a tension is at its limit, the lengths kept
+    # largest force before no tensions within the limits hold this pose; None where not known yet
     redistributed: Reserve | None
-    compliance: Array
+    compliance: Array  # of the point at which it acts, world axes [m/N], shape (3, 3); NaN where not known
 
     @property
     def force(self) -> float:

@@ -40,15 +40,10 @@ _ICON = (  # a platform on two cables that sag
 
 @dataclass(frozen=True, slots=True)
 class ClientFile:
-    """A file or folder of viser's client, as much of a path as its web server asks for.
+    """A file or folder of viser's client, as much of a path as its web server asks for."""
 
-    Attributes:
-        path: Where it is.
-        title: Title of the page.
-    """
-
-    path: Path
-    title: str
+    path: Path  # where it is
+    title: str  # title of the page
 
     def __truediv__(self, name: str) -> ClientFile:
         """A file in this folder."""

@@ -26,13 +26,9 @@ _COLORS: Final = np.array(
 
 @dataclass(frozen=True, slots=True)
 class MarginScale:
-    """Bands of margins.
+    """Bands of margins."""
 
-    Attributes:
-        step: Width of a band [N], > 0.
-    """
-
-    step: float
+    step: float  # width of a band [N], > 0
 
     @classmethod
     def up_to(cls, largest: float) -> MarginScale:
@@ -78,31 +74,19 @@ INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # of 255: the robot behind it is seen
 
 
 class Mark(NamedTuple):
-    """Label of a line.
-
-    Attributes:
-        text: Text.
-        place: Place [m], shape (3,).
-    """
+    """Label of a line."""
 
     text: str
-    place: Array
+    place: Array  # place [m], shape (3,)
 
 
 class Picture(NamedTuple):
-    """Drawing of a slice.
+    """Drawing of a slice."""
 
-    Attributes:
-        image: Red, green, blue and opacity, the first row the lowest, shape (h, w, 4).
-        boundary: Segments of the line where the margin is 0, in the world [m], shape (b, 2, 3).
-        lines: Segments between the other bands, shape (s, 2, 3).
-        marks: What stands on the lines.
-    """
-
-    image: NDArray[np.uint8]
-    boundary: Array
-    lines: Array
-    marks: list[Mark]
+    image: NDArray[np.uint8]  # red, green, blue and opacity, the first row the lowest, shape (h, w, 4)
+    boundary: Array  # segments of the line where the margin is 0, in the world [m], shape (b, 2, 3)
+    lines: Array  # segments between the other bands, shape (s, 2, 3)
+    marks: list[Mark]  # what stands on the lines
 
 
 def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:

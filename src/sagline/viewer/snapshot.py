@@ -64,25 +64,15 @@ METHODS: Final = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The robot's changes, how it is solved, and how it is drawn.
+    """The robot's changes, how it is solved, and how it is drawn."""
 
-    Attributes:
-        mass: Mass of the platform with its load [kg], > 0; the inertia grows with it.
-        density: Factor on the cables' linear density, > 0.
-        stiffness: Factor on the cables' axial stiffness, > 0.
-        model: Cable model that the lengths are planned with.
-        tension: How the load is shared.
-        sag_scale: How many times its sag a cable is drawn with, >= 0.
-        error_scale: How many times its position error the platform as it really hangs is drawn with, >= 0.
-    """
-
-    mass: float
-    density: float = 1.0
-    stiffness: float = 1.0
-    model: CableModel = field(default_factory=Catenary)
-    tension: TensionMethod = field(default_factory=MinimumNorm)
-    sag_scale: float = 1.0
-    error_scale: float = 1.0
+    mass: float  # mass of the platform with its load [kg], > 0; the inertia grows with it
+    density: float = 1.0  # factor on the cables' linear density, > 0
+    stiffness: float = 1.0  # factor on the cables' axial stiffness, > 0
+    model: CableModel = field(default_factory=Catenary)  # cable model that the lengths are planned with
+    tension: TensionMethod = field(default_factory=MinimumNorm)  # how the load is shared
+    sag_scale: float = 1.0  # how many times its sag a cable is drawn with, >= 0
+    error_scale: float = 1.0  # how many times its position error the platform as it really hangs is drawn with, >= 0
 
     def __post_init__(self) -> None:
         """Check what no robot checks."""
@@ -108,23 +98,16 @@ class Settings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A robot held at one pose.
+    """A robot held at one pose."""
 
-    Attributes:
-        robot: The robot, as the settings have changed it.
-        pose: Where the platform is wanted.
-        plan: The plan for this pose; None where a cable has no chord.
-        rest: Where the platform would really rest on exact cables of the planned lengths; None where the plan has no
-            answer or the model is exact.
-        refusal: Which cable over a pulley has no chord, and why; "" where all have.
-        previous: Tensions from which a method that depends on history continued [N], shape (m,); None for none.
-    """
-
-    robot: Robot
-    pose: Pose
-    plan: Plan | None
+    robot: Robot  # the robot, as the settings have changed it
+    pose: Pose  # where the platform is wanted
+    plan: Plan | None  # the plan for this pose; None where a cable has no chord
+    # where the platform would really rest on exact cables of the planned lengths; None where the plan has no answer or
+    # the model is exact
     rest: Pose | None
-    refusal: str = ""
+    refusal: str = ""  # which cable over a pulley has no chord, and why; "" where all have
+    # tensions from which a method that depends on history continued [N], shape (m,); None for none
     previous: Array | None = None
 
     @property

@@ -31,15 +31,10 @@ _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
 
 
 class Solid(NamedTuple):
-    """A closed surface.
+    """A closed surface."""
 
-    Attributes:
-        vertices: Corners [m], shape (v, 3).
-        faces: Triangles, as indices of corners, counter-clockwise from outside, shape (f, 3).
-    """
-
-    vertices: Array
-    faces: Faces
+    vertices: Array  # corners [m], shape (v, 3)
+    faces: Faces  # triangles, as indices of corners, counter-clockwise from outside, shape (f, 3)
 
 
 def size_of(robot: Robot) -> float:
@@ -193,19 +188,12 @@ THINNEST: Final = 0.03  # of its longest axis: a flat one is still seen
 
 
 class Ellipsoids(NamedTuple):
-    """Some ellipsoids.
+    """Some ellipsoids."""
 
-    Attributes:
-        middle: Where they are [m], shape (k, 3).
-        turn: Their axes, as quaternions, scalar first, shape (k, 4).
-        radius: One standard error along each of their axes [m], shape (k, 3).
-        which: Whose they are, shape (k,).
-    """
-
-    middle: Array
-    turn: Array
-    radius: Array
-    which: Indices
+    middle: Array  # where they are [m], shape (k, 3)
+    turn: Array  # their axes, as quaternions, scalar first, shape (k, 4)
+    radius: Array  # one standard error along each of their axes [m], shape (k, 3)
+    which: Indices  # whose they are, shape (k,)
 
     @classmethod
     def of(cls, points: Array, covariance: Array) -> Ellipsoids:

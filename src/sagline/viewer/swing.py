@@ -60,23 +60,14 @@ PERIOD = 2.0  # s of one swing as it is drawn
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Swing:
-    """Motion of a mode as it is drawn.
-
-    Attributes:
-        mode: The mode.
-        state: The equilibrium.
-        factor: Factor of the drawn amplitude over that of an energy of one joule.
-        motion: Of the platform as drawn: displacement of the center of mass [m], rotation vector [rad], shape (6,).
-        rest: Points of the cables at rest [m], shape (m, P, 3).
-        moved: Their displacement as drawn, shape (m, P, 3).
-    """
+    """Motion of a mode as it is drawn."""
 
     mode: ListedMode
-    state: Equilibrium
-    factor: float
-    motion: Array
-    rest: Array
-    moved: Array
+    state: Equilibrium  # the equilibrium
+    factor: float  # factor of the drawn amplitude over that of an energy of one joule
+    motion: Array  # of the platform as drawn: displacement of the center of mass [m], rotation vector [rad], shape (6,)
+    rest: Array  # points of the cables at rest [m], shape (m, P, 3)
+    moved: Array  # their displacement as drawn, shape (m, P, 3)
 
     @classmethod
     def of(cls, vibration: Vibration, mode: ListedMode) -> Swing:

@@ -42,15 +42,10 @@ _PER_WEIGHT = 4.0  # highest tension over the platform's weight where the robot 
 
 @dataclass(frozen=True, slots=True)
 class TensionScale:
-    """Tensions on a logarithmic scale: a robot's limits are often two decades apart.
+    """Tensions on a logarithmic scale: a robot's limits are often two decades apart."""
 
-    Attributes:
-        low: Tension at the blue end [N], > 0.
-        high: Tension at the yellow end [N], > low.
-    """
-
-    low: float
-    high: float
+    low: float  # tension at the blue end [N], > 0
+    high: float  # tension at the yellow end [N], > low
 
     @classmethod
     def of(cls, robot: Robot) -> TensionScale:
@@ -91,17 +86,11 @@ KILO_FROM = 1e5  # N: forces from here on are written in kilonewtons
 
 
 class ForceUnit(NamedTuple):
-    """Unit in which the forces of a robot are written.
+    """Unit in which the forces of a robot are written."""
 
-    Attributes:
-        name: "N" or "kN".
-        newtons: One of the unit [N].
-        form: Format specification, with the decimals.
-    """
-
-    name: str
-    newtons: float
-    form: str
+    name: str  # "N" or "kN"
+    newtons: float  # one of the unit [N]
+    form: str  # format specification, with the decimals
 
     @property
     def decimals(self) -> int:

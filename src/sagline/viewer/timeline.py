@@ -23,66 +23,40 @@ _ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 
 
 class Limit(NamedTuple):
-    """A limit of a chart.
+    """A limit of a chart."""
 
-    Attributes:
-        value: Value, in the unit of the chart.
-        name: Name.
-        upper: Whether values are to stay below it.
-    """
-
-    value: float
+    value: float  # value, in the unit of the chart
     name: str
-    upper: bool
+    upper: bool  # whether values are to stay below it
 
 
 class Span(NamedTuple):
-    """A time of an infeasible pose, a violated limit or a fault.
+    """A time of an infeasible pose, a violated limit or a fault."""
 
-    Attributes:
-        start: Start [s].
-        end: End [s].
-        why: Reason.
-    """
-
-    start: float
-    end: float
-    why: str
+    start: float  # start [s]
+    end: float  # end [s]
+    why: str  # reason
 
 
 class Mark(NamedTuple):
-    """An event.
+    """An event."""
 
-    Attributes:
-        time: Time [s].
-        text: Description.
-        bad: Whether it is a fault or a failure.
-    """
-
-    time: float
-    text: str
-    bad: bool
+    time: float  # time [s]
+    text: str  # description
+    bad: bool  # whether it is a fault or a failure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chart:
-    """A quantity of each cable, or along each axis, over time.
-
-    Attributes:
-        title: Title.
-        unit: Unit.
-        decimals: Number of decimals.
-        names: Names of the lines: numbers of cables, or axes.
-        values: Function that returns the values of some samples, shape (n, k); NaN where there is none.
-        limits: Limits of the values.
-    """
+    """A quantity of each cable, or along each axis, over time."""
 
     title: str
     unit: str
-    decimals: int
-    names: tuple[str, ...]
+    decimals: int  # number of decimals
+    names: tuple[str, ...]  # names of the lines: numbers of cables, or axes
+    # function that returns the values of some samples, shape (n, k); NaN where there is none
     values: Callable[[slice], Array]
-    limits: tuple[Limit, ...] = ()
+    limits: tuple[Limit, ...] = ()  # limits of the values
 
     @property
     def of_cables(self) -> bool:
@@ -92,20 +66,13 @@ class Chart:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Charts, spans and marks of something that is played.
+    """Charts, spans and marks of something that is played."""
 
-    Attributes:
-        time: Times of the samples [s], from 0 on, shape (N,).
-        charts: Charts, tensions first.
-        spans: Spans, in order.
-        marks: Marks, in order.
-        paths: Names and colors of the paths that are drawn in the scene.
-    """
-
-    time: Array
-    charts: tuple[Chart, ...]
-    spans: tuple[Span, ...] = ()
-    marks: tuple[Mark, ...] = ()
+    time: Array  # times of the samples [s], from 0 on, shape (N,)
+    charts: tuple[Chart, ...]  # charts, tensions first
+    spans: tuple[Span, ...] = ()  # spans, in order
+    marks: tuple[Mark, ...] = ()  # marks, in order
+    # names and colors of the paths that are drawn in the scene
     paths: tuple[tuple[str, tuple[int, int, int]], ...] = ()
 
     def within(self, start: float, end: float) -> slice:
@@ -204,17 +171,11 @@ _BORDER: Final = 0.05  # of the spread, above and below
 
 
 class Columns(NamedTuple):
-    """Samples, or groups of them.
+    """Samples, or groups of them."""
 
-    Attributes:
-        time: When each begins [s], shape (C,).
-        low: Least value of each line in it, shape (C, k); NaN where there is none.
-        high: Largest value.
-    """
-
-    time: Array
-    low: Array
-    high: Array
+    time: Array  # when each begins [s], shape (C,)
+    low: Array  # least value of each line in it, shape (C, k); NaN where there is none
+    high: Array  # largest value
 
 
 def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:

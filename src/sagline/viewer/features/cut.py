@@ -32,19 +32,12 @@ NEAR: Final = 14.0  # px: largest distance of a click, or of a finger, from a ca
 
 
 class Peak(NamedTuple):
-    """The highest tension after a cut.
+    """The highest tension after a cut."""
 
-    Attributes:
-        cable: Number of the cable.
-        tension: At the frame end [N].
-        time: To a sample [s] after the cut.
-        limit: Its highest allowed tension [N]; infinite where there is none.
-    """
-
-    cable: int
-    tension: float
-    time: float
-    limit: float
+    cable: int  # number of the cable
+    tension: float  # at the frame end [N]
+    time: float  # to a sample [s] after the cut
+    limit: float  # its highest allowed tension [N]; infinite where there is none
 
 
 def peak_of(simulation: Simulation, cut: int) -> Peak:
@@ -76,15 +69,10 @@ def outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
 
 
 class Before(NamedTuple):
-    """The page before a cut.
+    """The page before a cut."""
 
-    Attributes:
-        pose: Pose of the platform.
-        kept: What was played.
-    """
-
-    pose: Pose
-    kept: PlayerState
+    pose: Pose  # pose of the platform
+    kept: PlayerState  # what was played
 
 
 class CutFeature(Feature):

@@ -20,17 +20,11 @@ from sagline.viewer.tension_scale import force_unit, number
 
 
 class ScreenReaderText(NamedTuple):
-    """Parts of a text for screen readers.
+    """Parts of a text for screen readers."""
 
-    Attributes:
-        head: The verdict in a word or two: when it changes, it is said soon.
-        text: All of it.
-        place: Where the platform is.
-    """
-
-    head: str
-    text: str
-    place: str
+    head: str  # the verdict in a word or two: when it changes, it is said soon
+    text: str  # all of it
+    place: str  # where the platform is
 
 
 def screen_reader_text(view: View) -> ScreenReaderText:

@@ -26,21 +26,13 @@ MISSING_COLOR: Color = (220, 56, 48)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlatformForce:
-    """A force on the platform.
+    """A force on the platform."""
 
-    Attributes:
-        name: Number of its cable, or "weight", "load" or "missing".
-        color: Color of its cable, or its own.
-        force: World axes [N], shape (3,).
-        moment: About the center of mass, world axes [N m], shape (3,).
-        at: Point at which it acts [m], shape (3,).
-    """
-
-    name: str
-    color: Color
-    force: Array
-    moment: Array
-    at: Array
+    name: str  # number of its cable, or "weight", "load" or "missing"
+    color: Color  # color of its cable, or its own
+    force: Array  # world axes [N], shape (3,)
+    moment: Array  # about the center of mass, world axes [N m], shape (3,)
+    at: Array  # point at which it acts [m], shape (3,)
 
 
 def cable_forces(state: Equilibrium) -> Array:
@@ -96,31 +88,19 @@ SHOWN: Final = 2  # of them, those in which most is seen
 
 
 class Projection(NamedTuple):
-    """Projection of the polygon onto two axes.
+    """Projection of the polygon onto two axes."""
 
-    Attributes:
-        names: Names of the axes to the right and up.
-        points: Corners [N], shape (k + 1, 2): where each force begins and ends.
-    """
-
-    names: str
-    points: Array
+    names: str  # names of the axes to the right and up
+    points: Array  # corners [N], shape (k + 1, 2): where each force begins and ends
 
 
 class Box(NamedTuple):
-    """Box of a label.
+    """Box of a label."""
 
-    Attributes:
-        x: Its middle [px].
-        y: Its middle, down [px].
-        across: Half its width [px].
-        up: Half its height [px].
-    """
-
-    x: float
-    y: float
-    across: float
-    up: float
+    x: float  # its middle [px]
+    y: float  # its middle, down [px]
+    across: float  # half its width [px]
+    up: float  # half its height [px]
 
     def overlap(self, other: Box) -> float:
         """Area of the intersection [px^2]."""

@@ -87,15 +87,10 @@ def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
 
 
 class Hold(NamedTuple):
-    """A point of the platform that a client holds.
+    """A point of the platform that a client holds."""
 
-    Attributes:
-        client: Number of the client.
-        at: The point, platform frame [m], shape (3,).
-    """
-
-    client: int
-    at: Array
+    client: int  # number of the client
+    at: Array  # the point, platform frame [m], shape (3,)
 
 
 class PushFeature(Feature):

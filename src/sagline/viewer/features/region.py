@@ -54,17 +54,11 @@ class _SupersededError(SaglineError):
 
 
 class _Result(NamedTuple):
-    """A hull that was computed.
+    """A hull that was computed."""
 
-    Attributes:
-        key: Identifies the workspace.
-        rough: Whether it is the coarse one, which comes first.
-        hull: The hull; None where it cannot be computed.
-    """
-
-    key: Hashable
-    rough: bool
-    hull: Hull | None
+    key: Hashable  # identifies the workspace
+    rough: bool  # whether it is the coarse one, which comes first
+    hull: Hull | None  # the hull; None where it cannot be computed
 
 
 def planes_of(robot: Robot) -> tuple[int, ...]:

@@ -31,19 +31,12 @@ NEAR: Final = 10.0  # px: marks that are closer share one
 
 
 class Mark(NamedTuple):
-    """A tension distribution method with its result.
+    """A tension distribution method with its result."""
 
-    Attributes:
-        name: As it is chosen.
-        letter: That marks it.
-        tension: Its chord tensions [N], shape (m,); NaN where it has none.
-        missing: Why it has none; "" where it has.
-    """
-
-    name: str
-    letter: str
-    tension: Array
-    missing: str = ""
+    name: str  # as it is chosen
+    letter: str  # that marks it
+    tension: Array  # its chord tensions [N], shape (m,); NaN where it has none
+    missing: str = ""  # why it has none; "" where it has
 
 
 class Marks:
