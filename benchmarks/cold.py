@@ -21,14 +21,14 @@ import sys, threading, time
 import sagline as sl
 from sagline.cli.hosting import Readings
 import numpy as np
-from sagline.viewer.hull import WorkspaceQuery, region_hull
-from sagline.viewer.server import started, stop
+from sagline.viewer.workspace import WorkspaceQuery, region_hull
+from sagline.viewer.server import start_server, stop_server
 from sagline.viewer.feature import Reading
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
 
 begun = float(sys.argv[1])
-server = started(port=0)
+server = start_server(port=0)
 readings = Readings()
 viewer = Page(server, FEATURES, sl.load_robot("cogiro"), None, readings.ready)
 
@@ -52,7 +52,7 @@ def watch():
 threading.Thread(target=watch, daemon=True).start()
 with readings.compiled_for(viewer):
     viewer.serve()
-stop(server)
+stop_server(server)
 """
 
 

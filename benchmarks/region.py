@@ -16,9 +16,9 @@ import numpy as np
 import sagline as sl
 from benchmarks.measure import Row, print_table
 from sagline.viewer.features import FEATURES
-from sagline.viewer.hull import WorkspaceQuery, region_hull, region_in
 from sagline.viewer.page import Page
-from sagline.viewer.server import started, stop
+from sagline.viewer.server import start_server, stop_server
+from sagline.viewer.workspace import WorkspaceQuery, region_hull, region_in
 from tests.viewer.client import Client, await_that
 
 ROBOTS = ("cogiro", "falcon-7", "fast", "article-suspended", "ipanema-2-pulleys")
@@ -44,7 +44,7 @@ class Shown(NamedTuple):
 @contextmanager
 def shown(robot: sl.Robot) -> Iterator[Shown]:
     """A page of a robot, its region drawn."""
-    server = started(port=0)
+    server = start_server(port=0)
     viewer = Page(server, FEATURES, robot)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
@@ -56,7 +56,7 @@ def shown(robot: sl.Robot) -> Iterator[Shown]:
         yield Shown(viewer, client, _name(fields["Platform + load [kg]"]))
     viewer.stop()
     thread.join()
-    stop(server)
+    stop_server(server)
 
 
 def _name(field: Any) -> str:

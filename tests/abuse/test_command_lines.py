@@ -82,7 +82,7 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.control._link", linked)
     from sagline.viewer import server
 
-    monkeypatch.setattr(server, "started", started)
+    monkeypatch.setattr(server, "start_server", started)
 
 
 def snapshot(folder: Path) -> dict[str, str]:

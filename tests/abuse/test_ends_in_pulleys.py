@@ -9,7 +9,7 @@ import sagline as sl
 from sagline import article_balance
 from sagline.core.errors import MOST
 from sagline.viewer import readout
-from sagline.viewer.drawn import cable_segments, chord_segments
+from sagline.viewer.robot_scene import cable_segments, chord_segments
 from sagline.viewer.snapshot import Settings, taken_at
 from tests.refusal import refused
 from tests.tiers import extended, wide

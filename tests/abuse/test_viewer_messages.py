@@ -13,7 +13,7 @@ import sagline as sl
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
 from sagline.viewer.playback import Run
-from sagline.viewer.server import started, stop
+from sagline.viewer.server import start_server, stop_server
 from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client
 
@@ -66,7 +66,7 @@ def press(count: int, seed: int) -> None:
     generator = np.random.default_rng(seed)
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
     run = Run.of(sl.inverse(ROBOT, sl.quintic_path(ends, durations=[1.0], rate=20)))
-    server = started(port=0)
+    server = start_server(port=0)
     viewer = Page(server, FEATURES, ROBOT, run)
     thread = threading.Thread(target=viewer.serve)
     thread.start()
@@ -94,7 +94,7 @@ def press(count: int, seed: int) -> None:
     finally:
         viewer.stop()
         thread.join(timeout=PATIENCE)
-        stop(server)
+        stop_server(server)
 
 
 def shows(viewer: Page, place: np.ndarray, tension: np.ndarray) -> bool:

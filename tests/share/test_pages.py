@@ -14,8 +14,8 @@ from sagline.core.arrays import Array
 from sagline.robot.reach import home_pose
 from sagline.share.course import of_plan
 from sagline.share.page import LENGTH, POSITION, TENSION, TIME, TURN, course_page, robot_page
-from sagline.viewer import lines
-from sagline.viewer.solids import platform
+from sagline.viewer import shapes
+from sagline.viewer.shapes import platform
 from tests.chromium import NEEDED, launched
 from tests.share.opening import FLAGS, asking, opened
 from tests.tiers import extended
@@ -94,7 +94,7 @@ def test_a_run_plays(
         drawn = np.array(asking(page, DRAWN))
         robot = plan.state.one_robot
         state = plan.state[k]
-        expected = lines.catenaries(lines.chords(robot, state.pose), state.cables, 1.0)
+        expected = shapes.catenaries(shapes.chords(robot, state.pose), state.cables, 1.0)
         sag = float(np.max(state.cables.sag))
         np.testing.assert_allclose(drawn, expected, rtol=0.0, atol=2.0 * POSITION + TENSION * sag)
         before = pixels(page)

@@ -13,10 +13,9 @@ import viser
 
 import sagline as sl
 from sagline.viewer.camera import Framing
-from sagline.viewer.channel import NAME
 from sagline.viewer.page import Page
 from sagline.viewer.playback import Run
-from sagline.viewer.server import Server, started, stop
+from sagline.viewer.server import NAME, Server, start_server, stop_server
 from tests.viewer.client import PATIENCE, Client, await_that
 
 ROBOT = sl.load_robot("article-suspended")
@@ -92,7 +91,7 @@ def pieces_of(server: Server) -> list[viser.GuiHtmlHandle]:
 
 def shown(made: Callable[[Server], Page]) -> Iterator[Shown]:
     """A page of a viewer made for a server, while it is served."""
-    server = started(port=0)
+    server = start_server(port=0)
     pieces = pieces_of(server)
     viewer = made(server)
     thread = threading.Thread(target=viewer.serve)
@@ -103,7 +102,7 @@ def shown(made: Callable[[Server], Page]) -> Iterator[Shown]:
     finally:
         viewer.stop()
         thread.join(timeout=PATIENCE)
-        stop(server)
+        stop_server(server)
     assert not thread.is_alive()
 
 

@@ -21,7 +21,7 @@ from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.page import Page as ViewerPage
 from sagline.viewer.playback import Run
 from sagline.viewer.robot_scene import PLATFORM
-from sagline.viewer.server import started, stop
+from sagline.viewer.server import start_server, stop_server
 from tests.calibration.made_up import made_up
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
@@ -75,7 +75,7 @@ def opened(
 
     All that it tells of its camera is kept, if it is to be.
     """
-    server = started(port=0, title=robot.name)
+    server = start_server(port=0, title=robot.name)
     if cameras is not None:
         server._websock_server.register_handler(ViewerCameraMessage, lambda _, message: cameras.append(message))
     viewer = ViewerPage(server, FEATURES, robot, run, found=found)
@@ -104,7 +104,7 @@ def opened(
         page.close()
         viewer.stop()
         thread.join(timeout=PATIENCE)
-        stop(server)
+        stop_server(server)
     assert complains or complaints == []
 
 
@@ -226,7 +226,7 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         page.get_by_text("Reset View").wait_for()
         least_contrast(page)
         page.locator(".tabler-icon-arrow-back").first.click()
-        stop(viewer.server)
+        stop_server(viewer.server)
         page.get_by_text("Disconnected: is sagline view still running?").wait_for()
         least_contrast(page)
 

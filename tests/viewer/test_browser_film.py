@@ -15,7 +15,7 @@ import sagline as sl
 from sagline.viewer.features import export
 from sagline.viewer.page import home_pose
 from sagline.viewer.playback import Run
-from sagline.viewer.solids import size_of
+from sagline.viewer.shapes import size_of
 from sagline.viewer.tension_scale import TensionScale
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended

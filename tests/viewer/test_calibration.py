@@ -18,7 +18,7 @@ from sagline.viewer.features import calibration as feature
 from sagline.viewer.features.calibration import FIELD
 from sagline.viewer.page import Page
 from sagline.viewer.panel import written_mass
-from sagline.viewer.solids import Ellipsoids, ball, readable
+from sagline.viewer.shapes import Ellipsoids, ball, readable
 from tests.calibration.made_up import made_up, parameters
 from tests.tiers import extended
 from tests.viewer.client import Client, await_that

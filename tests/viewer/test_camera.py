@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer import solids
+from sagline.viewer import shapes
 from sagline.viewer.camera import Camera, nearest_line, ray_distance
 
 CAMERA = SimpleNamespace(  # ten meters before the origin, looking along y
@@ -56,7 +56,7 @@ def test_nonsense_is_no_camera(wrong: dict[str, object]) -> None:
 
 @pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
 def test_a_ray_meets_the_platform_where_each_triangle_by_itself_is(name: str) -> None:
-    body = solids.platform(sl.load_robot(name))
+    body = shapes.platform(sl.load_robot(name))
     size = float(np.abs(body.vertices).max())
     random = np.random.default_rng(4)
     hits = 0

@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from sagline.viewer.channel import LONGEST, NAME, Channel, chosen_by
-from sagline.viewer.server import Server, started, stop
+from sagline.viewer.server import LONGEST, NAME, Channel, Server, chosen_by, start_server, stop_server
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import handle
 
@@ -20,9 +19,9 @@ NONSENSE = ("", "{", "[]", "3", '{"topic": "test"}', '{"topic": [], "value": 1}'
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    one = started(port=0)
+    one = start_server(port=0)
     yield one
-    stop(one)
+    stop_server(one)
 
 
 @pytest.fixture(scope="module")

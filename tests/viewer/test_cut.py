@@ -10,15 +10,13 @@ import pytest
 from viser import CameraHandle
 
 import sagline as sl
-from sagline.viewer import swing
 from sagline.viewer.camera import Camera
-from sagline.viewer.drawn import InMotion
 from sagline.viewer.features import FEATURES, cut
 from sagline.viewer.features.cut import Before, CutFeature
 from sagline.viewer.page import Page, home_pose
 from sagline.viewer.playback import Playback
-from sagline.viewer.player import Played, Player
-from sagline.viewer.server import started, stop
+from sagline.viewer.player import InMotion, Played, Player
+from sagline.viewer.server import start_server, stop_server
 from tests.effort import least_seconds
 from tests.plot import made
 from tests.tiers import extended, wide
@@ -89,9 +87,7 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         whole = played()
         assert isinstance(whole, Playback)
         state = sl.inverse(ROBOT, POSE, tension=sl.MinimumNorm()).state
-        by_itself = sl.simulate(
-            state, duration=swing.DURATION, events=sl.Break(cable=2, time=0.0), damping=swing.LOSSES
-        )
+        by_itself = sl.simulate(state, duration=cut.DURATION, events=sl.Break(cable=2, time=0.0), damping=cut.LOSSES)
         np.testing.assert_allclose(whole.simulation.tensions, by_itself.tensions, rtol=1e-9)
         peak = cut.peak_of(by_itself, 2)
         others = np.delete(by_itself.largest_tension, 2)  # type: ignore[arg-type]
@@ -111,7 +107,7 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
 
 
 def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         given, first, second = Playback(made.simulation()), made.simulation(50), made.simulation(60)
         viewer = Page(server, FEATURES, given.robot, given)
@@ -125,11 +121,11 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
         cuts._play(1, made.simulation(70), 3, before)
         assert player.played is given
     finally:
-        stop(server)
+        stop_server(server)
 
 
 def test_cut_by_cut_all_is_put_back() -> None:
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         given = Playback(made.simulation())
         viewer = Page(server, FEATURES, given.robot, given)
@@ -145,17 +141,19 @@ def test_cut_by_cut_all_is_put_back() -> None:
         assert player.played is given
         assert not handle(server, "Calm").visible
     finally:
-        stop(server)
+        stop_server(server)
 
 
 @pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "fast"]))
 def test_the_first_part_is_soon_there_and_begins_what_follows(name: str) -> None:
     robot = sl.load_robot(name)
     state = sl.inverse(robot, home_pose(robot), tension=sl.MinimumNorm()).state
-    parts = swing.cut(state, 1, "none")
+    parts = cut.simulate_cut(state, 1, "none")
     first = next(parts)
-    assert least_seconds(lambda: next(swing.cut(state, 1, "none")), 0.15) < 0.15  # of the 0.3 until something moves
-    again, second = next(swing.cut(state, 1, "none")), next(parts)
+    assert (
+        least_seconds(lambda: next(cut.simulate_cut(state, 1, "none")), 0.15) < 0.15
+    )  # of the 0.3 until something moves
+    again, second = next(cut.simulate_cut(state, 1, "none")), next(parts)
     for part in (again, second):
         np.testing.assert_array_equal(part.tensions[: len(first.time)], first.tensions)
     kinetic = second.energy.kinetic

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer import solids
+from sagline.viewer import shapes
 from sagline.viewer.camera import BORDER, FIELD, Framing, fitted
-from sagline.viewer.server import started, stop
+from sagline.viewer.server import start_server, stop_server
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import put
@@ -28,7 +28,7 @@ def seen(points: np.ndarray, camera: np.ndarray, target: np.ndarray, aspect: flo
 @pytest.mark.parametrize("aspect", [0.4, 0.7, 1.0, 1.6, 3.0])
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
 def test_every_robot_fills_the_picture_and_no_more(name: str, aspect: float) -> None:
-    low, high = solids.bounds(sl.load_robot(name))
+    low, high = shapes.bounds(sl.load_robot(name))
     camera, target = fitted(low, high, aspect)
     middle = 0.5 * (low + high)
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
@@ -45,7 +45,7 @@ def at(camera: Any, position: Any) -> bool:
 @extended
 def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> None:
     low, high = np.array([-5.0, -4.0, 0.0]), np.array([5.0, 4.0, 6.0])
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         Framing(server, low, high)
         with Client(server.get_port()) as client:
@@ -70,12 +70,12 @@ def test_the_box_stays_in_the_picture_until_someone_looks_from_elsewhere() -> No
             look(narrow, 401)
             await_that(lambda: at(camera, fitted(low, high, 401 / 600, 1.0)[0]))
     finally:
-        stop(server)
+        stop_server(server)
 
 
 def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() -> None:
     low, high = np.zeros(3), np.ones(3)
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         framing = Framing(server, low, high)
         with Client(server.get_port()) as client:
@@ -96,12 +96,12 @@ def test_a_camera_that_a_link_has_put_is_let_be_whatever_its_page_still_tells() 
             fit = fitted(low, high, 300 / 600, 1.0)[0]
             assert not any(np.allclose(place, fit) for place in aimed)
     finally:
-        stop(server)
+        stop_server(server)
 
 
 @extended
 def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() -> None:
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         framing = Framing(server, np.zeros(3), np.ones(3))
         with Client(server.get_port()) as client, ThreadPoolExecutor(1) as other:
@@ -116,4 +116,4 @@ def test_a_camera_that_is_just_being_put_somewhere_has_not_been_moved_by_hand() 
                 framing._places[number].append(np.array([3.0, 4.0, 5.0]))
             assert asked.result() is None
     finally:
-        stop(server)
+        stop_server(server)

@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from sagline.viewer.free_travel import NAMES, free_travel, travel_text
 from sagline.viewer.tension_scale import ForceUnit
+from sagline.viewer.workspace import NAMES, free_travel, travel_text
 from tests.viewer.analytic import PER_METER, RADIUS, WALL, ball
 
 LOW, HIGH = np.full(3, -2.0), np.full(3, 2.0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer import hull
-from sagline.viewer.hull import WorkspaceQuery, region_hull, region_in
+from sagline.viewer import workspace
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import cable_color
+from sagline.viewer.workspace import WorkspaceQuery, region_hull, region_in
 from tests.effort import least_seconds
 from tests.tiers import extended
 
@@ -43,7 +43,7 @@ def test_a_hull_is_that_of_the_workspace() -> None:
 
 
 def test_a_hull_that_is_empty_says_what_is_nearest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hull, "CELLS", 6)
+    monkeypatch.setattr(workspace, "CELLS", 6)
     asked = WorkspaceQuery(ROBOT, LEVEL, sl.Catenary(), sl.WrenchBox(1e5))
     found = region_hull(asked, False, lambda *_: None)
     assert found.by_cable == []

@@ -12,13 +12,12 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline.core.arrays import locked
-from sagline.viewer.channel import chosen_by
 from sagline.viewer.feature import Reading
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.missing import explanation, missing_label
 from sagline.viewer.missing import NearestFeasible, missing_of, nearest_feasible
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.server import Server
+from sagline.viewer.server import Server, chosen_by
 from sagline.viewer.snapshot import Settings, Snapshot, taken_at
 from sagline.viewer.tension_scale import force_unit
 from tests.effort import best_rate

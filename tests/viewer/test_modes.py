@@ -11,14 +11,13 @@ import pytest
 
 import sagline as sl
 from sagline import InvalidValueError, vibration
-from sagline.viewer import lines, readout, swing
+from sagline.viewer import readout, shapes
 from sagline.viewer.feature import BackgroundTask
 from sagline.viewer.features import FEATURES
-from sagline.viewer.features.modes import ModesFeature
+from sagline.viewer.features.modes import PERIOD, ModesFeature, mode_of
 from sagline.viewer.page import Page, home_pose
 from sagline.viewer.playback import Playback
 from sagline.viewer.snapshot import Settings, taken_at
-from sagline.viewer.swing import PERIOD, mode_of
 from sagline.viewer.tension_scale import TensionScale
 from tests.effort import best_rate
 from tests.plot import made
@@ -80,7 +79,7 @@ def test_a_mode_moves_at_the_rate_of_the_page_and_stops(page: Shown) -> None:
         assert best_rate(rate, 30.0) >= 30.0  # pictures a second
         assert page.viewer.updates == before  # nothing is solved for them
         farthest = np.linalg.norm(show.swing.courses(0.5 * np.pi) - show.swing.rest, axis=-1).max()
-        rest, away, start = lines.segments(show.swing.rest, dashed=False), [0.0], time.monotonic()
+        rest, away, start = shapes.segments(show.swing.rest, dashed=False), [0.0], time.monotonic()
         while time.monotonic() < start + PERIOD or (
             max(away) < 0.9 * farthest and time.monotonic() < start + 20 * PERIOD  # a busy machine leaves pictures out
         ):
@@ -141,7 +140,7 @@ def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatc
         asked.append((state.pose.position.tolist(), cable, cable_mass))
         yield made.simulation()
 
-    monkeypatch.setattr(swing, "cut", cut)
+    monkeypatch.setattr("sagline.viewer.features.cut.simulate_cut", cut)
     with Client(page.port) as client:
         client.drag([1.0, 0.0, 2.0])
         await_that(lambda: page.position[0] == 1.0)
@@ -163,8 +162,8 @@ def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
     played = Playback(made.simulation())
     start, end = played.at(0.0), played.at(9.0)
     state = made.state_at()
-    ends = lines.chords(ROBOT, state.pose)
-    np.testing.assert_allclose(start.courses(1.0), lines.catenaries(ends, state.cables, 1.0), atol=1e-9)
+    ends = shapes.chords(ROBOT, state.pose)
+    np.testing.assert_allclose(start.courses(1.0), shapes.catenaries(ends, state.cables, 1.0), atol=1e-9)
     assert end.index == 199
     assert np.isnan(end.tension[3])
     np.testing.assert_array_equal(end.courses(1.0)[3], np.broadcast_to(ROBOT.frame_anchors[3], (41, 3)))

@@ -8,14 +8,14 @@ from urllib.request import urlopen
 import viser
 from viser import infra
 
-from sagline.viewer.server import ClientFile, dressed, started, stop
+from sagline.viewer.server import ClientFile, page_html, start_server, stop_server
 
 BUILD = Path(viser.__file__).parent / "client" / "build"
 
 
 def test_the_head_is_ours_and_the_client_what_it_is() -> None:
     stock = (BUILD / "index.html").read_text()
-    ours = dressed(stock, "<b>robot</b> & co")
+    ours = page_html(stock, "<b>robot</b> & co")
     assert re.findall("<title>(.*?)</title>", ours) == [escape("<b>robot</b> & co")]
     assert ours.count('rel="icon"') == 1
     assert "Disconnected" in ours
@@ -33,7 +33,7 @@ def test_only_the_first_page_is_dressed(tmp_path: Path) -> None:
 
 def test_the_server_serves_it_and_viser_stays_what_it_was() -> None:
     stock = infra.WebsockServer
-    server = started(port=0, title="cogiro <1>")
+    server = start_server(port=0, title="cogiro <1>")
     try:
         assert infra.WebsockServer is stock
         with urlopen(f"http://127.0.0.1:{server.get_port()}/") as answer:
@@ -41,4 +41,4 @@ def test_the_server_serves_it_and_viser_stays_what_it_was() -> None:
             assert title.startswith(escape("cogiro <1>"))
             assert title.endswith("sagline")
     finally:
-        stop(server)
+        stop_server(server)

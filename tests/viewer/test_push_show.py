@@ -9,21 +9,21 @@ import pytest
 from viser import CameraHandle
 
 import sagline as sl
-from sagline.viewer import solids
+from sagline.viewer import shapes
 from sagline.viewer.camera import Camera
-from sagline.viewer.channel import NAME
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.push import FAR, PushFeature
 from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, push_response
+from sagline.viewer.server import NAME
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import ROBOT, Shown, framed, handle, shown
 
 POSE = sl.Pose([0.5, 0.5, 1.5], np.eye(3))
 WIDE, HIGH, FOV = 800, 600, 1.0
-BODY = solids.platform(ROBOT)
-STIFFNESS = np.sqrt(25.0 * 2000.0) / (FAR * solids.size_of(ROBOT))  # N/m, of the limits of the tensions
+BODY = shapes.platform(ROBOT)
+STIFFNESS = np.sqrt(25.0 * 2000.0) / (FAR * shapes.size_of(ROBOT))  # N/m, of the limits of the tensions
 
 
 @pytest.fixture(scope="module")

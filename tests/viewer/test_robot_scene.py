@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer import solids
+from sagline.viewer import shapes
 from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import RobotScene
-from sagline.viewer.server import Server, started, stop
+from sagline.viewer.server import Server, start_server, stop_server
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
 from tests.tiers import wide
@@ -18,9 +18,9 @@ from tests.tiers import wide
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    one = started(port=0)
+    one = start_server(port=0)
     yield one
-    stop(one)
+    stop_server(one)
 
 
 def node(server: Server, name: str) -> Any:
@@ -31,7 +31,7 @@ def node(server: Server, name: str) -> Any:
 def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: Server, name: str) -> None:
     robot = sl.load_robot(name)
     RobotScene(server.scene, robot, home_pose(robot))
-    size = solids.size_of(robot)
+    size = shapes.size_of(robot)
     gizmo = node(server, "/platform")
     assert 0.05 * size < gizmo.scale < 0.2 * size
     assert gizmo.depth_test  # what is behind the platform does not hide it
@@ -41,11 +41,11 @@ def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: 
 def test_every_robot_has_a_floor_and_a_scale(server: Server, name: str) -> None:
     robot = sl.load_robot(name)
     RobotScene(server.scene, robot, home_pose(robot))
-    low, high = solids.bounds(robot)
+    low, high = shapes.bounds(robot)
     floor = node(server, "/floor")
     assert floor.width > high[0] - low[0]
-    assert floor.position[2] == pytest.approx(low[2], abs=0.01 * solids.size_of(robot))
-    assert floor.fade_distance > 5.0 * solids.size_of(robot)
+    assert floor.position[2] == pytest.approx(low[2], abs=0.01 * shapes.size_of(robot))
+    assert floor.fade_distance > 5.0 * shapes.size_of(robot)
     assert 5.0 < np.hypot(floor.width, floor.height) / floor.cell_size < 60.0
     arms = np.asarray(node(server, "/axes").points)
     lengths = np.linalg.norm(arms[:, 1] - arms[:, 0], axis=1)
@@ -65,7 +65,7 @@ def test_pulleys_turn_and_exit_points_move_with_the_platform(server: Server) -> 
         snapshot = taken_at(robot, sl.Pose(position, np.eye(3)), Settings(mass=robot.mass), None)
         stage.show(snapshot, TensionScale.of(robot), 1.0, 1.0, ghost=True)
         assert np.asarray(wheels.batched_wxyzs) == pytest.approx(
-            solids.pulley_rotations(robot, snapshot.pose), abs=1e-6
+            shapes.pulley_rotations(robot, snapshot.pose), abs=1e-6
         )
         points = np.asarray(node(server, "/cables").points).reshape(8, -1, 2, 3)
         assert points[:, 0, 0] == pytest.approx(robot.frame_anchors, abs=1e-6)
@@ -85,6 +85,6 @@ def test_dead_cable_is_dashed_where_its_way_is_not_known(server: Server) -> None
         points = np.asarray(node(server, name).points)
         assert np.linalg.norm(points[:, 1] - points[:, 0], axis=1).sum() == pytest.approx(runs, rel=1e-5)
     low, high = stage.extent(home_pose(robot))
-    drums = solids.winches(robot).vertices
+    drums = shapes.winches(robot).vertices
     assert np.all(drums > low)
     assert np.all(drums <= high)

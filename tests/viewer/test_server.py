@@ -3,7 +3,7 @@
 import logging
 import warnings
 
-from sagline.viewer.server import LOUD, started, stop
+from sagline.viewer.server import LOUD, start_server, stop_server
 from tests.viewer.client import await_that
 from tests.viewer.test_linking import a_page, asking, view
 
@@ -13,11 +13,11 @@ def test_after_the_last_server_logging_and_warnings_are_as_before() -> None:
         return (*warnings.filters, *(logging.getLogger(name).level for name in LOUD))
 
     before = state()
-    first, second = started(port=0), started(port=0)
+    first, second = start_server(port=0), start_server(port=0)
     assert state() != before
-    stop(first)
+    stop_server(first)
     assert state() != before  # the second is still running
-    stop(second)
+    stop_server(second)
     assert state() == before
 
 

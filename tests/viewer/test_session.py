@@ -11,13 +11,12 @@ import viser
 import sagline as sl
 from sagline.control import Event, EventKind, State
 from sagline.files.mcap_writer import Recorder
-from sagline.viewer.drawn import InMotion, scaled_position
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
-from sagline.viewer.player import Timeline
+from sagline.viewer.player import InMotion, Timeline
 from sagline.viewer.readout import css_color
-from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, TRUTH
-from sagline.viewer.server import started, stop
+from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, TRUTH, scaled_position
+from sagline.viewer.server import start_server, stop_server
 from sagline.viewer.session import LogFollower, Session
 from sagline.viewer.tension_scale import TensionScale
 from tests.files.executions import cycles_of, events_of, execution, plan_of
@@ -99,7 +98,7 @@ def test_a_fault_is_red_with_its_name(log: Path, state: State) -> None:
     session = session_of(log)
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
     wrong = Session(**parts | {"state": np.full(201, state, dtype=np.int8)})
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         viewer = Page(server, FEATURES, ROBOT, wrong)
         viewer._update()
@@ -107,7 +106,7 @@ def test_a_fault_is_red_with_its_name(log: Path, state: State) -> None:
         assert tuple(body.color) == (PLATFORM if state is State.MOVING else INFEASIBLE)
         assert handle(server, "/platform/notice").text == ("" if state is State.MOVING else state.name)
     finally:
-        stop(server)
+        stop_server(server)
 
 
 def handle(server: viser.ViserServer, name: str) -> Any:
@@ -125,7 +124,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         recorder.cycle(cycle)
     while (session := follower.more()) is None or len(session.time) < 100:
         pass
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         viewer = Page(server, FEATURES, ROBOT, session)
         viewer.player.scrub_to(session.duration)
@@ -146,7 +145,7 @@ def test_the_page_shows_three_platforms_and_goes_on_with_the_log(tmp_path: Path,
         assert viewer.view.snapshot.index == 200  # who looked at the end sees the new end
         assert viewer.player.clock.time == pytest.approx(2.0)
     finally:
-        stop(server)
+        stop_server(server)
 
 
 def test_a_timeline_that_grows_keeps_its_place_but_at_its_end() -> None:

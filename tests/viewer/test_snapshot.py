@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.drawn import cable_colors, cable_segments, chord_segments, scaled_position
 from sagline.viewer.readout import legend
+from sagline.viewer.robot_scene import cable_colors, cable_segments, chord_segments, scaled_position
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
 

@@ -7,18 +7,18 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.viewer import solids
+from sagline.viewer import shapes
 from tests.tiers import wide
 
 
-def mesh(solid: solids.Solid) -> Any:
+def mesh(solid: shapes.Solid) -> Any:
     import trimesh  # a quarter of a second
 
     return trimesh.Trimesh(solid.vertices, solid.faces, process=True)
 
 
 def test_platform_is_a_closed_box_of_its_size() -> None:
-    platform = mesh(solids.platform(sl.load_robot("article-mixed")))
+    platform = mesh(shapes.platform(sl.load_robot("article-mixed")))
     assert platform.is_watertight
     assert platform.volume == pytest.approx(0.3 * 0.3 * 0.5)  # positive: the faces look outward
 
@@ -26,45 +26,45 @@ def test_platform_is_a_closed_box_of_its_size() -> None:
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
 def test_every_preset_has_its_parts(name: str) -> None:
     robot = sl.load_robot(name)
-    low, high = solids.bounds(robot)
+    low, high = shapes.bounds(robot)
     assert np.all(robot.frame_anchors >= low - 1e-9)
     assert np.all(robot.frame_anchors <= high + 1e-9)
-    assert mesh(solids.platform(robot)).volume > 0.0
-    frame = mesh(solids.frame(robot))
+    assert mesh(shapes.platform(robot)).volume > 0.0
+    frame = mesh(shapes.frame(robot))
     assert frame.volume > 0.0
-    assert np.all(np.abs(frame.bounds - [low, high]) < 0.01 * solids.size_of(robot))
+    assert np.all(np.abs(frame.bounds - [low, high]) < 0.01 * shapes.size_of(robot))
 
 
 def test_tube_is_as_long_and_thick_as_asked() -> None:
     points = np.linspace([0.0, 0.0, 0.0], [0.0, 3.0, 4.0], 9)
-    area = mesh(solids.tube(points, 0.1, sides=64)).area
+    area = mesh(shapes.tube(points, 0.1, sides=64)).area
     assert area == pytest.approx(2.0 * np.pi * 0.1 * 5.0, rel=2e-3)
 
 
 def test_suspended_robot_without_a_frame_stands_on_the_floor() -> None:
     robot = sl.load_robot("cogiro")
     assert robot.frame_size is None
-    assert solids.bounds(robot)[0][2] == 0.0
+    assert shapes.bounds(robot)[0][2] == 0.0
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 4))
 def test_frames_that_nobody_gave_are_dashed(name: str) -> None:
     robot = sl.load_robot(name)
-    pieces = mesh(solids.frame(robot)).body_count
-    assert pieces == 1 if not solids.is_frame_assumed(robot) else pieces > 60
-    given = robot.replace(frame_size=solids.bounds(robot)[1] - solids.bounds(robot)[0], assumed={})
-    assert mesh(solids.frame(given)).body_count == 1
+    pieces = mesh(shapes.frame(robot)).body_count
+    assert pieces == 1 if not shapes.is_frame_assumed(robot) else pieces > 60
+    given = robot.replace(frame_size=shapes.bounds(robot)[1] - shapes.bounds(robot)[0], assumed={})
+    assert mesh(shapes.frame(given)).body_count == 1
 
 
 @pytest.mark.parametrize(
     ("length", "rounded"), [(0.099, 0.05), (0.1, 0.1), (1.99, 1.0), (2.0, 2.0), (4.9, 2.0), (7.0, 5.0), (640.0, 500.0)]
 )
 def test_lengths_to_measure_by_are_round(length: float, rounded: float) -> None:
-    assert solids.round_below(length) == pytest.approx(rounded, rel=1e-12)
+    assert shapes.round_below(length) == pytest.approx(rounded, rel=1e-12)
 
 
 def test_a_pulley_stands_where_its_cable_enters_and_as_large_as_it_is() -> None:
-    wheel = mesh(solids.wheel())
+    wheel = mesh(shapes.wheel())
     assert wheel.bounds[0] == pytest.approx([0.03, -0.1, -0.97], abs=0.01)  # entered at the origin, a bit of room
     assert wheel.bounds[1] == pytest.approx([1.97, 0.1, 0.97], abs=0.01)
     assert wheel.volume > 0.0
@@ -75,7 +75,7 @@ def test_a_pulley_stands_where_its_cable_enters_and_as_large_as_it_is() -> None:
 def test_pulleys_turn_to_the_platform() -> None:
     robot = sl.load_robot("ipanema-2-pulleys")
     pose = sl.Pose.from_euler([0.5, -0.3, 2.0], 0.1, 0.0, 0.2)
-    turned = Rotation.from_quat(np.roll(solids.pulley_rotations(robot, pose), -1, axis=1)).apply([1.0, 0.0, 0.0])
+    turned = Rotation.from_quat(np.roll(shapes.pulley_rotations(robot, pose), -1, axis=1)).apply([1.0, 0.0, 0.0])
     reach = pose.transform(robot.platform_anchors) - robot.frame_anchors
     reach[:, 2] = 0.0
     assert turned == pytest.approx(reach / np.linalg.norm(reach, axis=1, keepdims=True), abs=1e-12)
@@ -83,11 +83,11 @@ def test_pulleys_turn_to_the_platform() -> None:
 
 def test_marks_stay_where_no_pulley_is_seen_and_drums_are_drawn_where_they_are() -> None:
     robot = sl.load_robot("ipanema-2")
-    assert mesh(solids.winches(robot)).body_count == 8
-    assert mesh(solids.winches(robot.replace(winches=sl.Winch(pulley_radius=0.01)))).body_count == 8
-    assert len(solids.winches(robot.replace(winches=sl.Winch(pulley_radius=0.2))).faces) == 0
+    assert mesh(shapes.winches(robot)).body_count == 8
+    assert mesh(shapes.winches(robot.replace(winches=sl.Winch(pulley_radius=0.01)))).body_count == 8
+    assert len(shapes.winches(robot.replace(winches=sl.Winch(pulley_radius=0.2))).faces) == 0
     wound = sl.Winch(pulley_radius=0.2, dead_cable=3.0, dead_rise=3.0, drum_radius=0.25, drum_width=0.4)
-    drums = mesh(solids.winches(robot.replace(winches=wound)))
+    drums = mesh(shapes.winches(robot.replace(winches=wound)))
     assert drums.body_count == 8
     assert drums.volume == pytest.approx(8 * np.pi * 0.25**2 * 0.4, rel=0.03)  # as good as twenty sides are
     assert drums.bounds[:, 2] == pytest.approx(robot.frame_anchors[[5, 3], 2] - 3.0 + [-0.25, 0.25], abs=0.005)
@@ -96,4 +96,4 @@ def test_marks_stay_where_no_pulley_is_seen_and_drums_are_drawn_where_they_are()
 def test_a_tube_leaves_out_points_that_repeat() -> None:
     points = np.linspace([0.0, 0.0, 0.0], [0.0, 3.0, 4.0], 9)
     twice = np.repeat(points, 2, axis=0)
-    assert np.array_equal(solids.tube(twice, 0.1).vertices, solids.tube(points, 0.1).vertices)
+    assert np.array_equal(shapes.tube(twice, 0.1).vertices, shapes.tube(points, 0.1).vertices)

@@ -14,10 +14,10 @@ from sagline import SaglineError
 from sagline.viewer.feature import Reading
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.region import RegionFeature, planes_of
-from sagline.viewer.hull import Hull, WorkspaceQuery, region_hull
 from sagline.viewer.page import Page
 from sagline.viewer.server import Server
 from sagline.viewer.tension_scale import cable_color
+from sagline.viewer.workspace import Hull, WorkspaceQuery, region_hull
 from tests.effort import best_rate
 from tests.kinematics.test_many_robots import planar
 from tests.tiers import extended

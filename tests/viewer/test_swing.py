@@ -5,9 +5,9 @@ import pytest
 
 import sagline as sl
 from sagline import vibration
-from sagline.viewer import lines, solids
+from sagline.viewer import shapes
+from sagline.viewer.features.modes import Swing, mode_of
 from sagline.viewer.snapshot import Settings, taken_at
-from sagline.viewer.swing import Swing, mode_of
 from tests.tiers import wide
 
 
@@ -35,12 +35,12 @@ def test_at_rest_it_is_what_the_page_shows(name: str) -> None:
 def test_cables_stay_on_the_platform_and_at_the_frame(name: str) -> None:
     for swing in swings(name):
         robot = swing.state.one_robot
-        size = solids.size_of(robot)
+        size = shapes.size_of(robot)
         for phase in (0.7, 0.5 * np.pi, 4.0):
             courses, pose = swing.courses(phase), swing.pose(phase)
             np.testing.assert_allclose(courses[:, -1], pose.transform(robot.platform_anchors), atol=1e-9)
             np.testing.assert_allclose(courses[:, 0], robot.frame_anchors, atol=1e-9)
-            np.testing.assert_allclose(courses[:, : -lines.POINTS], swing.rest[:, : -lines.POINTS], atol=1e-9)
+            np.testing.assert_allclose(courses[:, : -shapes.POINTS], swing.rest[:, : -shapes.POINTS], atol=1e-9)
             away = np.linalg.norm(courses - swing.rest, axis=-1).max()
             assert away < 0.1 * size
         farthest = np.linalg.norm(swing.moved, axis=-1).max()

@@ -15,7 +15,7 @@ from sagline.viewer.features.timeline import TimelineFeature
 from sagline.viewer.page import Page
 from sagline.viewer.playback import Playback, Run
 from sagline.viewer.player import Beside, Player
-from sagline.viewer.server import started, stop
+from sagline.viewer.server import start_server, stop_server
 from sagline.viewer.session import LogFollower, Session
 from sagline.viewer.tension_scale import ForceUnit
 from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
@@ -301,7 +301,7 @@ def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
 
 
 def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> None:
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         page = Page(server, (), ROBOT, Run.of(PLAN))
         channel, player = page.channel, page.player
@@ -323,7 +323,7 @@ def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> Non
         player.scrub_to(0.0)
         assert window() == [6.0, 8.0]  # who looks elsewhere does so by hand
     finally:
-        stop(server)
+        stop_server(server)
 
 
 @extended

@@ -18,7 +18,7 @@ from sagline.viewer.feature import Reading
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
 from sagline.viewer.robot_scene import RobotScene
-from sagline.viewer.server import started, stop
+from sagline.viewer.server import start_server, stop_server
 from sagline.viewer.snapshot import Snapshot, method_name
 from tests.effort import best_rate
 from tests.refusal import refused
@@ -44,15 +44,15 @@ def test_it_listens_on_the_loopback_address_alone(page: Shown) -> None:
 
 def test_a_port_that_is_taken_is_told(page: Shown) -> None:
     with refused(f"port {page.port}", "in use on 127.0.0.1", kind=sl.InvalidValueError):
-        started(port=page.port)
+        start_server(port=page.port)
     with refused("203.0.113.7:0", kind=sl.InvalidValueError):
-        started(host="203.0.113.7", port=0)
+        start_server(host="203.0.113.7", port=0)
     with refused("port", "70000", "0 to 65535", kind=sl.InvalidValueError):
-        started(port=70000)
+        start_server(port=70000)
 
 
 def test_the_gizmo_goes_where_it_is_put() -> None:
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         pose = sl.Pose.from_euler([1.0, 0.5, 2.0], 0.3, -0.2, 0.1)
         stage = RobotScene(server.scene, ROBOT, pose)
@@ -61,7 +61,7 @@ def test_the_gizmo_goes_where_it_is_put() -> None:
         np.testing.assert_allclose(stage.dragged_pose().matrix, pose.matrix, atol=1e-14)
         np.testing.assert_array_equal(stage.dragged_pose().position, pose.position)
     finally:
-        stop(server)
+        stop_server(server)
 
 
 def test_everything_follows_a_drag(page: Shown) -> None:
@@ -208,14 +208,14 @@ def test_a_pose_that_is_none_is_refused_and_forgotten(page: Shown) -> None:
 
 
 def test_what_a_slider_does_not_reach_is_refused_once_and_not_asked_again() -> None:
-    server = started(port=0)
+    server = start_server(port=0)
     try:
         viewer = Page(server, FEATURES, ROBOT)
         viewer.panel._mass.value = 1e9  # after the settings were read
         viewer.panel.show_what_if("")
         assert not viewer.panel._forgetting.visible
     finally:
-        stop(server)
+        stop_server(server)
 
 
 @extended
@@ -270,7 +270,7 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
         "sagline.kinematics.polygon.polygon_of_pose",
         "sagline.kinematics.forward_rows.forward_poses",
     )
-    server = started(port=0)
+    server = start_server(port=0)
     pieces = pieces_of(server)
     viewer = Page(server, FEATURES, ROBOT, ready=ready.__contains__)
     thread = threading.Thread(target=viewer.serve)
@@ -307,4 +307,4 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
         viewer.stop()
         if thread.ident is not None:
             thread.join(timeout=PATIENCE)
-        stop(server)
+        stop_server(server)

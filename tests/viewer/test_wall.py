@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sagline.viewer.hull import Hull, margin_text, near_patches
 from sagline.viewer.tension_scale import ForceUnit, cable_color
+from sagline.viewer.workspace import Hull, margin_text, near_patches
 
 SIDE = 41  # corners along each edge of a wall
 

@@ -118,7 +118,7 @@ def serve(
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
 
-    server = web.started(address.host, address.port, robot.name)
+    server = web.start_server(address.host, address.port, robot.name)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is how one ends, and no failure
     try:
@@ -135,7 +135,7 @@ def serve(
     except KeyboardInterrupt:
         note("", "Stopped.")
     finally:
-        web.stop(server)
+        web.stop_server(server)
     return 0
 
 

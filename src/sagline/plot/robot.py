@@ -24,7 +24,7 @@ from sagline.plot.style import current
 from sagline.robot.batch import points_on_pulleys, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer import lines
+from sagline.viewer import shapes
 from sagline.viewer.tension_scale import TensionScale
 
 if TYPE_CHECKING:
@@ -63,15 +63,15 @@ def pose_of(robot: Robot, pose: Pose | None) -> Pose:
 def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
     """Points of the cables in the world as a feasible plan of the pose has them [m], shape (m, points, 3)."""
     contact = plan.state.contact
-    wraps = lines.wraps(robot, pose, None if contact is None else contact.wrap_angle)
-    free = lines.catenaries(lines.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
+    wraps = shapes.wraps(robot, pose, None if contact is None else contact.wrap_angle)
+    free = shapes.catenaries(shapes.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
     return np.concatenate((wraps, free), axis=1)
 
 
 def straight_points(robot: Robot, pose: Pose) -> Array:
     """Points of straight cables in the world [m], shape (m, points, 3)."""
-    wraps = lines.wraps(robot, pose, None)
-    return np.concatenate((wraps, lines.straight(lines.chords(robot, pose, wraps[:, -1]))), axis=1)
+    wraps = shapes.wraps(robot, pose, None)
+    return np.concatenate((wraps, shapes.straight(shapes.chords(robot, pose, wraps[:, -1]))), axis=1)
 
 
 def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
@@ -83,8 +83,8 @@ def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple
     pulleys = np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
     known = None if robot.winches is None else robot.winches.drum_radius
     radii = np.empty(0) if known is None else known
-    drums = [_rims(ends, radius) for ends, radius in zip(lines.drum_axes(robot), radii, strict=False)]
-    runs, upright = lines.dead_runs(robot)
+    drums = [_rims(ends, radius) for ends, radius in zip(shapes.drum_axes(robot), radii, strict=False)]
+    runs, upright = shapes.dead_runs(robot)
     high = [(run, bool(known)) for run, known in zip(runs, upright, strict=True) if run[0, 2] != run[1, 2]]
     return [*pulleys, *drums], high
 

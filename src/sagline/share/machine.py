@@ -15,7 +15,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.packing import Channel, encode_channels
-from sagline.viewer import lines, solids
+from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
 DIGITS: Final = 12  # of the numbers a page calculates with
@@ -61,8 +61,8 @@ def model_data(robot: Robot) -> dict[str, Any]:
 def solids_data(robot: Robot) -> dict[str, Any]:
     """Solids of frame, winches and platform, for page/scene.js."""
     low, high = bounds(robot)
-    body, size = solids.platform(robot), solids.size_of(robot)
-    drawn = {"frame": solids.frame(robot), "winches": solids.winches(robot), "platform": body}
+    body, size = shapes.platform(robot), shapes.size_of(robot)
+    drawn = {"frame": shapes.frame(robot), "winches": shapes.winches(robot), "platform": body}
     meshes = {name: _triangles(each, size) for name, each in drawn.items() if len(each.faces)}
     least, most = body.vertices.min(axis=0), body.vertices.max(axis=0)
     middle, grip = 0.5 * (least + most), 0.5 * float(np.linalg.norm(most - least))
@@ -103,23 +103,23 @@ def _highest(robot: Robot) -> float:
     return float(limited.max()) if limited.size else robot.mass * robot.gravity
 
 
-def _triangles(solid: solids.Solid, size: float) -> tuple[dict[str, object], str]:
+def _triangles(solid: shapes.Solid, size: float) -> tuple[dict[str, object], str]:
     """The corners of all triangles, one after the other, packed."""
     return encode_channels([Channel("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
 
 
 def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
     """The cables of a robot as they hang at chord tensions, between frame and platform, as SVG."""
-    ends = lines.chords(robot, pose)
+    ends = shapes.chords(robot, pose)
     run = ends[:, 1] - ends[:, 0]
     known = np.isfinite(tension) & (np.linalg.norm(run, axis=1) > 0.0)
-    courses = lines.straight(ends)
+    courses = shapes.straight(ends)
     if known.all():
         cables = Catenary().from_tension(robot.cables, np.hypot(*run[:, :2].T), run[:, 2], tension, robot.gravity)
-        courses = lines.catenaries(ends, cables, 1.0)
+        courses = shapes.catenaries(ends, cables, 1.0)
     low, high = bounds(robot)
     frame = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
-    body = solids.platform(robot)
+    body = shapes.platform(robot)
     box = np.array(np.meshgrid(*zip(body.vertices.min(axis=0), body.vertices.max(axis=0), strict=True), indexing="ij"))
     platform = pose.transform(box.reshape(3, -1).T)
     groups = [_seen(each) for each in (frame, platform, *courses)]

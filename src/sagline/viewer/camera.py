@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
-from sagline.viewer.solids import Solid
+from sagline.viewer.shapes import Solid
 
 
 class Camera(NamedTuple):

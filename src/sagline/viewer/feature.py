@@ -14,8 +14,7 @@ from typing import Final, TypeVar
 from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.robot.equilibrium import Equilibrium
-from sagline.viewer.drawn import Configuration
-from sagline.viewer.player import Played
+from sagline.viewer.player import Configuration, Played
 from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import TensionScale
 

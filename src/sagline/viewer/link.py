@@ -18,7 +18,7 @@ from sagline.files.quantity import plain_number
 from sagline.files.robot_file import dump_robot
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.channel import NAME
+from sagline.viewer.server import NAME
 
 LONGEST: Final = 4000  # characters of a link
 LONGEST_TEXT: Final = 60  # characters of a value, and of what a message quotes

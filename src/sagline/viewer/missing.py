@@ -19,8 +19,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import structure_matrix
 from sagline.tension.methods import MinimumNorm
-from sagline.viewer.hull import CELLS, WorkspaceQuery
 from sagline.viewer.snapshot import Snapshot
+from sagline.viewer.workspace import CELLS, WorkspaceQuery
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox

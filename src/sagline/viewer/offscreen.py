@@ -13,11 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
-from sagline.viewer.channel import Messages
 from sagline.viewer.feature import View
 from sagline.viewer.player import Played
 from sagline.viewer.readout import spaced
 from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
+from sagline.viewer.server import Messages
 from sagline.viewer.tension_scale import force_unit
 
 HEIGHT: Final = 4.0  # of the size of its text

@@ -22,14 +22,13 @@ from sagline.robot.reach import check_reach
 from sagline.robot.reach import home_pose as home_pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
-from sagline.viewer import readout, solids
+from sagline.viewer import readout, shapes
 from sagline.viewer.camera import Framing
-from sagline.viewer.channel import Channel
-from sagline.viewer.drawn import Configuration, InMotion
 from sagline.viewer.feature import Feature, Reading, View
 from sagline.viewer.panel import Panel
-from sagline.viewer.player import Beside, Played, Player
+from sagline.viewer.player import Beside, Configuration, InMotion, Played, Player
 from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
+from sagline.viewer.server import Channel
 from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, taken_at
 from sagline.viewer.tension_scale import TensionScale
 
@@ -107,7 +106,7 @@ class Page:
         self.mode, self.found, self.source = mode, found, source or Source()
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._tasks: deque[Callable[[], None]] = deque()  # appended to by any thread
-        self.scale, self.size = TensionScale.of(robot), solids.size_of(robot)
+        self.scale, self.size = TensionScale.of(robot), shapes.size_of(robot)
         self.channel = Channel(server.gui, self.later)
         server.on_client_connect(self.channel.connect)
         server.on_client_disconnect(self.channel.disconnect)

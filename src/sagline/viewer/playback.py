@@ -16,7 +16,7 @@ from sagline.kinematics.confirm import Confirmation, confirm
 from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.drawn import InMotion
+from sagline.viewer.player import InMotion
 from sagline.viewer.readout import box, definitions
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot

@@ -16,8 +16,8 @@ from sagline.robot.batch import pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.margin import capacity_margin
-from sagline.viewer.channel import chosen_by
-from sagline.viewer.lines import dead_runs
+from sagline.viewer.server import chosen_by
+from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number
 

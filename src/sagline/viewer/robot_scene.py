@@ -1,7 +1,8 @@
-"""The robot in the scene: built once, changed with every view."""
+"""Robot in the scene, and nodes that features add."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -13,18 +14,111 @@ from sagline.robot.batch import pulleys_of
 from sagline.robot.pattern import ROTATING
 from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
-from sagline.viewer import lines, solids
-from sagline.viewer.drawn import (
-    Configuration,
-    InMotion,
-    cable_colors,
-    cable_segments,
-    chord_segments,
-    scaled_position,
-)
+from sagline.viewer import shapes
+from sagline.viewer.player import Configuration, InMotion
 from sagline.viewer.readout import headline
+from sagline.viewer.shapes import Solid
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import TensionScale
+from sagline.viewer.tension_scale import Colors, TensionScale
+
+
+class Nodes:
+    """Nodes of a scene by name: made when they are first drawn, changed in place afterward.
+
+    Attributes:
+        scene: The scene.
+    """
+
+    def __init__(self, scene: viser.SceneApi, pixel: float = 0.0) -> None:
+        """Draw nothing yet; `pixel` [m] is the width of a line of 1 px, 0 for that of the screen."""
+        self.scene, self._pixel = scene, pixel
+        self._made: dict[str, Any] = {}
+
+    def draw(self, name: str, make: Callable[..., Any], *, visible: bool = True, **values: Any) -> Any:
+        """Show a node with these values; `make`, a method of the scene, adds it where there is none."""
+        node = self._made.get(name)
+        points = values.get("points")
+        if node is not None and points is not None and len(node.points) != len(points):
+            node.remove()  # points and colors of another number would not arrive together
+            node = None
+        if node is None:
+            node = self._made[name] = make(name, visible=visible, **values)
+            return node
+        for key, value in values.items():
+            setattr(node, key, value)
+        node.visible = visible
+        return node
+
+    def lines(self, name: str, segments: Array, color: Any, width: float) -> None:
+        """Draw segments (k, 2, 3) so wide [px], in one color or in those of their ends; nothing for none."""
+        if not len(segments):
+            self.hide(name)
+            return
+        units, thickness = ("screen", width) if self._pixel == 0.0 else ("world", width * self._pixel)
+        self.draw(
+            name,
+            self.scene.add_line_segments,
+            points=segments.astype(np.float32),
+            colors=np.asarray(color, dtype=np.uint8),
+            thickness=thickness,
+            thickness_units=units,
+        )
+
+    def arrows(self, name: str, ends: Array, color: Any, shaft: float, head: float, length: float) -> None:
+        """Draw arrows (k, 2, 3); radii of shaft and head, and length of the head [m]."""
+        self.draw(
+            name,
+            self.scene.add_arrows,
+            points=ends.astype(np.float32),
+            colors=np.broadcast_to(np.asarray(color, dtype=np.uint8), (len(ends), 3)),
+            shaft_radius=shaft,
+            head_radius=head,
+            head_length=length,
+        )
+
+    def label(self, name: str, text: str, position: Any, anchor: str = "bottom-center", scale: float = 1.0) -> None:
+        """Write a text at a position; nothing for none."""
+        self.draw(
+            name,
+            self.scene.add_label,
+            visible=bool(text),
+            text=text,
+            position=position,
+            anchor=anchor,
+            font_screen_scale=scale,
+        )
+
+    def body(self, name: str, solid: Solid, color: Any, opacity: float, pose: Pose, position: Any = None) -> None:
+        """Draw a solid at a pose, or with the rotation of the pose at another position."""
+        place = pose.position if position is None else position
+        self.draw(name, self.scene.add_frame, show_axes=False, position=place, wxyz=np.roll(pose.quaternion, 1))
+        self.draw(
+            f"{name}/body",
+            self.scene.add_mesh_simple,
+            vertices=solid.vertices.astype(np.float32),
+            faces=solid.faces.astype(np.uint32),
+            color=color,
+            opacity=opacity,
+        )
+
+    def hide(self, *names: str) -> None:
+        """Hide nodes; those that were never drawn are passed over."""
+        for name in names:
+            if name in self._made:
+                self._made[name].visible = False
+
+    def keep_first(self, name: str, count: int) -> None:
+        """Remove the nodes below a name that are numbered from a count on."""
+        while f"{name}/{count}" in self._made:
+            self.remove(f"{name}/{count}")
+            count += 1
+
+    def remove(self, *names: str) -> None:
+        """Remove nodes, and those below them; those that were never drawn are passed over."""
+        for name in names:
+            for found in [each for each in self._made if each == name or each.startswith(f"{name}/")][::-1]:
+                self._made.pop(found).remove()
+
 
 # All stand out from the white and from the dark background, 3 : 1 or more but for the floor.
 STEEL, DRUM, FLOOR, SECTION = (120, 128, 138), (104, 112, 122), (172, 178, 186), (132, 138, 146)
@@ -53,11 +147,11 @@ class RobotScene:
         """Build the scene with the platform at home."""
         self._scene, self._live, self._pixel = scene, live, pixel
         self._build_lights()
-        self._low, self._high = solids.bounds(robot)
-        self._size = solids.size_of(robot)
-        self._winches = solids.winches(robot)
+        self._low, self._high = shapes.bounds(robot)
+        self._size = shapes.size_of(robot)
+        self._winches = shapes.winches(robot)
         self._build_surroundings(robot)
-        body = self._body = solids.platform(robot)
+        body = self._body = shapes.platform(robot)
         self._gizmo: Any = self._build_gizmo(robot, body) if live else scene.add_frame("/platform", show_axes=False)
         self._traces: list[Any] = []
         self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
@@ -66,7 +160,7 @@ class RobotScene:
         self._truth: Any = None  # made when it is known for the first time
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
-        blank = np.zeros((robot.cable_count * (lines.points_per_cable(robot) - 1), 2, 3))
+        blank = np.zeros((robot.cable_count * (shapes.points_per_cable(robot) - 1), 2, 3))
         self._cables = self._scene.add_line_segments("/cables", blank, GHOST, **self._wide(CABLE_WIDTH))
         self._cables.colors = np.zeros(blank.shape, dtype=np.uint8)
         self._ghost = self._scene.add_line_segments("/chords", blank, GHOST, **self._wide(GHOST_WIDTH), visible=False)
@@ -116,7 +210,7 @@ class RobotScene:
         self._cables.points = cable_segments(snapshot, sag_scale).astype(np.float32)
         self._cables.colors = cable_colors(snapshot, scale)
         if self._wheels is not None:
-            turns = solids.pulley_rotations(snapshot.robot, snapshot.pose)[self._over_pulleys]
+            turns = shapes.pulley_rotations(snapshot.robot, snapshot.pose)[self._over_pulleys]
             self._wheels.batched_wxyzs = turns.astype(np.float32)
         self._platform.color = PLATFORM if snapshot.feasible else INFEASIBLE
         self._notice.visible = self._live and not snapshot.feasible
@@ -142,7 +236,7 @@ class RobotScene:
         back = rest.rotation.inv()
         self._platform.position = back.as_matrix() @ (pose.position - rest.position)
         self._platform.wxyz = np.roll((back * pose.rotation).as_quat(), 1)
-        self._cables.points = lines.segments(courses, dashed=False).astype(np.float32)
+        self._cables.points = shapes.segments(courses, dashed=False).astype(np.float32)
 
     def settle(self) -> None:
         """Put the platform back to where its gizmo is."""
@@ -177,13 +271,13 @@ class RobotScene:
         )
 
     def _build_surroundings(self, robot: Robot) -> None:
-        frame = solids.frame(robot)
+        frame = shapes.frame(robot)
         self._scene.add_mesh_simple("/frame", frame.vertices, frame.faces, color=STEEL)
         if len(self._winches.faces):
             self._scene.add_mesh_simple("/winches", self._winches.vertices, self._winches.faces, color=DRUM)
         self._build_dead_cables(robot)
         width, depth = 1.5 * (self._high - self._low)[:2]
-        cell = solids.round_below(self._size / 10.0)
+        cell = shapes.round_below(self._size / 10.0)
         middle = 0.5 * (self._low + self._high)
         self._scene.add_grid(
             "/floor", width, depth, position=(middle[0], middle[1], self._low[2] - 0.005 * self._size),
@@ -201,25 +295,25 @@ class RobotScene:
 
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
         """The pulleys as large as they are; they turn with the platform."""
-        wheel, which = solids.wheel(), self._over_pulleys
+        wheel, which = shapes.wheel(), self._over_pulleys
         return self._scene.add_batched_meshes_simple(
-            "/pulleys", wheel.vertices, wheel.faces, solids.pulley_rotations(robot, pose)[which],
+            "/pulleys", wheel.vertices, wheel.faces, shapes.pulley_rotations(robot, pose)[which],
             robot.frame_anchors[which],
             batched_scales=pulleys_of(robot).radius[which], batched_colors=DRUM, flat_shading=True, lod="off",
         )  # fmt: skip
 
     def _build_dead_cables(self, robot: Robot) -> None:
         """The runs behind the pulleys, dashed where only what they rise is known."""
-        runs, upright = lines.dead_runs(robot)
+        runs, upright = shapes.dead_runs(robot)
         for name, which in (("/dead", upright), ("/dead_assumed", ~upright)):
             shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
             if len(shown):
-                pieces = lines.segments(lines.straight(shown), dashed=name != "/dead")
+                pieces = shapes.segments(shapes.straight(shown), dashed=name != "/dead")
                 self._scene.add_line_segments(name, pieces, STEEL, **self._wide(GHOST_WIDTH))
 
     def _build_axes(self) -> None:
         """The directions of the world at a corner of the floor; their arms of a round length are the scale."""
-        arm = solids.round_below(_ARM * self._size)
+        arm = shapes.round_below(_ARM * self._size)
         corner = self._low - np.array([0.0, 0.06 * self._size, 0.0])
         arms = np.stack((np.zeros((3, 3)), arm * np.eye(3)), axis=1) + corner
         self._scene.add_line_segments("/axes", arms, STEEL, **self._wide(ARM_WIDTH))
@@ -229,7 +323,7 @@ class RobotScene:
             "/axes/length", f"{arm:g} m", position=arms[0].mean(axis=0), anchor="top-center", font_screen_scale=0.8
         )
 
-    def _build_gizmo(self, robot: Robot, body: solids.Solid) -> viser.TransformControlsHandle:
+    def _build_gizmo(self, robot: Robot, body: shapes.Solid) -> viser.TransformControlsHandle:
         free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5  # world axes along which the platform may move
         least, most = (share * self._size for share in _GIZMO)
         return self._scene.add_transform_controls(
@@ -247,6 +341,29 @@ def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> Non
     if frame.visible and other is not None:
         frame.position = scaled_position(pose, other, error_scale)
         frame.wxyz = np.roll(other.quaternion, 1)
+
+
+def scaled_position(pose: Pose, other: Pose, factor: float) -> Array:
+    """Position of another pose with its distance scaled by a factor [m], shape (3,)."""
+    return np.asarray(pose.position + factor * (other.position - pose.position))
+
+
+def cable_segments(drawn: Configuration, sag_scale: float) -> Array:
+    """Segments of the cables (m (P - 1), 2, 3), dashed where the pose is not feasible."""
+    return shapes.segments(drawn.courses(sag_scale), dashed=not drawn.feasible)
+
+
+def chord_segments(drawn: Configuration, sag_scale: float, apart: float) -> Array:
+    """Segments of the chords where a cable is farther from its own than a distance [m]; else of zero length."""
+    free = drawn.courses(sag_scale)[:, -shapes.POINTS :]
+    chords = shapes.straight(free[:, [0, -1]])
+    return shapes.segments(chords, dashed=False, shown=np.linalg.norm(free - chords, axis=2) > apart)
+
+
+def cable_colors(drawn: Configuration, scale: TensionScale) -> Colors:
+    """Colors of both ends of every segment as viser takes them, shape (m (P - 1), 2, 3)."""
+    ends = 2 * (shapes.points_per_cable(drawn.robot) - 1)
+    return np.repeat(scale.linear_colors(drawn.tension), ends, axis=0).reshape(-1, 2, 3)
 
 
 def _neighbors(points: Array, near: float) -> list[tuple[Array, list[int]]]:

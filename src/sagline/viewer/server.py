@@ -1,19 +1,23 @@
-"""Web server: viser on the loopback address, with our title, styles and scripts in its page."""
+"""Web server with our title, styles and scripts in the page of viser, and the channel of messages to and from pages.
+
+The channel (the other end is browser/channel.js) is beside the messages of viser: a hidden text field carries the
+messages of pages, hidden pieces of HTML those to pages, which viser repeats to clients that connect later.
+"""
 
 from __future__ import annotations
 
 import errno
+import json
 import logging
 import socket
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
-from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
 from io import StringIO
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 from urllib.parse import quote
 
 import viser
@@ -29,6 +33,11 @@ SCRIPTS: Final = (  # in the order in which they run, before viser's client
     "strip.js", "pictures.js", "mp4.js", "recorder.js", "film.js",
     "timeline_plot.js", "timeline.js",
 )  # fmt: skip
+NAME: Final = "sagline"  # title, label of the hidden text field, and prefix of the hidden pieces of HTML
+LOOPBACK: Final = "127.0.0.1"
+PORT: Final = 8080
+LOUD: Final = ("websockets.server", "asyncio")  # loggers
+LONGEST: Final = 10_000  # characters of a message of a page
 _STOCK = infra.WebsockServer
 _ICON = (  # a platform on two cables that sag
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#10335c"/>'
@@ -38,12 +47,14 @@ _ICON = (  # a platform on two cables that sag
 )
 
 
-@dataclass(frozen=True, slots=True)
-class ClientFile:
-    """A file or folder of viser's client, as much of a path as its web server asks for."""
+Handler = Callable[[Any, int], None]
 
-    path: Path  # where it is
-    title: str  # title of the page
+
+class ClientFile(NamedTuple):
+    """A file or folder of viser's client, with the methods of a path that its web server uses."""
+
+    path: Path
+    title: str  # of the page
 
     def __truediv__(self, name: str) -> ClientFile:
         """A file in this folder."""
@@ -54,13 +65,13 @@ class ClientFile:
         return self.path.is_file()
 
     def read_bytes(self) -> bytes:
-        """Its content; of the first page, dressed."""
+        """Its content; that of the first page is ours."""
         content = self.path.read_bytes()
-        return dressed(content.decode(), self.title).encode() if self.path.name == "index.html" else content
+        return page_html(content.decode(), self.title).encode() if self.path.name == "index.html" else content
 
 
-def dressed(html: str, title: str) -> str:
-    """A page with our title, icon, styles and scripts at the end of its head: what comes last holds."""
+def page_html(html: str, title: str) -> str:
+    """Page of viser with our title and icon; our styles and scripts are last in its head, to take precedence."""
     ours = files("sagline.viewer").joinpath("browser")
     style, script = ("".join(ours.joinpath(name).read_text("utf-8") for name in names) for names in (STYLES, SCRIPTS))
     html = html.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1).replace('rel="icon"', "", 1)
@@ -70,8 +81,8 @@ def dressed(html: str, title: str) -> str:
 
 
 @contextmanager
-def served(title: str) -> Iterator[None]:
-    """While inside, a viser server that is made serves our page."""
+def _serving_our_page(title: str) -> Iterator[None]:
+    """Context in which a viser server that is made serves our page."""
 
     class PageServer(_STOCK):
         def __init__(self, **options: Any) -> None:
@@ -85,21 +96,16 @@ def served(title: str) -> Iterator[None]:
         infra.WebsockServer = _STOCK  # type: ignore[misc]
 
 
-LOOPBACK = "127.0.0.1"
-PORT = 8080
-NAME = "sagline"
-LOUD = ("websockets.server", "asyncio")  # loggers
-
 _running: list[Server] = []
-_quieted = ExitStack()  # what is quiet for the whole process while any server runs
+_quiet_process = ExitStack()  # silences logging of the whole process while any server runs
 
 
 class Server(viser.ViserServer):
-    """A viser server with our page, that no page can ask to open a tunnel to the internet."""
+    """A viser server with our page; no page can ask it to open a tunnel to the internet."""
 
     def __init__(self, host: str, port: int, title: str) -> None:
-        """Start serving; `title` stands at the top of the panel and in the browser's tab."""
-        with served(title if title == NAME else f"{title} – {NAME}"):
+        """Start serving; the title stands at the top of the panel and in the browser's tab."""
+        with _serving_our_page(title if title == NAME else f"{title} – {NAME}"):
             super().__init__(host=host, port=port, label=title, verbose=False)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
@@ -107,36 +113,32 @@ class Server(viser.ViserServer):
         return None
 
 
-def started(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> Server:
-    """A running server.
-
-    Args:
-        host: Address to listen on; "0.0.0.0" is every one.
-        port: Port; 0 for any that is free.
-        title: What stands at the top of the panel.
+def start_server(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> Server:
+    """Start a server at an address ("0.0.0.0" is every one) and a port (0 for any that is free).
 
     Raises:
-        InvalidValueError: If nothing can listen there; viser itself would take the next port, or wait for ever.
+        InvalidValueError: If the port is in use or the address is not of this machine; viser itself would take the
+            next port, or wait forever.
     """
     _check(host, port)
-    with ExitStack() as quieted:
+    with ExitStack() as quiet:
         if not _running:
-            quieted.enter_context(_quiet())
+            quiet.enter_context(_quiet())
         with redirect_stdout(StringIO()):
             server = Server(host, port, title)
         _running.append(server)
-        _quieted.push(quieted.pop_all())
+        _quiet_process.push(quiet.pop_all())
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     return server
 
 
-def stop(server: Server) -> None:
-    """Stop it and its threads; after the last one, logging and warnings are as they were before the first."""
+def stop_server(server: Server) -> None:
+    """Stop a server and its threads; after the last one, logging and warnings are restored."""
     with redirect_stdout(StringIO()):
         server.stop()
     _running[:] = [other for other in _running if other is not server]
     if not _running:
-        _quieted.close()
+        _quiet_process.close()
 
 
 def url(server: Server, host: str) -> str:
@@ -147,9 +149,9 @@ def url(server: Server, host: str) -> str:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """A client that says nonsense is cut off or not heard, one that leaves gets no more; neither is news to anybody.
+    """Context without log entries and warnings on clients that disconnect or send nonsense, and on gimbal lock.
 
-    Nor is it that a platform which stands on end has many triples of angles: one of them is shown.
+    A rotation with gimbal lock has many triples of angles; one of them is shown.
     """
     levels = {name: logging.getLogger(name).level for name in LOUD}
     for name in LOUD:
@@ -189,3 +191,76 @@ def _check(host: str, port: int) -> None:
             "an address of this machine and a free port",
             "Choose others with --host and --port; --port 0 takes any that is free.",
         ) from None
+
+
+def chosen_by(topic: str, value: str | int) -> str:
+    """Attributes of an HTML element that sends a value under a topic when it is clicked; see browser/choices.js."""
+    return f'data-send="{topic}" data-value="{escape(str(value))}"'
+
+
+class Messages:
+    """Messages to pages, the latest of each topic; values are those of JSON."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        """Begin without messages."""
+        self._gui = gui
+        self._sent: dict[str, Any] = {}  # HTML, by topic
+
+    def send(self, topic: str, value: Any) -> None:
+        """Send a value under a topic; it replaces the one before."""
+        content = f"{NAME}:{topic}:{json.dumps(value, separators=(',', ':'), allow_nan=False)}"
+        if topic not in self._sent:
+            self._sent[topic] = self._gui.add_html(content, visible=False)
+        elif self._sent[topic].content != content:
+            self._sent[topic].content = content
+
+
+class Channel(Messages):
+    """Messages to and from pages."""
+
+    def __init__(self, gui: viser.GuiApi, later: Callable[[Callable[[], None]], None]) -> None:
+        """Add the text field; `later` has the serving thread call a function."""
+        super().__init__(gui)
+        self._later = later
+        self._handlers: dict[str, Handler] = {}
+        self._clients: dict[int, Messages] = {}  # by number
+        self._field = gui.add_text(NAME, "", visible=False)
+
+        @self._field.on_update
+        async def _(event: Any) -> None:  # a coroutine keeps the order of messages, viser's threads do not
+            self._receive(event.target.value, event.client_id)
+
+    def on(self, topic: str, handler: Handler) -> None:
+        """Have the serving thread call a handler with the messages of a topic."""
+        self._handlers[topic] = handler
+
+    def send_to(self, client: int, topic: str, value: Any) -> None:
+        """Send a value to one client, unless it has left."""
+        messages = self._clients.get(client)
+        if messages is not None:
+            messages.send(topic, value)
+
+    async def connect(self, client: viser.ClientHandle) -> None:
+        """Tell a client that its messages arrive from now on; viser drops earlier ones.
+
+        A coroutine that awaits nothing is called before the next message of the client is read; a thread is not.
+        """
+        messages = self._clients[client.client_id] = Messages(client.gui)
+        messages.send("welcome", True)
+
+    async def disconnect(self, client: viser.ClientHandle) -> None:
+        """Forget a client that has left."""
+        self._clients.pop(client.client_id, None)
+
+    def _receive(self, text: Any, client: int | None) -> None:
+        """Pass a message to the serving thread; anything else is ignored."""
+        if client is None or not isinstance(text, str) or len(text) > LONGEST:
+            return
+        try:
+            message = json.loads(text)
+            topic, value = message["topic"], message["value"]
+            handler = self._handlers[topic]
+            json.dumps(value, ensure_ascii=False, allow_nan=False).encode()  # half a surrogate pair cannot be sent
+        except (ValueError, TypeError, KeyError, RecursionError):
+            return
+        self._later(lambda: handler(value, client))

@@ -19,7 +19,7 @@ from sagline.files.mcap_layout import NANO
 from sagline.files.mcap_reader import Log, LogReader
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.drawn import InMotion
+from sagline.viewer.player import InMotion
 from sagline.viewer.readout import box, definitions
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
 from sagline.viewer.tension_scale import force_unit, number

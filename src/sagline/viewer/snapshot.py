@@ -24,7 +24,7 @@ from sagline.tension.margin import cable_margins
 from sagline.tension.method import TensionMethod, shared_tension
 from sagline.tension.methods import METHODS as ALL_METHODS
 from sagline.tension.methods import MinimumNorm
-from sagline.viewer import lines
+from sagline.viewer import shapes
 from sagline.viewer.by_hand import BY_HAND, ByHand
 from sagline.viewer.tension_scale import force_unit
 
@@ -166,21 +166,9 @@ class Snapshot:
         return None if self.rest is None else self.rest.position - self.pose.position
 
     def courses(self, sag_scale: float) -> Array:
-        """Points of the cables from frame anchor over pulley to platform end (m, points_per_cable, 3).
-
-        Hanging, their sag some times as large; straight where the pose is not feasible.
-        """
-        wraps, ends = self._on_pulleys()
-        free = lines.straight(ends)
-        if self.plan is not None and self.feasible:
-            free = lines.catenaries(ends, self.plan.state.cables, sag_scale)
-        return free if wraps.shape[1] == 1 else np.concatenate((wraps, free), axis=1)
-
-    def _on_pulleys(self) -> tuple[Array, Array]:
-        """The cables on their pulleys, and both ends of the free ones."""
-        contact = self.plan.state.contact if self.plan is not None and self.feasible else None
-        wraps = lines.wraps(self.robot, self.pose, None if contact is None else contact.wrap_angle)
-        return wraps, lines.chords(self.robot, self.pose, wraps[:, -1])
+        """Points of the cables (m, P, 3), their sag scaled by a factor; straight where the pose is not feasible."""
+        state = self.plan.state if self.plan is not None and self.feasible else None
+        return shapes.courses(self.robot, self.pose, state, sag_scale)
 
 
 def taken_at(

@@ -23,14 +23,13 @@ from sagline.calibration.summary import (
 from sagline.core.arrays import Array, Indices
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import counted, n
-from sagline.viewer import solids
-from sagline.viewer.channel import chosen_by
+from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
-from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
 from sagline.viewer.readout import block, box, color_key, refused, sentence
-from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH
-from sagline.viewer.solids import Ellipsoids, ball, readable
+from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
+from sagline.viewer.server import chosen_by
+from sagline.viewer.shapes import Ellipsoids, ball, readable
 
 FIELD: Final = "Row of the log"
 TOPIC: Final = "row"  # of the messages with the number of a row that is clicked
@@ -158,7 +157,7 @@ class CalibrationFeature(Feature):
 
     def __init__(self, page: Page, found: Calibration) -> None:
         """Build tab and scene of a calibration."""
-        self._found, self._go, self._size = found, page.go, solids.size_of(found.robot)
+        self._found, self._go, self._size = found, page.go, shapes.size_of(found.robot)
         self._nodes, self._ball, self._later = Nodes(page.server.scene), ball(), page.later
         self._bands = bands(found)
         factor = readable(self._anchors("frame_anchors", relative=False).radius, LARGE * self._size)

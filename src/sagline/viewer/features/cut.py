@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import viser
 
 from sagline.core.numbers import n
-from sagline.dynamics.simulation.results import Simulation
+from sagline.dynamics.simulation.chain_plant import wave_frequency
+from sagline.dynamics.simulation.initial_conditions import initial_conditions
+from sagline.dynamics.simulation.results import Break, Simulation
+from sagline.dynamics.simulation.simulate import started_run
+from sagline.dynamics.vibration.dynamic_stiffness import Damping
+from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
-from sagline.viewer import lines, swing
+from sagline.viewer import shapes
 from sagline.viewer.camera import camera_of, nearest_line, screen_point
 from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
-from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
 from sagline.viewer.playback import Playback
 from sagline.viewer.player import PlayerState
 from sagline.viewer.readout import box, definitions, refused, sentence
+from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.tension_scale import force_unit
 
+LOSSES: Final = Damping(loss_time=1e-3)
+PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # s: ends of the parts; the first is short, to be shown soon
+DURATION: Final = PARTS[-1]
+ELEMENTS: Final = 10  # of a cable with mass: four times as fast as twice as many
 CABLE_MASS = {"massless": "none", "with cable mass": "lumped"}
 TOP = -10.0  # order of buttons that stand above all else
 HELP: Final = sentence("Click a cable in the scene, or choose one.")
@@ -29,6 +38,18 @@ _WIDTH: Final = 7.0  # px
 _PLACE: Final = 0.4  # fraction of the cable at which its name stands, from the frame on
 TOPIC: Final = "pick"  # of the messages of browser/hand.js
 NEAR: Final = 14.0  # px: largest distance of a click, or of a finger, from a cable
+
+
+def simulate_cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Simulation]:
+    """Simulation of the break of a cable, the other lengths kept; each part continues the one before."""
+    given = initial_conditions(state, None, None, DURATION)
+    elements = ELEMENTS if cable_mass == "lumped" else 0
+    losses = LOSSES
+    if elements:  # the losses of waves in stiff cables need no smaller steps than the waves themselves
+        losses = Damping(loss_time=min(LOSSES.loss_time, 2.0 / wave_frequency(given, elements)))
+    run = started_run(given, elements, events=(Break(cable=cable, time=0.0),), damping=losses)
+    for part in PARTS:
+        yield run.until(part)
 
 
 class Peak(NamedTuple):
@@ -121,7 +142,7 @@ class CutFeature(Feature):
             return
         points = view.snapshot.courses(view.settings.sag_scale)[cable]
         tension = force_unit(state.one_robot).written(float(state.chord_tension[cable]))
-        nodes.lines("/chosen", lines.segments(points[None], dashed=False), MARK, _WIDTH)
+        nodes.lines("/chosen", shapes.segments(points[None], dashed=False), MARK, _WIDTH)
         nodes.label("/chosen_name", f"cable {cable}: {tension}", points[int(_PLACE * (len(points) - 1))])
         self._button.label = f"Cut cable {cable}"
 
@@ -144,7 +165,7 @@ class CutFeature(Feature):
         number, before = self._asked, Before(view.snapshot.pose, self._player.save())
 
         def simulate() -> None:
-            for simulation in swing.cut(state, cable, cable_mass):
+            for simulation in simulate_cut(state, cable, cable_mass):
                 if self._asked != number:
                     return
                 self._page.later(lambda part=simulation: self._play(number, part, cable, before))  # type: ignore[misc]
@@ -186,7 +207,7 @@ class CutFeature(Feature):
             self._player.play(Playback(simulation), at_once=True)
             self._number = self._player.number
             self._undo.visible = True
-        whole = float(simulation.time[-1] - simulation.time[0]) >= swing.DURATION - simulation.step
+        whole = float(simulation.time[-1] - simulation.time[0]) >= DURATION - simulation.step
         self._text.content = outcome_text(simulation, cable, whole=whole)
 
     def _mark(self) -> None:

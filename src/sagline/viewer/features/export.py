@@ -16,16 +16,15 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.files.writing import file_stem
 from sagline.robot.batch import pulleys_of
-from sagline.viewer import lines, solids
-from sagline.viewer.channel import Messages
-from sagline.viewer.drawn import InMotion
+from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.offscreen import HEIGHT as STRIP
 from sagline.viewer.offscreen import PAPERS, Shot, offscreen_scene, save_picture, strip_of
 from sagline.viewer.page import Page
-from sagline.viewer.player import Played
+from sagline.viewer.player import InMotion, Played
 from sagline.viewer.readout import headline
 from sagline.viewer.robot_scene import DRUM, INFEASIBLE, PLATFORM, STEEL
+from sagline.viewer.server import Messages
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
@@ -51,31 +50,31 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     scene = trimesh.Scene()
     place = np.eye(4)
     place[:3, :3], place[:3, 3] = snapshot.pose.matrix, snapshot.pose.position
-    _add(scene, "frame", solids.frame(robot), STEEL)
-    winches = solids.winches(robot)
+    _add(scene, "frame", shapes.frame(robot), STEEL)
+    winches = shapes.winches(robot)
     if len(winches.faces):
         _add(scene, "winches", winches, DRUM)
     for i, (radius, turn) in enumerate(
-        zip(pulleys_of(robot).radius, solids.pulley_rotations(robot, snapshot.pose), strict=True)
+        zip(pulleys_of(robot).radius, shapes.pulley_rotations(robot, snapshot.pose), strict=True)
     ):
         if radius > 0.0:
             placed = compose_matrix(scale=np.full(3, radius), translate=robot.frame_anchors[i])
-            _add(scene, f"pulley {i}", solids.wheel(), DRUM, placed @ quaternion_matrix(turn))
-    thin = _DEAD_RADIUS * solids.size_of(robot)
-    for i, (run, known) in enumerate(zip(*lines.dead_runs(robot), strict=True)):
+            _add(scene, f"pulley {i}", shapes.wheel(), DRUM, placed @ quaternion_matrix(turn))
+    thin = _DEAD_RADIUS * shapes.size_of(robot)
+    for i, (run, known) in enumerate(zip(*shapes.dead_runs(robot), strict=True)):
         if run[0, 2] != run[1, 2]:
             name = f"dead cable {i}" if known else f"dead cable {i}, its way not known"
-            _add(scene, name, solids.rod(run, thin), STEEL)
-    _add(scene, "platform", solids.platform(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
+            _add(scene, name, shapes.rod(run, thin), STEEL)
+    _add(scene, "platform", shapes.platform(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
     for i, course in enumerate(snapshot.courses(sag_scale)):
-        _add(scene, f"cable {i}", solids.tube(course, _CABLE_RADIUS * solids.size_of(robot)), tuple(colors[i]))
+        _add(scene, f"cable {i}", shapes.tube(course, _CABLE_RADIUS * shapes.size_of(robot)), tuple(colors[i]))
     scene.apply_transform(_Z_UP_TO_Y_UP)
     glb: bytes = scene.export(file_type="glb")
     return glb
 
 
-def _add(scene: Any, name: str, solid: solids.Solid, color: tuple[int, ...], place: Any = None) -> None:
+def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], place: Any = None) -> None:
     """Add a solid of a color to a scene of trimesh."""
     import trimesh
 

@@ -11,10 +11,10 @@ from sagline.core.arrays import Array
 from sagline.core.errors import SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer import solids
-from sagline.viewer.drawn import InMotion
+from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
+from sagline.viewer.player import InMotion
 from sagline.viewer.readout import headline
 from sagline.viewer.tension_scale import force_unit, number
 
@@ -78,7 +78,7 @@ class KeyboardFeature(Feature):
         """Build nothing; say what the picture is of."""
         channel, robot = page.channel, page.robot
         self._channel, self._go, self._go_home = channel, page.go_near, page.go_home
-        self._step = solids.round_below(STEP * solids.size_of(robot))
+        self._step = shapes.round_below(STEP * shapes.size_of(robot))
         self._pose: Pose | None = None
         channel.send("scene", {"what": described(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)})
         channel.on("nudge", self._on_nudge)

@@ -13,15 +13,14 @@ from sagline.core.errors import SaglineError
 from sagline.core.numbers import n
 from sagline.kinematics.status import PoseStatus
 from sagline.tension.singular import unresisted_motion
-from sagline.viewer import lines, solids
-from sagline.viewer.channel import chosen_by
+from sagline.viewer import shapes
 from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
 from sagline.viewer.features.tensions import SHARING
 from sagline.viewer.missing import Missing, NearestFeasible, missing_of, nearest_feasible
-from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
 from sagline.viewer.readout import block, definitions
-from sagline.viewer.robot_scene import INFEASIBLE
+from sagline.viewer.robot_scene import INFEASIBLE, Nodes
+from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import Snapshot, method_name
 from sagline.viewer.tension_scale import ForceUnit, force_unit, number
 
@@ -117,7 +116,7 @@ class MissingFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Draw nothing yet."""
         self._page, self._panel, self._nodes = page, page.panel, Nodes(page.server.scene)
-        self._body = solids.platform(page.robot)
+        self._body = shapes.platform(page.robot)
         self._task = BackgroundTask(page.later)
         self.missing: Missing | None = None  # at the pose that is shown
         self._key: Key = ()  # of the pose that is shown; () while it is feasible
@@ -181,7 +180,7 @@ class MissingFeature(Feature):
         text = f"held here, {distance_of(nearest)} away"
         nodes.label("/nearest/name", text, (0.0, 0.0, 0.0), "top-center", SMALL)
         ends = np.stack((snapshot.pose.position, nearest.pose.position))[None]
-        nodes.lines("/nearest_way", lines.segments(lines.straight(ends), dashed=True), FEASIBLE, LINE_WIDTH)
+        nodes.lines("/nearest_way", shapes.segments(shapes.straight(ends), dashed=True), FEASIBLE, LINE_WIDTH)
 
     def _draw_force(self, snapshot: Snapshot, missing: Missing | None) -> None:
         """Draw the missing force at the center of mass."""
@@ -205,7 +204,7 @@ class MissingFeature(Feature):
         points = snapshot.courses(1.0)[[each.cable for each in limits]]
         tensions = np.array([scale.low if each.lower else scale.high for each in limits])
         colors = np.repeat(scale.linear_colors(tensions), 2 * (points.shape[1] - 1), axis=0).reshape(-1, 2, 3)
-        nodes.lines("/limits", lines.segments(points, dashed=False), colors, WIDTH)
+        nodes.lines("/limits", shapes.segments(points, dashed=False), colors, WIDTH)
         for k, (each, cable) in enumerate(zip(limits, points, strict=True)):
             place = cable[round(ALONG[each.cable % len(ALONG)] * (len(cable) - 1))]
             nodes.label(f"/limits_names/{k}", each.name, place, "top-left", SMALL)

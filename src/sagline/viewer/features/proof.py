@@ -12,9 +12,9 @@ from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.features.missing import MissingFeature
-from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
 from sagline.viewer.readout import block, css_color, sentence, swatch
+from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import NONE, Color, cable_color, force_unit, number
 

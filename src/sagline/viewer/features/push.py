@@ -13,14 +13,14 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
-from sagline.viewer import solids
+from sagline.viewer import shapes
 from sagline.viewer.camera import Camera, camera_of, ray_distance, screen_point
 from sagline.viewer.feature import Feature, Reading, View
-from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, Reserve, push_response, semi_axes
 from sagline.viewer.readout import LATER, box, definitions, refused, sentence
-from sagline.viewer.solids import THINNEST, ball, readable
+from sagline.viewer.robot_scene import Nodes
+from sagline.viewer.shapes import THINNEST, ball, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
 
 COLOR: Final = (200, 60, 130)  # 3 : 1 on both backgrounds, none of those of platforms
@@ -99,7 +99,7 @@ class PushFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Build the folder."""
         self._page, self._size, self._nodes = page, page.size, Nodes(page.server.scene)
-        self.body, self._ball = solids.platform(page.robot), ball()
+        self.body, self._ball = shapes.platform(page.robot), ball()
         scale = page.scale
         self._stiffness = float(np.sqrt(scale.low * scale.high)) / (FAR * self._size)  # N/m of a drag
         self._hold: Hold | None = None

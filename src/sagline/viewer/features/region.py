@@ -13,24 +13,27 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
-from sagline.viewer.free_travel import NAMES, FreeTravel, free_directions, free_travel, travel_text
-from sagline.viewer.hull import (
+from sagline.viewer.page import Page
+from sagline.viewer.readout import LATER, block, refused, sentence
+from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
+from sagline.viewer.slices import MarginScale, Picture, picture_of
+from sagline.viewer.tension_scale import force_unit
+from sagline.viewer.workspace import (
     CELLS,
+    NAMES,
     REACH,
+    FreeTravel,
     Hull,
     Patch,
     WorkspaceQuery,
     draw_patches,
+    free_directions,
+    free_travel,
     margin_text,
     near_patches,
     region_hull,
+    travel_text,
 )
-from sagline.viewer.nodes import Nodes
-from sagline.viewer.page import Page
-from sagline.viewer.readout import LATER, block, refused, sentence
-from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST
-from sagline.viewer.slices import MarginScale, Picture, picture_of
-from sagline.viewer.tension_scale import force_unit
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Plane, Region, region_of, slice_of
 from sagline.workspaces.wrench_sets import WrenchBox

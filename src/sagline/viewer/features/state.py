@@ -17,7 +17,6 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.methods import QuadraticProgram
 from sagline.viewer.by_hand import ByHand
-from sagline.viewer.drawn import InMotion
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.link import (
     STEP,
@@ -32,6 +31,7 @@ from sagline.viewer.link import (
     shortest,
 )
 from sagline.viewer.page import Page, Source
+from sagline.viewer.player import InMotion
 from sagline.viewer.readout import block
 from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import number

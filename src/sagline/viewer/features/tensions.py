@@ -20,10 +20,10 @@ from sagline.tension.methods import MinimumNorm
 from sagline.tension.options import kernel_options, takes_default_kernel
 from sagline.tension.polygon import TensionPolygon
 from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
-from sagline.viewer.channel import chosen_by
 from sagline.viewer.feature import Feature, Reading, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import LATER, block, sentence
+from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import METHODS, Snapshot, method_name
 from sagline.viewer.tension_scale import force_unit, number
 

@@ -9,13 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagline.viewer import lines, solids
-from sagline.viewer.drawn import cable_segments
+from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
-from sagline.viewer.nodes import Nodes
 from sagline.viewer.page import Page
 from sagline.viewer.player import Played
-from sagline.viewer.robot_scene import GHOST, GHOST_WIDTH, NEAR
+from sagline.viewer.robot_scene import GHOST, GHOST_WIDTH, NEAR, Nodes, cable_segments
 from sagline.viewer.tension_scale import linear
 from sagline.viewer.timeline import COLORS, Track, timeline_message
 
@@ -37,7 +35,7 @@ class TimelineFeature(Feature):
         """Register the messages of browser/timeline.js."""
         player, channel = page.player, page.channel
         self._channel, self._player = channel, player
-        self._nodes, self._body = Nodes(page.server.scene), solids.platform(page.robot)
+        self._nodes, self._body = Nodes(page.server.scene), shapes.platform(page.robot)
         self._above = float(self._body.vertices[:, 2].max()) + NEAR * page.size
         self._played: Played | None = None  # of which the track is
         self._number = player.number
@@ -80,7 +78,7 @@ class TimelineFeature(Feature):
         if cable is None or cable >= view.snapshot.robot.cable_count:
             self._nodes.hide("/pointed")
         else:
-            points = lines.segments(view.snapshot.courses(sag_scale)[[cable]], dashed=False)
+            points = shapes.segments(view.snapshot.courses(sag_scale)[[cable]], dashed=False)
             self._nodes.lines("/pointed", points, _COLORS[cable % len(_COLORS)], _WIDTH)
 
     def tick(self) -> None:
