@@ -14,10 +14,11 @@ from sagline import InvalidValueError, vibration
 from sagline.viewer import readout, shapes
 from sagline.viewer.feature import BackgroundTask
 from sagline.viewer.features import FEATURES
-from sagline.viewer.features.modes import PERIOD, ModesFeature, mode_of
+from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.page import Page, home_pose
 from sagline.viewer.playback import Playback
 from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.swing import PERIOD, mode_of
 from sagline.viewer.tension_scale import TensionScale
 from tests.effort import best_rate
 from tests.plot import made

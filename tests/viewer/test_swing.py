@@ -6,8 +6,8 @@ import pytest
 import sagline as sl
 from sagline import vibration
 from sagline.viewer import shapes
-from sagline.viewer.features.modes import Swing, mode_of
 from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.swing import Swing, mode_of
 from tests.tiers import wide
 
 

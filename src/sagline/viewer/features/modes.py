@@ -4,35 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
 from html import escape
 from math import ceil, floor, log10
 from typing import Any, Final
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from sagline.core.arrays import Array
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
-from sagline.dynamics.vibration.mode_list import (
-    MASSLESS,
-    WITH_MASS,
-    ListedMode,
-    end_displacements,
-    listed_modes,
-    quasi_static_displacements,
-)
+from sagline.dynamics.vibration.mode_list import MASSLESS, ListedMode, listed_modes
 from sagline.dynamics.vibration.response import MOTIONS, ResponseCurves, response_curves
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.pose import Pose
-from sagline.statics.stiffness import modes
-from sagline.viewer import shapes
 from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import block, refused, sentence, waiting
 from sagline.viewer.server import chosen_by
+from sagline.viewer.swing import PERIOD, Swing, mode_of
 from sagline.viewer.tension_scale import number
 
 Place = Callable[[Array], Array]
@@ -142,72 +131,8 @@ def _row(mode: ListedMode, chosen: str) -> str:
     )
 
 
-DRAWN: Final = 0.035  # of the robot's size: largest displacement as drawn
-MOST_TURN: Final = 0.3  # rad: largest rotation of the platform as drawn
-ENERGY: Final = 1.0  # J, of the vibration that the drawing is compared with
-PERIOD: Final = 2.0  # s, of the motion as drawn
+RESTED: Final = 0.25  # s without a change before modes are computed
 DAMPING: Final = Damping(modal_damping=0.01)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Swing:
-    """Motion of a mode as it is drawn."""
-
-    mode: ListedMode
-    state: Equilibrium
-    factor: float  # drawn amplitude over that of an energy of one joule
-    motion: Array  # of the platform as drawn: displacement of the center of mass [m], rotation vector [rad], shape (6,)
-    rest: Array  # points of the cables at rest [m], shape (m, P, 3)
-    moved: Array  # their displacements as drawn [m], shape (m, P, 3)
-
-    @classmethod
-    def of(cls, vibration: Vibration, mode: ListedMode) -> Swing:
-        """Motion of one of the modes of a vibration."""
-        state, k = vibration.state, mode.number - 1
-        if mode.kind == WITH_MASS:
-            shape, cables = vibration.shape[:, k], shapes.resampled(vibration.cable_shape[k], shapes.POINTS)
-        else:
-            shape = modes(state).shape[:, k]
-            cables = quasi_static_displacements(state, end_displacements(state, shape[:, None])[..., 0], shapes.POINTS)
-        farthest = max(float(np.linalg.norm(cables, axis=-1).max()), float(np.linalg.norm(shape[:3])))
-        scale = DRAWN * shapes.size_of(state.one_robot) / farthest
-        scale = min(scale, MOST_TURN / max(float(np.linalg.norm(shape[3:])), 1e-12))
-        at_one_joule = np.sqrt(2.0 * ENERGY) / (2.0 * np.pi * mode.frequency)  # of unit modal mass
-        rest = shapes.courses(state.one_robot, state.pose, state, 1.0)
-        moved = np.zeros_like(rest)  # the points on the pulleys are at rest
-        moved[:, -shapes.POINTS :] = scale * cables
-        return cls(mode, state, scale / at_one_joule, scale * shape, rest, moved)
-
-    def pose(self, phase: float) -> Pose:
-        """Pose at a phase [rad], the equilibrium at 0."""
-        share, rest, center = np.sin(phase), self.state.pose, self.state.one_robot.center_of_mass
-        rotation = Rotation.from_rotvec(share * self.motion[3:]) * rest.rotation
-        place = rest.transform(center) + share * self.motion[:3] - rotation.as_matrix() @ center
-        return Pose(place, rotation)
-
-    def courses(self, phase: float) -> Array:
-        """Points of the cables at a phase [rad], shape (m, P, 3); their ends stay on the platform."""
-        courses = self.rest + np.sin(phase) * self.moved
-        gap = self.pose(phase).transform(self.state.one_robot.platform_anchors) - courses[:, -1]
-        share = np.zeros(courses.shape[1])
-        share[-shapes.POINTS :] = np.linspace(0.0, 1.0, shapes.POINTS)
-        return np.asarray(courses + share[:, None] * gap[:, None])
-
-    @property
-    def text(self) -> str:
-        """Factors of size and speed of the drawing."""
-        slower = PERIOD * self.mode.frequency
-        speed = f"{slower:.3g} times slower" if slower >= 1.0 else f"{1.0 / slower:.3g} times faster"
-        return f"drawn {self.factor:.2g} times as large as a vibration of {ENERGY:g} J, {speed}"
-
-
-def mode_of(vibration: Vibration, name: str) -> ListedMode | None:
-    """The mode of this name, "1" or "massless 1"; None where there is none."""
-    wanted = " ".join(name.split())
-    return next((mode for mode in listed_modes(vibration) if mode.name == wanted), None)
-
-
-RESTED = 0.25  # s without a change before modes are computed
 
 
 class ModesFeature(Feature):
