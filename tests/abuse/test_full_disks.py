@@ -119,5 +119,6 @@ def test_a_command_names_what_was_finished_and_removes_the_rest(
         assert first.startswith("Error: "), result.output
         assert "written" in first, result.output
         assert len(first) < LONGEST
-        told = more[0].removeprefix("Written before, and whole: ").removesuffix(" in out").split(", ") if more else []
-        assert sorted(told) == sorted(Path(path).name for path in there)
+        head, text = "Complete files before the error: ", more[0] if more else ""
+        named = text.removeprefix(head).removesuffix(" in out").split(", ") if text else []
+        assert sorted(named) == sorted(Path(path).name for path in there)

@@ -96,7 +96,7 @@ def test_an_interrupt_says_how_to_go_on(folder: Path, monkeypatch: pytest.Monkey
     result = sagline()
     assert result.exit_code == 130
     kept = len((folder / "front" / "evaluations.csv").read_text().splitlines()) - 1
-    assert f"{kept} robots " in result.stderr
+    assert f"{kept} evaluated robots " in result.stderr
     monkeypatch.undo()
     monkeypatch.chdir(folder)
     again = sagline("--json")

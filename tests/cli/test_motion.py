@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline import to_shape
 from sagline.cli.main import app
-from sagline.cli.values import damping_of
+from sagline.cli.values import quantity, ratio
 from tests.tiers import extended
 
 WAY = "durations: 1\nrate: 100\nwaypoints: [{position: [0, 0, 1.5]}, {position: [1, 0, 1.5]}]\n"
@@ -164,5 +164,5 @@ def test_a_map_of_the_test_box(folder: FilePath) -> None:
 
 
 def test_losses_may_be_given_in_percent_and_with_units() -> None:
-    damping = damping_of("2 ms", "0.1 N*s/m^2", "3 %")
-    np.testing.assert_allclose([damping.loss_time, damping.air_damping, damping.modal_damping], [2e-3, 0.1, 0.03])
+    losses = [quantity("2 ms", "--loss-time", "s"), quantity("0.1 N*s/m^2", "--air-damping", "N*s/m^2")]
+    np.testing.assert_allclose([*losses, ratio("3 %", "--damping")], [2e-3, 0.1, 0.03])

@@ -63,7 +63,7 @@ def test_large_forces_have_a_prefix_and_ordinary_spaces(folder: FilePath) -> Non
     plan = sl.inverse(robot, sl.Pose([0, 0, 2], np.eye(3)), wrench=[0, 0, -30000, 0, 0, 0])
     assert f" {float(plan.shortfall) / 1e3:.4g} kN; " in result.stderr
     result = sagline("article-suspended", "--pose", "0,0,2", "--no-figures")
-    assert "balance it: " in result.stdout
+    assert "balance: " in result.stdout
     assert "\u00a0" not in result.output
 
 
@@ -80,14 +80,14 @@ def test_the_polygon_is_that_of_the_load(folder: FilePath, monkeypatch: pytest.M
     assert not np.allclose(expected.vertices, sl.tension_polygon(robot, middle).vertices)
 
 
-def test_the_number_of_ways_in_the_help_is_that_of_the_table() -> None:
+def test_the_number_of_methods_in_the_help_is_that_of_the_table() -> None:
     from sagline.cli.tension import LEFT_OUT, tension
 
     methods = set(public_methods())
     alone = {name for name in methods if name not in LEFT_OUT}
     words = " ".join((tension.__doc__ or "").split())
     assert len(alone) == 9
-    assert "nine ways" in words
+    assert "nine tension distribution methods" in words
     assert len(methods) - len(alone) == 3
-    assert "Three ways" in words
+    assert "Three methods" in words
     assert all(name in words for name in methods - alone)

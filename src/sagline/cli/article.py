@@ -24,9 +24,9 @@ def article(
     folder: OutOption = Path("output"),
     as_json: JsonOption = False,
 ) -> None:
-    """Redo the article's figures, tables and errata, as one page: what it says beside what is computed.
+    """Redo the article's figures, tables and errata, as one page with its statements and the computed values.
 
-    Writes DIR/article.html, which needs nothing else, and DIR/article.json with the numbers.
+    The page is DIR/article.html, which needs no other file; DIR/article.json has the numbers.
 
     For example:
 

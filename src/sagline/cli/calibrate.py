@@ -1,4 +1,4 @@
-"""`sagline calibrate`: a robot's numbers from its readings, or the poses at which to read."""
+"""`sagline calibrate`: parameters of a robot from its log, or the poses to measure at."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rich.text import Text
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
-from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument, argument, flag, option
+from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument, argument, flag, option, quantity_option
 from sagline.cli.terminal import note, show, show_json, show_pieces, working
 from sagline.core.errors import FileError, InvalidValueError, printable
 from sagline.files.writing import check_files, create_folder, write_text
@@ -26,40 +26,29 @@ WHOLE: Final = ".nc"
 FIGURES: Final = (".png", ".svg", ".pdf")
 
 
-class Request(NamedTuple):
-    """The options of fitting and of choosing poses; deviations are texts by the names of the quantities."""
+class _Request(NamedTuple):
+    """The options of fitting and of choosing poses; the deviations are those of the sensors that the options give."""
 
     robot: str
     unknowns: tuple[str, ...]
-    deviations: dict[str, str | None]
+    deviations: dict[str, Any]
     files: tuple[Path, ...]
     plot: Path | None
 
-    def sensor_deviations(self) -> dict[str, Any]:
-        """The deviations that are given, by the names of the sensors' fields."""
-        from sagline.cli.values import quantity
-
-        units = {"length": "m", "tension": "N", "position": "m", "rotation": "rad"}
-        return {
-            f"{name}_deviation": quantity(text, f"--{name}-deviation", units[name], above=0.0)
-            for name, text in self.deviations.items()
-            if text is not None
-        }
-
     def check_files(self, suffixes: tuple[str, ...]) -> None:
-        """Refuse files of other kinds than these, the robot's own, and those that could not be written."""
+        """Reject files with other suffixes, the robot's own file, and files that cannot be written."""
         for file, allowed in [*((file, suffixes) for file in self.files), *[(self.plot, FIGURES)] * bool(self.plot)]:
             assert file is not None
             if file.suffix.lower() not in allowed:
                 kinds = ", ".join(allowed)
                 raise FileError(file, f"the suffix is {file.suffix or 'missing'}; allowed: {kinds}", "Choose one.")
             if file.resolve() == Path(self.robot).resolve():
-                raise FileError(file, "is the robot that is read: its comments would be lost", "Give another name.")
+                raise FileError(file, "is the robot that is read; its comments would be lost", "Give another name.")
             check_files(file.parent, [file.name])
 
 
-def _deviation(quantity: str) -> Any:
-    return option("NUMBER", f"Standard deviation of {quantity}. Default: what the log says.")
+def _deviation_option(quantity: str, unit: str) -> Any:
+    return quantity_option("NUMBER", f"Standard deviation of {quantity}. Default: that of the log.", unit, above=0.0)
 
 
 def calibrate(
@@ -67,14 +56,14 @@ def calibrate(
     log: Annotated[
         Path | None,
         argument(
-            "LOG", "CSV: one row a pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z where measured."
+            "LOG", "CSV: one row a pose; count_0, ... or length_0, ..., load_cell_0, ..., and x, y, z if measured."
         ),
     ] = None,
     out: Annotated[
         list[Path] | None,
         option(
             "FILE",
-            "The robot that was found, .yaml, or all that was found, .nc; may be given twice. With --plan: the "
+            "The calibrated robot, .yaml, or the whole result, .nc. The option can be repeated. With --plan: the "
             "poses, .yaml.",
             "--out",
         ),
@@ -83,28 +72,28 @@ def calibrate(
         str | None,
         option(
             "NAMES",
-            "What is looked for, with commas between. Default: "
+            "Unknown parameters, with commas between. Default: "
             "frame_anchors,length_zero,axial_stiffness,mass,center_of_mass.",
         ),
     ] = None,
-    length_deviation: Annotated[str | None, _deviation("a length off a drum, counted or given, '0.5 mm'")] = None,
-    tension_deviation: Annotated[str | None, _deviation("a load cell's reading, '5 N'")] = None,
-    position_deviation: Annotated[str | None, _deviation("a measured coordinate, '1 mm'")] = None,
-    rotation_deviation: Annotated[str | None, _deviation("a measured rotation, '1 mrad'")] = None,
-    folds: Annotated[int, option("NUMBER", "Parts of the poses that are predicted from the others; 0 for none.")] = 5,
-    robust: Annotated[bool, flag("Poses that do not fit the rest count less.", "--robust/--no-robust")] = True,
+    length_deviation: Annotated[float | None, _deviation_option("a length or counted length, '0.5 mm'", "m")] = None,
+    tension_deviation: Annotated[float | None, _deviation_option("a load cell's reading, '5 N'", "N")] = None,
+    position_deviation: Annotated[float | None, _deviation_option("a measured coordinate, '1 mm'", "m")] = None,
+    rotation_deviation: Annotated[float | None, _deviation_option("a measured rotation, '1 mrad'", "rad")] = None,
+    folds: Annotated[int, option("NUMBER", "Folds of the cross-validation; 0 for none.")] = 5,
+    robust: Annotated[bool, flag("Give outliers less weight.", "--robust/--no-robust")] = True,
     model: ModelOption = Model.CATENARY,
-    plot: Annotated[Path | None, option("FILE", "A figure of the fit: .png, .svg or .pdf.")] = None,
-    plan: Annotated[int | None, option("NUMBER", "Choose so many poses to measure, instead of a LOG.")] = None,
-    seed: Annotated[int, option("NUMBER", "Of the poses among which --plan chooses.")] = 0,
+    plot: Annotated[Path | None, option("FILE", "Figure of the fit: .png, .svg or .pdf.")] = None,
+    plan: Annotated[int | None, option("NUMBER", "Choose this number of poses to measure, instead of a LOG.")] = None,
+    seed: Annotated[int, option("NUMBER", "Seed of the candidate poses of --plan.")] = 0,
     as_json: JsonOption = False,
 ) -> int:
-    """Find what a robot's anchors, zeros and cables really are, from its own readings.
+    """Estimate anchors, zeros and cables of a robot from its own readings.
 
-    It stands at some poses; what encoders, load cells and perhaps a measuring system read there is in LOG. Told are the
-    numbers with their standard errors, what the readings leave open, and which do not fit. With --plan, before anybody
-    measures: the poses and tensions that tell most, and the errors to expect. Exit code 1 where the search did not
-    converge, or the fit says that model or deviations are wrong.
+    LOG has the readings of encoders, load cells and, if there is one, a measuring system at some poses. The result is
+    the parameters with their standard errors, the unobserved combinations, and the outliers. --plan chooses poses and
+    tensions before the measurement and predicts the errors. Exit code 1 if the fit did not converge, or contradicts the
+    model or the deviations.
 
     For example:
 
@@ -116,18 +105,19 @@ def calibrate(
 
     names = UNKNOWNS if unknowns is None else tuple(name.strip() for name in unknowns.split(","))
     deviations = {
-        "length": length_deviation,
-        "tension": tension_deviation,
-        "position": position_deviation,
-        "rotation": rotation_deviation,
+        "length_deviation": length_deviation,
+        "tension_deviation": tension_deviation,
+        "position_deviation": position_deviation,
+        "rotation_deviation": rotation_deviation,
     }
-    request = Request(robot, names, deviations, tuple(out or ()), plot)
+    known = {name: value for name, value in deviations.items() if value is not None}
+    request = _Request(robot, names, known, tuple(out or ()), plot)
     if plan is not None:
         return _plan_poses(request, plan, seed, log, as_json=as_json)
     return _fit(request, log, model.build(), folds, robust=robust, as_json=as_json)
 
 
-def _fit(request: Request, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
+def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
     """Calibrate, write and print the result; returns the exit code."""
     from sagline.calibration import parameters, summary
     from sagline.calibration.calibrate import calibrate
@@ -135,12 +125,12 @@ def _fit(request: Request, log: Path | None, model: CableModel, folds: int, *, r
     from sagline.files.robot_file import load_robot
 
     if log is None:
-        step = "Give the readings, or ask where to read: --plan 40."
+        step = "Give the readings, or choose poses with --plan 40."
         raise InvalidValueError("LOG", "missing", "a CSV file, or --plan", step)
     if log.suffix.lower() in (*ROBOTS, WHOLE):
-        raise FileError(log, "is no CSV file of readings", "Give what encoders and load cells read, winches.csv.")
+        raise FileError(log, "is no CSV file of readings", "Give the readings of encoders and load cells, winches.csv.")
     request.check_files((*ROBOTS, WHOLE))
-    robot, readings = load_robot(request.robot), _log(log, request.sensor_deviations())
+    robot, readings = load_robot(request.robot), _log(log, request.deviations)
     unknowns = parameters.checked_unknowns(request.unknowns)  # before anything is compiled
     with working(f"{robot.name}: calibrating from {len(readings):,} rows", FORWARD, STARTING_LENGTHS, READINGS) as line:
         found = calibrate(robot, readings, unknowns, model=model, robust=robust, folds=folds, progress=line.progress)
@@ -155,11 +145,11 @@ def _fit(request: Request, log: Path | None, model: CableModel, folds: int, *, r
         return 0
     note(f"{robot.name}: ", found.status.text, style="bold red")
     if found.status is CalibrationStatus.NOT_CONVERGED and len(files) < len(request.files):
-        note("", "No robot file is written of numbers that are none.")
+        note("", "No robot file is written, because the fit did not converge.")
     return OUTSIDE
 
 
-def _plan_poses(request: Request, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
+def _plan_poses(request: _Request, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
     """Choose poses, write and print them; returns the exit code."""
     from sagline.calibration import parameters, planning
     from sagline.calibration.log import Sensors
@@ -171,10 +161,10 @@ def _plan_poses(request: Request, count: int, seed: int, log: Path | None, *, as
             step = f"Leave out --plan, or {item}."
             raise InvalidValueError(item, f"given with --plan: {str(value)!r}", "one of the two", step)
     request.check_files(ROBOTS)
-    robot, given = load_robot(request.robot), request.sensor_deviations()
+    robot = load_robot(request.robot)
     unknowns = parameters.checked_unknowns(request.unknowns)  # before anything is compiled
     with working(f"{robot.name}: choosing {count:,} poses", INVERSE, READINGS) as line:
-        sensors = Sensors(**given) if given else None
+        sensors = Sensors(**request.deviations) if request.deviations else None
         chosen = calibration_poses(robot, count, unknowns, sensors, seed=seed, progress=line.progress)
         for file in request.files:
             create_folder(file.parent)
@@ -187,7 +177,7 @@ def _plan_poses(request: Request, count: int, seed: int, log: Path | None, *, as
     return 0
 
 
-def _log(file: Path, deviations: dict[str, Any]) -> WinchLog:
+def _log(file: Path, deviations: dict[str, float]) -> WinchLog:
     """The log; deviations on the command line replace those of its comments."""
     from sagline.files.log_file import load_log, sensors_of_comments
     from sagline.files.reading import read_text
@@ -195,11 +185,11 @@ def _log(file: Path, deviations: dict[str, Any]) -> WinchLog:
 
     if not deviations:
         return load_log(file)
-    said, _ = sensors_of_comments(read_text(file, TABLE_LIMIT), file)
-    return load_log(file, said.replace(**deviations))
+    sensors, _ = sensors_of_comments(read_text(file, TABLE_LIMIT), file)
+    return load_log(file, sensors.replace(**deviations))
 
 
-def _written(found: Calibration, request: Request, line: Any) -> list[Path]:
+def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
     """Write the robot if the search has converged, the whole result and the figure; returns the files."""
     from sagline.calibration.findings import CalibrationStatus
     from sagline.files.robot_file import dump_robot
@@ -239,12 +229,12 @@ def _tell_files(files: list[Path]) -> None:
 
 
 def _tell_offset(found: Calibration, files: list[Path]) -> None:
-    """Print a note on the zeros of lengths that were read, which no robot file keeps."""
+    """Print a note on the zeros of read lengths, which a robot file does not keep."""
     robots = [file.name for file in files if file.suffix.lower() in ROBOTS]
     if robots and found.length_offset.any():
         whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)
         kept = f"{whole} keeps it" if whole else "--out found.nc does"
-        text = "keeps no length_zero of lengths that were read, which is to be added to what the machine believes"
+        text = "has no length_zero for read lengths; it is to be added to the lengths of the machine"
         note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
 
 

@@ -1,4 +1,4 @@
-"""`sagline control`: the operator's place, line by line, while the cycles go on."""
+"""`sagline control`: the controller with the lines of an operator."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ if TYPE_CHECKING:
 
 def control(
     name: RobotArgument,
-    plc: Annotated[str, option("ADDRESS,...", "host or host:port of each group's PLC, in order.", "--plc")],
+    plc: Annotated[
+        str, option("ADDRESS,...", "Address, host or host:port, of the PLC of each group, in order.", "--plc")
+    ],
     modbus: ModbusOption = False,
-    shadow: Annotated[bool, flag("Read and log only: nothing is ever sent.", "--shadow")] = False,
-    log: Annotated[Path | None, option("FILE", "Write everything to an MCAP file, run.mcap.")] = None,
+    shadow: Annotated[bool, flag("Read and log only; nothing is sent.", "--shadow")] = False,
+    log: Annotated[Path | None, option("FILE", "Write the log to an MCAP file, run.mcap.")] = None,
 ) -> int:
-    """Be the controller: connect, home, follow paths, until quit.
+    """Control a machine: connect, home, follow paths, until quit.
 
-    It asks what to do, line by line: home, goto 0.2,-0.4,1.4, run path.yaml, jog 3 +5mm, pause, resume, stop, state,
-    ack, off, help. Lines from a pipe are done one after the other; the first that is refused ends it. Ctrl-C leads all
-    rates to zero and gives the machine back, exit code 130. Software is no safety function: have an emergency stop
-    wired in hardware.
+    The commands are lines: home, goto 0.2,-0.4,1.4, run path.yaml, jog 3 +5mm, pause, resume, stop, state, ack, off,
+    help. Lines from a pipe are executed one after the other; the first error ends the session. Ctrl-C stops all winches
+    and releases the machine, exit code 130. Software is no safety function: have an emergency stop wired in hardware.
 
     For example:
 

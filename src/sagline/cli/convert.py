@@ -1,4 +1,4 @@
-"""`sagline convert`: robots of other tools in, robot files and MuJoCo models out."""
+"""`sagline convert`: robot files and MuJoCo models from robots of other tools."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from sagline.cli.entries import FORWARD, INVERSE
-from sagline.cli.options import FileOption, argument, option
+from sagline.cli.options import FileOption, argument, option, quantity_option
 from sagline.cli.terminal import note, show_data, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
@@ -29,7 +29,7 @@ class Format(StrEnum):
     MJCF = "mjcf"
 
 
-LEAST = 1e-6  # m: a distance that is told is no smaller
+LEAST = 1e-6  # m: smallest distance that is printed
 ENDINGS = {Format.ROBOT: (".yaml", ".yml"), Format.MJCF: (".xml", ".mjcf")}
 
 
@@ -45,18 +45,20 @@ def convert(
         Format, option("FORMAT", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--format")
     ] = Format.ROBOT,
     linear_density: Annotated[
-        str | None, option("QUANTITY", "Mass of all cables per length, '65 g/m' for instance.")
+        float | None, quantity_option("QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m")
     ] = None,
-    axial_stiffness: Annotated[str | None, option("QUANTITY", "EA of all cables, '700 kN' for instance.")] = None,
-    cable_set: Annotated[str | None, option("NAME", "CASPR: which set of cables. Default: the file's own.")] = None,
+    axial_stiffness: Annotated[
+        float | None, quantity_option("QUANTITY", "Axial stiffness EA of all cables, for instance '700 kN'.", "N")
+    ] = None,
+    cable_set: Annotated[str | None, option("NAME", "CASPR: set of cables. Default: that of the file.")] = None,
     at: Annotated[
         tuple[str, str, str] | None,
-        option("X Y Z", "MuJoCo: where the platform starts, in m. Default: middle of the test box."),
+        option("X Y Z", "MuJoCo: initial position of the platform [m]. Default: middle of the test box."),
     ] = None,
 ) -> None:
     r"""Convert a robot of CASPR or WireX to a robot file, or any robot to a MuJoCo model.
 
-    What had to be assumed and what was lost is told on stderr, and stands in the robot file.
+    Assumptions and losses are printed on stderr and written into the robot file.
 
     For example:
 
@@ -75,7 +77,7 @@ def convert(
         raise FileError(out, f"is no name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --format.")
     if at is not None and form is Format.ROBOT:
         raise InvalidValueError(
-            "--at", "given for a robot file", "--format mjcf", "A robot file holds no pose: leave it out."
+            "--at", "given for a robot file", "--format mjcf", "A robot file has no pose: leave it out."
         )
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
@@ -111,20 +113,19 @@ def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
     return Imported(robot if cables is None else robot.replace(cables=cables), ())
 
 
-def _material(density: str | None, stiffness: str | None) -> Cable | None:
+def _material(density: float | None, stiffness: float | None) -> Cable | None:
     from sagline.cables.cable import Cable
-    from sagline.cli.values import quantity
 
     if density is None and stiffness is None:
         return None
     if density is None or stiffness is None:
         missing = "--linear-density" if density is None else "--axial-stiffness"
         raise InvalidValueError(missing, "missing", "both or none of the two", f"Add {missing}.")
-    return Cable(quantity(density, "--linear-density", "kg/m"), quantity(stiffness, "--axial-stiffness", "N"))
+    return Cable(density, stiffness)
 
 
 def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
-    """The model, and what it costs this robot that its tendons neither sag nor weigh."""
+    """The model, and the position error of tendons without sag and weight."""
     from sagline.cables.models import Elastic
     from sagline.files.mjcf import dump_mjcf
     from sagline.kinematics.confirm import confirm
@@ -132,7 +133,7 @@ def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
     from sagline.robot.pose import Pose
 
     if at is None and robot.test_box is None:
-        raise InvalidValueError("--at", "missing", "X Y Z in m", "Say where the platform starts.")
+        raise InvalidValueError("--at", "missing", "X Y Z in m", "Give the initial position of the platform.")
     position = at if at is not None else 0.5 * (robot.test_box.low + robot.test_box.high)  # type: ignore[union-attr]
     pose = Pose.from_euler(position, 0.0, 0.0, 0.0)
     with working(f"{robot.name}: planning and confirming one pose", INVERSE, FORWARD):

@@ -1,4 +1,4 @@
-"""`sagline design`: a search for better robots, its table, its files."""
+"""`sagline design`: a search for better robots."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from sagline.cli.entries import INVERSE, SIGNED_MARGINS, VIBRATION
 from sagline.cli.options import JsonOption, RobotArgument, argument, figures_flag, option
 from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.terminal import note, show, working
 
 if TYPE_CHECKING:
     from sagline.optimization.front import Front
@@ -20,18 +20,20 @@ MOST_ROWS: Final = 12  # of the table; front.csv has all
 
 def design(
     robot: RobotArgument,
-    file: Annotated[Path, argument("DESIGN", "What may change and what should be better, design.yaml.")],
-    out: Annotated[Path, option("DIR", "Folder for what is found; a search in it is gone on with.", "--out")] = Path(
+    file: Annotated[Path, argument("DESIGN", "Design variables with their bounds, and goals, design.yaml.")],
+    out: Annotated[Path, option("DIR", "Folder for the results; a search in it is continued.", "--out")] = Path(
         "front"
     ),
-    evaluations: Annotated[str | None, option("NUMBER", "Robots that are tried. Default: as the file says.")] = None,
-    figures: Annotated[bool, figures_flag("Draw what was tried and found, as PNG and SVG.")] = True,
+    evaluations: Annotated[
+        str | None, option("NUMBER", "Number of candidate robots. Default: that of the file.")
+    ] = None,
+    figures: Annotated[bool, figures_flag("Draw the candidates and the best robots, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> None:
-    r"""Search for a better robot: anchors, cables and limits that may change, and goals, stand in a file.
+    r"""Search for a better robot. A file has the design variables (anchors, cables, limits) and the goals.
 
-    Found robots are ordinary robot files; front.csv lists them. Whatever is rated is kept in the folder at once: after
-    Ctrl-C, or with more --evaluations, the same command goes on from there.
+    The best robots are ordinary robot files; front.csv lists them. Every evaluated robot is written to the folder at
+    once: after Ctrl-C, or with more --evaluations, the same command continues.
 
     For example:
 
@@ -41,7 +43,7 @@ def design(
     """
     from sagline.cli.values import whole_of
     from sagline.files.robot_file import load_robot
-    from sagline.optimization.design import design as searched
+    from sagline.optimization.design import design as search
     from sagline.optimization.file import load_design
     from sagline.optimization.front import FRONT
     from sagline.optimization.request import MOST_EVALUATIONS
@@ -51,16 +53,16 @@ def design(
         asked["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
     output = Output(out, [FRONT], [FIGURE] * figures)
     rated = [0]
-    with working(f"{first.name}: rating robots", *_needed(asked["goals"])) as line:
+    with working(f"{first.name}: evaluating robots", *_needed(asked["goals"])) as line:
 
-        def tell(done: int, total: int) -> None:
+        def show_progress(done: int, total: int) -> None:
             rated[0] = done
             line.progress(done, total)
 
         try:
-            front = searched(first, **asked, folder=out, progress=tell)
+            front = search(first, **asked, folder=out, progress=show_progress)
         except KeyboardInterrupt:
-            note("", f"{rated[0]:,} robots are rated, and kept in {out}: the same command goes on from there.")
+            note("", f"{rated[0]:,} evaluated robots are in {out}: the same command continues.")
             raise
         output.files = front.save(out)
         if figures:
@@ -68,12 +70,12 @@ def design(
 
             line.stage("drawing")
             output.draw(plot.front(front))
-    if as_json:
-        show_json({**_record(front), "files": output.files})
-        return
-    show_table(_table(front))
-    show(front.text)
-    output.show()
+
+    def tell() -> None:
+        show_table(_table(front))
+        show(front.text)
+
+    output.report(lambda: _record(front), tell, as_json=as_json)
 
 
 def _needed(goals: list[Goal]) -> tuple[str, ...]:
@@ -88,7 +90,7 @@ def _needed(goals: list[Goal]) -> tuple[str, ...]:
 
 
 def _table(front: Front) -> Grid:
-    """The first robot and those found: goals, then what has changed."""
+    """The first robot and the best robots: goals, then the design variables."""
     heads = ["", *(f"{goal.kind}\n[{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
     heads += [f"{part.name}\n[{part.unit}]" if part.unit else part.name for part in front.parts]
     rows = [[front.start.name, *_cells(front.start_values), *_cells([part.start for part in front.parts])]]

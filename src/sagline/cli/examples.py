@@ -1,4 +1,4 @@
-"""`sagline examples`: the files that the documentation's commands and the README's work with."""
+"""`sagline examples`: the files for the commands of the documentation."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ KINDS = (".py", ".yaml", ".csv", ".wcrfx")
 
 
 def examples(
-    folder: Annotated[Path, option("DIR", "Folder for the files; created if missing.", "--out")] = Path(
+    folder: Annotated[Path, option("DIR", "Folder for the files; it is created if missing.", "--out")] = Path(
         "sagline-examples"
     ),
     force: Annotated[bool, flag("Replace files that exist.", "--force")] = False,
 ) -> None:
-    """Write the files that the documentation's commands work with: a robot, a path, lengths, measurements, scripts.
+    """Write the files for the commands of the documentation: a robot, a path, lengths, measurements, scripts.
 
     For example:
 

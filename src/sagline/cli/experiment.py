@@ -1,4 +1,4 @@
-"""`sagline experiment`: the article's ten points, driven again."""
+"""`sagline experiment`: the article's experiment at ten points, repeated."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
 from sagline.cli.options import JsonOption, OutOption, SeedOption, argument, flag, option
+from sagline.cli.output import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.core.numbers import n
@@ -20,29 +21,29 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
 KNOWN: Final = ("article",)
-PARTS: Final = 1000  # of the whole, as progress is told
+PARTS: Final = 1000  # of the progress
 
 
 def experiment(
     name: Annotated[str, argument("NAME", "article: ten points, Table 2 and figures 25-27.")],
     waits: Annotated[
-        bool, flag("Let the twin's clock wait: half a minute instead of 14, and no network.", "--in-process")
+        bool, flag("Without real time and network: half a minute instead of 14 minutes.", "--in-process")
     ] = False,
     true: Annotated[
         str | None,
         option(
             "ROBOT",
-            "The robot as it really is, where that is another one; the controller still knows article-prototype.",
+            "The real robot if it differs; the controller still knows article-prototype.",
         ),
     ] = None,
     seed: SeedOption = "1",
     folder: OutOption = Path("output"),
     as_json: JsonOption = False,
 ) -> None:
-    """Do an experiment again: home, the ten points of Table 2, home, as one page beside the article's numbers.
+    """Repeat an experiment: home, the ten points of Table 2, home, as one page with the article's numbers.
 
     The controller drives a twin of the prototype in another process, over S7 and in real time, which takes 14 minutes.
-    Writes DIR/experiment.html, which needs nothing else, and DIR/experiment.json with the numbers.
+    The page is DIR/experiment.html, which needs no other file; DIR/experiment.json has the numbers.
 
     For example:
 
@@ -64,7 +65,7 @@ def experiment(
     nominal = load_robot(PROTOTYPE)
     real = nominal if true is None else load_robot(true)
     if real.cable_count != nominal.cable_count:
-        step = "Begin a robot file with base: article-prototype, and say what is other."
+        step = "Begin a robot file with base: article-prototype, and give the values that differ."
         raise InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
     check_files(folder, NAMES)
     how = _how(None if true is None else real.name, waits)
@@ -103,19 +104,21 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
 
 
 def _how(true: str | None, waits: bool) -> str:
-    machine = "a twin of the prototype as it was planned" if true is None else f"a twin of {true}"
-    way = "in one process, on a clock that waits" if waits else "over four S7 connections, in real time"
+    machine = "a twin of the prototype as planned" if true is None else f"a twin of {true}"
+    way = "in one process, not in real time" if waits else "over four S7 connections, in real time"
     return f"The controller drove {machine}, {way}; it knew the prototype of Table 1, with our anchors."
 
 
 def _tell(result: Experiment) -> None:
-    """The table, as wide as a small terminal."""
-    show("point   desired x, y, z [m]    article [mm]     ours [mm]")
     table = result.table
-    for k, point in enumerate(table.points):
-        place = ", ".join(f"{x:5.2f}" for x in table.desired[k])
-        show(f"{point:<6}  {place:<21}  {1e3 * table.distance[k]:12.1f}  {1e3 * result.distance[k]:12.3f}")
-    means = [1e3 * float(np.mean(each)) for each in (table.distance, result.distance)]
-    show(f"{'mean':<6}  {'':<21}  {means[0]:12.1f}  {means[1]:12.3f}")
+    places = [", ".join(written(x, ".2f") for x in place) for place in table.desired]
+    distances = zip(
+        (*table.distance, np.mean(table.distance)), (*result.distance, np.mean(result.distance)), strict=True
+    )
+    rows = [
+        [str(point), place, written(1e3 * theirs, ".1f"), written(1e3 * ours, ".3f")]
+        for point, place, (theirs, ours) in zip((*table.points, "mean"), (*places, ""), distances, strict=True)
+    ]
+    show_table(Grid(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows))
     took = n(result.duration / 60.0, ".1f", "min")
     show(f"It took {took}; the fastest winch had {n(1e3 * result.winch_speed, '.0f', 'mm/s')}.")

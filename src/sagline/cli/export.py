@@ -1,4 +1,4 @@
-"""`sagline export-c` and `sagline export-scl`: source for the microcontroller or the PLCs of a robot."""
+"""`sagline export-c` and `sagline export-scl`: source code for the microcontroller or the PLCs of a robot."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from sagline.cli.terminal import note, show, working
 
 def export_c(
     robot: RobotArgument,
-    out: Annotated[Path, option("FILE", "The source, sagline.c; header and SCL text stand beside it.", "--out")] = Path(
-        "sagline.c"
-    ),
+    out: Annotated[
+        Path, option("FILE", "The source, sagline.c; header and SCL file are written to the same folder.", "--out")
+    ] = Path("sagline.c"),
     single_precision: Annotated[
-        bool, flag("Single precision, for controllers that compute no other in hardware.", "--float")
+        bool, flag("Single precision, for controllers without double precision in hardware.", "--float")
     ] = False,
 ) -> None:
-    """Write C99 that finds a robot's tensions and lengths on a microcontroller, and a cable's length in SCL for a PLC.
+    """Write C99 for tensions and lengths of a robot on a microcontroller, and SCL for a cable's length on a PLC.
 
-    The source needs no heap and answers every call with a status; tensions are those of Closest or MinimumNorm. It
-    covers robots with two redundant cables and nothing behind their frame anchors.
+    The source needs no heap, and every call returns a status; tensions are those of Closest or MinimumNorm. The robot
+    must have two redundant cables and no routing beyond its frame anchors.
 
     For example:
 
@@ -37,18 +37,18 @@ def export_c(
     precision = "single" if single_precision else "double"
     note(f"{loaded.name}: ", f"{loaded.cable_count} cables, {loaded.motion_pattern}, {precision} precision")
     show(f"{source}: C99, the same for every robot; cc -std=c99 -O2 -c {source.name}", whole=True)
-    show(f"{header}: this robot's constants, and what is offered", whole=True)
-    show(f"{scl}: P3 in SCL for a Siemens PLC, which no compiler has seen yet", whole=True)
+    show(f"{header}: this robot's constants, and the declarations", whole=True)
+    show(f"{scl}: P3 in SCL for a Siemens PLC, not compiled yet", whole=True)
 
 
 def export_scl(
     robot: RobotArgument,
-    out: Annotated[Path, option("FILE", "The source.", "--out")] = Path("plc.scl"),
+    out: Annotated[Path, option("FILE", "The source file.", "--out")] = Path("plc.scl"),
 ) -> None:
-    """Write the PLCs' side of a robot as SCL source for TIA Portal: data blocks, limits, and the program of a group.
+    """Write SCL source for the PLCs of a robot, for TIA Portal: data blocks, limits, and the program of a group.
 
-    The program grants control to one controller at a time, keeps to the limits, and slows the winches down by itself
-    when commands stay away. No compiler has seen it; its head says what is to be set in the CPU.
+    The program grants control to one controller at a time, keeps to the limits, and slows the winches down when
+    commands are missing. It has not been compiled yet; its head lists the settings of the CPU.
 
     For example:
 
@@ -62,4 +62,4 @@ def export_scl(
     with working("", INVERSE):
         path = export_scl(loaded, out)
     groups = len(groups_of(loaded.cable_count))
-    show(f"{path}: SCL for the {groups} PLCs of {loaded.name}, which no compiler has seen yet", whole=True)
+    show(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)

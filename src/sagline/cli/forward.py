@@ -1,4 +1,4 @@
-"""`sagline forward`: from measured lengths or counts to the poses in which the platform rests."""
+"""`sagline forward`: poses of the platform from measured lengths or encoder counts."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from sagline.cli.options import (
     argument,
     flag,
 )
-from sagline.cli.output import Grid, csv_text, show_table, written
+from sagline.cli.output import Grid, Output, csv_text, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
-from sagline.files.writing import check_files, create_folder, write_text
+from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
     from sagline.files.measurements import Lengths
     from sagline.kinematics.forward_rows import ForwardSolution
     from sagline.robot.robot import Robot
 
-SHOWN = 12  # rows of the table on the terminal; the file has them all
+SHOWN = 12  # rows of the table on the terminal; the file has all of them
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
 Cell = float | str
 
 
 def forward(
     name: RobotArgument,
-    file: Annotated[Path, argument("CSV", "Columns L0, L1, ... and perhaps time; units in brackets: L0 [mm].")],
+    file: Annotated[Path, argument("CSV", "Columns L0, L1, ... and optionally time; units in brackets: L0 [mm].")],
     counts: Annotated[
-        bool, flag("The columns are C0, C1, ...: counts of the encoders of the robot's winches.", "--counts")
+        bool, flag("The columns are C0, C1, ...: encoder counts of the robot's winches.", "--counts")
     ] = False,
     model: ModelOption = Model.CATENARY,
     wrench: WrenchOption = None,
@@ -46,10 +46,10 @@ def forward(
     folder: OutOption = Path("output"),
     as_json: JsonOption = False,
 ) -> int:
-    """Find the poses in which the platform rests on cables of measured lengths.
+    """Find the poses of the platform from measured cable lengths.
 
-    The first sample needs no start; each other begins where the last one ended. Exit code 1 where a sample
-    ends in no stable equilibrium.
+    The first sample needs no initial pose; each later sample starts from the pose before it. Exit code 1 if a sample
+    has no stable equilibrium.
 
     For example:
 
@@ -57,33 +57,30 @@ def forward(
         sagline forward my_robot.yaml counts.csv --counts
     """
     from sagline.cli.values import robot_with
-    from sagline.files.pose_text import wrench_of
     from sagline.files.writing import file_stem
     from sagline.kinematics.forward import forward as solve
     from sagline.kinematics.status import ForwardStatus
 
-    load = wrench_of(wrench)
     robot = robot_with(name, payload)
     lengths = _counted(file, robot) if counts else _measured(file, robot)
-    target = folder / f"{file_stem(robot.name, 'poses')}.csv"
-    check_files(folder, [target.name])
+    table = f"{file_stem(robot.name, 'poses')}.csv"
+    output = Output(folder, [table])
     entry = FIT if model is Model.STRAIGHT else FORWARD
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
-        first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=load)
+        first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=wrench)
         start = first.pose if np.isfinite(first.pose.position).all() else None
-        found = solve(robot, lengths.unstrained_length, start, model.build(), load, progress=line.progress)
-    create_folder(folder)
+        found = solve(robot, lengths.unstrained_length, start, model.build(), wrench, progress=line.progress)
     rows = _rows(lengths, found)
-    write_text(target, csv_text(rows))
+    write_text(output.file(table), csv_text(rows))
     lost = [k for k, status in enumerate(found.status) if status not in (ForwardStatus.SOLVED, ForwardStatus.FITTED)]
     if as_json:
         header = [str(cell).split(" ")[0] for cell in rows[0]]
-        show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": target})
+        show_json({"poses": [dict(zip(header, row, strict=True)) for row in rows[1:]], "file": output.files[0]})
     else:
         show_table(_grid(rows))
         if len(rows) - 1 > SHOWN:
-            show(f"The first {SHOWN} of {len(rows) - 1:,} samples; the file has them all")
-        show(f"In {folder.resolve()}: {target.name}", whole=True)
+            show(f"The first {SHOWN} of {len(rows) - 1:,} samples; the file has all of them.")
+        output.show()
     if not lost:
         return 0
     status = ForwardStatus(int(found.status[lost[0]]))
@@ -106,7 +103,7 @@ def _counted(file: Path, robot: Robot) -> Lengths:
 
 
 def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:
-    """Header and one row a sample; the time if it was given."""
+    """Header and one row a sample; with the time if the file has it."""
     from sagline.kinematics.status import ForwardStatus
 
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}
@@ -120,7 +117,7 @@ def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:
 
 
 def _grid(rows: list[list[Cell]]) -> Grid:
-    """The first samples; each is named by its time, or by its number."""
+    """The first samples; the time or the number names each row."""
     header, body = [str(name) for name in rows[0]], rows[1 : SHOWN + 1]
     texts = [[cell if isinstance(cell, str) else written(cell, ".6g") for cell in row] for row in body]
     if not header[0].startswith("time"):

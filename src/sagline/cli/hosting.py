@@ -44,41 +44,24 @@ if TYPE_CHECKING:
     from sagline.viewer.feature import Reading
     from sagline.viewer.page import Page
 
-LATER = "trimesh"  # what the viewer loads when somebody asks for it
-ENTRY_OF = {  # by the names of the viewer's readings
+LATER = "trimesh"  # a package that the viewer loads when it is needed
+ENTRY_OF = {  # by the names of the viewer's readings, in the order in which they are compiled
+    "WORKSPACE": SIGNED_MARGINS,
     "MARGIN": MARGINS,
     "POLYGON": POLYGON,
     "SHARING": SHARING,
     "FREQUENCIES": VIBRATION,
-    "REST": FORWARD,
-    "MODES": ANSWERS,  # the modes, and the response
-    "SIMULATION": SIMULATION,
-    "WORKSPACE": SIGNED_MARGINS,
     "VERDICTS": VERDICTS,
+    "MODES": ANSWERS,  # the modes, and the response
+    "REST": FORWARD,
+    "SIMULATION": SIMULATION,
 }
-ORDER = (
-    SIGNED_MARGINS,  # where the platform may go is there with its cables
-    MARGINS,
-    POLYGON,
-    SHARING,
-    VIBRATION,
-    VERDICTS,
-    MODES,
-    ANSWERS,
-    FORWARD,
-    SIMULATION,
-)  # as they are looked at
-PATIENCE = 5.0  # s: how long the end may wait for a compilation
+ORDER = tuple(each for entry in ENTRY_OF.values() for each in ((MODES, entry) if entry == ANSWERS else (entry,)))
+PATIENCE = 5.0  # s: longest wait for a compilation at the end
 
 
 class Address(NamedTuple):
-    """Address of the page.
-
-    Attributes:
-        host: Address to listen on.
-        port: Port; 0 for any that is free.
-        browser: Whether to open one here.
-    """
+    """Address and port of the page, 0 for any free one, and True to open a browser here."""
 
     host: str
     port: int
@@ -86,11 +69,7 @@ class Address(NamedTuple):
 
 
 def check_viewer() -> None:
-    """Check that the packages of the viewer are installed.
-
-    Raises:
-        FileError: If one is not.
-    """
+    """Raise FileError if a package of the viewer is not installed."""
     try:
         import sagline.viewer.features  # noqa: F401
     except ModuleNotFoundError as error:
@@ -106,26 +85,19 @@ def serve(
     meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
     **page: Any,
 ) -> int:
-    """Serve a page until Ctrl-C; returns the exit code.
-
-    Args:
-        robot: The robot.
-        address: Where to listen.
-        meanwhile: What goes on beside the viewer, as long as it serves.
-        page: What is on the page, as `Page` takes it: played, wrench, pose, mode, found, source, beside.
-    """
+    """Serve a page until Ctrl-C, `meanwhile` around it; `page` is as `Page` takes it. Returns the exit code."""
     from sagline.viewer import server as web
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
 
     server = web.start_server(address.host, address.port, robot.name)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is how one ends, and no failure
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is the normal end
     try:
         url = web.url(server, address.host)
         show(f"{robot.name} is at {url}   (Ctrl-C stops it)", whole=True)
         if address.host not in ("127.0.0.1", "::1", "localhost"):
-            note("Note: ", "everyone who can reach this machine can look at it and drag it.", style="bold")
+            note("Note: ", "everyone who can reach this machine can see the page and drag the platform.", style="bold")
         readings = Readings()
         viewer = Page(server, FEATURES, robot, ready=readings.ready, **page)
         if address.browser and has_display():
@@ -145,11 +117,7 @@ def has_display() -> bool:
 
 
 class Readings:
-    """The readings of the viewer that need no compilation any more.
-
-    Attributes:
-        missing: Words of the entries that are still to be compiled.
-    """
+    """The readings of the viewer whose kernels are compiled; `missing` has the words of the other entries."""
 
     def __init__(self) -> None:
         """Find the entries that are not compiled."""
@@ -161,14 +129,11 @@ class Readings:
 
     @contextmanager
     def compiled_for(self, viewer: Page) -> Iterator[None]:
-        """Compile what is missing in another process while inside, and refresh the viewer after each entry.
-
-        The page shows only what the calling thread, which serves it, has to wait for.
-        """
+        """Compile the missing entries in another process while inside; the viewer is refreshed after each of them."""
         serving = threading.get_ident()
 
         def tell(stage: Stage) -> None:
-            if threading.get_ident() == serving:  # what is compiled beside makes nobody wait
+            if threading.get_ident() == serving:  # the page shows only what its own thread waits for
                 viewer.wait(first_run_text([stage]))
 
         ended = threading.Event()
@@ -198,7 +163,7 @@ class Readings:
                 if stage.finished and not ended.is_set():
                     side.move_kernels()
                     self._arrived(stage.words, viewer)
-        for name in self.missing:  # the other process failed: dragging is slow until it is made up for
+        for name in self.missing:  # the other process failed: dragging is slow until this is done
             if not ended.is_set():
                 ENTRIES[name].compile()
                 self._arrived(name, viewer)

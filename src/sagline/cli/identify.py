@@ -1,4 +1,4 @@
-"""`sagline identify`: what a measured cable weighs, how stiff it is, and the empirical model for it."""
+"""`sagline identify`: linear density, stiffness and empirical model of a measured cable."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import numpy as np
 
-from sagline.cli.options import JsonOption, argument, choice, flag, option
+from sagline.cli.options import JsonOption, argument, choice_option, flag, quantity_option
 from sagline.cli.output import Grid, show_table, written
 from sagline.cli.terminal import note, show, show_json, working
 from sagline.core.numbers import n
@@ -33,19 +33,23 @@ TOLERANCE = 5e-3  # m, of the position: the article's own is 6 mm
 
 def identify(
     file: Annotated[Path, argument("CSV", "Columns span, rise, length, tension; units in brackets: span [mm].")],
-    length_error: Annotated[str, option("LENGTH", "Standard error of a length, 0.002 or '2 mm'.")] = "0.001",
-    tension_error: Annotated[str, option("FORCE", "Standard error of a tension, 5 or '5 N'.")] = "1",
+    length_error: Annotated[
+        float, quantity_option("LENGTH", "Standard error of a length, 0.002 or '2 mm'.", "m", above=0.0)
+    ] = 0.001,
+    tension_error: Annotated[
+        float, quantity_option("FORCE", "Standard error of a tension, 5 or '5 N'.", "N", above=0.0)
+    ] = 1,
     tension_at: Annotated[
-        TensionPlace, choice("PLACE", "Where the tension is measured", TensionPlace)
+        TensionPlace, choice_option("PLACE", "Place of the tension measurement", TensionPlace)
     ] = TensionPlace.FRAME_END,
     offset: Annotated[
-        bool, flag("Find the zero of the lengths too, as one more unknown.", "--offset/--no-offset")
+        bool, flag("Estimate the zero of the lengths as another unknown.", "--offset/--no-offset")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Find what a measured cable weighs and how stiff it is, and the empirical model for it.
+    """Estimate linear density and axial stiffness of a measured cable, and its empirical model.
 
-    Standard errors and warnings say what the measurements do not determine or cannot tell apart.
+    Standard errors and warnings show the weakly identifiable parameters.
 
     For example:
 
@@ -53,17 +57,14 @@ def identify(
         sagline identify cable.csv --length-error "2 mm" --tension-at platform-end --offset
     """
     from sagline.article.identify_cable import UNITS, identify_cable
-    from sagline.cli.values import quantity
     from sagline.files.measurements import load_measurements
 
-    length_deviation = quantity(length_error, "--length-error", "m", above=0.0)
-    tension_deviation = quantity(tension_error, "--tension-error", "N", above=0.0)
     data = load_measurements(file)
     with working(f"{file.name}: identifying"):
         cable = identify_cable(
             *data,
-            length_error=length_deviation,
-            tension_error=tension_deviation,
+            length_error=length_error,
+            tension_error=tension_error,
             tension_at=cast(Any, tension_at.value.replace("-", "_")),
             unknowns=["linear_density", "axial_stiffness", *["length_offset"] * offset],
         )
@@ -79,7 +80,7 @@ def identify(
         rows.append([name, written(estimate.value, ".5g"), written(estimate.high - estimate.value, ".2g"), unit])
     heads = ["", "value", "standard error", "unit"]
     show_table(Grid(heads, rows, f"{len(data.span)} measurements", left=frozenset({0, 3})))
-    show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 if the errors are as given)")
+    show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 if the errors are right)")
     show(
         f"The empirical model with k_h, k_p keeps a position error of {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
         f"measured range from T_x = {n(model.tension_min(TOLERANCE), '.3g', 'N')} on."

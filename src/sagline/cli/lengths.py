@@ -1,4 +1,4 @@
-"""`sagline lengths` and `sagline encoder`: lengths and counts of a run, for `sagline forward` and controllers."""
+"""`sagline lengths` and `sagline encoder`: lengths and encoder counts of a run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Winding(StrEnum):
-    """Models of the cable that is wound on the drums."""
+    """Models of the cable on the drums."""
 
     CONSTANT = "constant"
     REMEMBERED = "remembered"
@@ -36,9 +36,9 @@ def lengths(
     file: RunArgument,
     out: FileOption = None,
 ) -> int:
-    """Take the planned lengths out of a run: a row a sample, as `sagline forward` reads them and controllers do.
+    """Write the planned lengths of a run as CSV: one row a sample, for `sagline forward` and controllers.
 
-    Rows are feasible ones; how many are not, and so are left out, is told on stderr (exit code 1).
+    Only feasible samples are written; stderr has the number of the others (exit code 1).
 
     For example:
 
@@ -54,16 +54,17 @@ def encoder(
         Winding,
         option(
             "WINDING",
-            "What lies on the drums: constant, cable at the winches' winding_tension; remembered, cable wound "
-            "along the run at the tension it had there.",
+            "Cable on the drums: constant, wound at the winches' winding_tension; remembered, wound along the run at "
+            "its tension there.",
         ),
     ] = Winding.CONSTANT,
     out: FileOption = None,
 ) -> int:
-    """Take the counts of the encoders out of a run: a row a sample, for the drives.
+    """Write the encoder counts of a run as CSV: one row a sample, for the drives.
 
-    The robot's winches must say drum_radius, groove_pitch, counts_per_turn and length_zero, its cables their diameter.
-    Rows are feasible ones. Exit code 1 where some are not, or winches would exceed their speed_limit or torque_limit.
+    The robot needs drum_radius, groove_pitch, counts_per_turn and length_zero of its winches, and the diameter of its
+    cables. Only feasible samples are written. Exit code 1 if others exist, or if winches exceed their speed_limit or
+    torque_limit.
 
     For example:
 
@@ -85,19 +86,12 @@ def encoder(
             samples = beyond.any(axis=1)
             first, cables = plan.path.time[np.argmax(samples)], ", ".join(map(str, np.flatnonzero(beyond.any(axis=0))))
             many = f"{samples.sum():,} of {samples.size:,} samples, the first at {first:g} s, of cables {cables}"
-            note(f"Beyond {limit}: ", f"{many}; winch_rates tells by how much", style="bold red")
+            note(f"Beyond {limit}: ", f"{many}; winch_rates has the values", style="bold red")
     return OUTSIDE if rates.exceeding.any() else code
 
 
 def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
-    """Write a column for each cable at the feasible samples, with their times; returns the exit code.
-
-    Args:
-        plan: The plan.
-        name: Of a column, with {} where the cable's number goes.
-        rows: Of all samples.
-        out: File to write; None for stdout.
-    """
+    """Write rows of all samples at the feasible ones, with times; `name` formats a column; returns the exit code."""
     kept = np.atleast_1d(plan.feasible)
     header = [name.format(k) for k in range(len(rows[0]))]
     body = [row for row, is_kept in zip(rows, kept, strict=True) if is_kept]
@@ -117,14 +111,14 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
 
 
 def _plan_of(file: Path, out: Path | None) -> Plan:
-    """The plan in a run; refused if no sample is feasible, or if the run would be overwritten."""
+    """The plan in a run; FileError if no sample is feasible, or if the run would be overwritten."""
     from sagline.files.plan_file import load_plan
 
     if out is not None and out.exists() and out.resolve() == file.resolve():
         raise FileError(out, "is the run itself", "Name another file with --out.")
     plan = load_plan(file)
     if not plan.feasible.any():
-        raise FileError(file, "has no feasible sample, and so no lengths", "Plan another path, or raise the limits.")
+        raise FileError(file, "has no feasible sample", "Plan another path, or raise the limits.")
     return plan
 
 

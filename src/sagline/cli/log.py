@@ -1,4 +1,4 @@
-"""`sagline log`: what a log of the controller holds, in numbers, and as a data set for other tools."""
+"""`sagline log`: contents of a log of the controller, printed or converted."""
 
 from __future__ import annotations
 
@@ -28,20 +28,19 @@ BAR: Final = 30  # characters of the longest bar
 
 
 def log(
-    file: Annotated[Path, argument("RUN.mcap", "A log, also one of a process that was killed.")],
+    file: Annotated[Path, argument("RUN.mcap", "A log; the process may have been killed.")],
     to: Annotated[
         Path | None,
         option(
             "FILE",
-            "Write it to this file and tell nothing else: .nc is a data set with the plan in it, .mcap a log "
-            "with its end.",
+            "Write the log to this file instead: .nc is a data set with the plan, .mcap a complete log.",
             "--to",
         ),
     ] = None,
-    plan: Annotated[str | None, option("NUMBER", "Only the cycles of one of its plans, from 0. Default: all.")] = None,
+    plan: Annotated[str | None, option("NUMBER", "Only the cycles of this plan, from 0. Default: all.")] = None,
     as_json: JsonOption = False,
 ) -> int:
-    """Tell what a log of the controller holds: states, largest errors, late cycles, events.
+    """Print the contents of a log of the controller: states, largest errors, late cycles, events.
 
     For example:
 
@@ -72,7 +71,7 @@ def log(
 def _tell(done: Execution) -> None:
     duration = _since(done, done.time[-1]) if len(done) else 0.0
     silent = int(np.count_nonzero(~done.answered))
-    show(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} of them without an answer.")
+    show(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} without an answer.")
     show(f"{done.status.name}: {done.reason or done.status.text}")
     show_table(Grid(["state", "time [s]", "cycles"], _states(done)))
     largest = [
@@ -83,9 +82,9 @@ def _tell(done: Execution) -> None:
     show_table(Grid(["cycles that began late by", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
     if done.events:
         rows = [_row(done, event) for event in done.events[:MOST_EVENTS]]
-        show_table(Grid(["at [s]", "what", "in words"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
+        show_table(Grid(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
     if len(done.events) > MOST_EVENTS:
-        show(f"… and {len(done.events) - MOST_EVENTS:,} events more: --to FILE.nc has them all.")
+        show(f"… and {len(done.events) - MOST_EVENTS:,} more events: --to FILE.nc has all of them.")
 
 
 def _since(done: Execution, time: float) -> float:

@@ -27,40 +27,40 @@ NAMES = (
 )
 MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # else of their names
 DEBUG = "--debug"
-MOST_NAMES = 6  # of files, told when something failed after them
+MOST_NAMES = 6  # of files that are listed after an error
 START = """\
 Cable robots whose cables sag: from a robot and a path to proven cable lengths.
 
 Start here:
 
     sagline run                          the article's test, with its figures
-    sagline robots                       the robots that come with it
-    sagline show ipanema-1               all values of one of them
+    sagline robots                       the preset robots
+    sagline show ipanema-1               all values of a robot
     sagline examples --out DIR           files to try the commands with
-    sagline track cogiro own_path.yaml   a robot along a path of your own
-    sagline forward cogiro lengths.csv   from measured lengths to poses
-    sagline tension cogiro               ways of sharing a load compared
-    sagline vibrate cogiro               how it swings, cables and all
-    sagline simulate cogiro --break 3@1s what comes when a cable breaks
-    sagline workspace cogiro             where it can work, and what limits it
+    sagline track cogiro own_path.yaml   a plan along a path of your own
+    sagline forward cogiro lengths.csv   poses from measured lengths
+    sagline tension cogiro               tension distribution methods compared
+    sagline vibrate cogiro               natural frequencies, with cable mass
+    sagline simulate cogiro --break 3@1s motion after a cable breaks
+    sagline workspace cogiro             workspace and its limits
     sagline sweep own_sweep.yaml         robots x poses x loads, on all cores
     sagline article                      the article redone, as one page
-    sagline view cogiro                  drag a platform in the browser
-    sagline share cogiro                 one page of it, to give away
-    sagline twin article-prototype       a machine to drive, over S7
-    sagline control article-prototype --plc ADDRESSES  drive it, line by line
-    sagline log run.mcap                 what it did, also after a crash
+    sagline view cogiro                  a platform to drag in the browser
+    sagline share cogiro                 a robot as one HTML page
+    sagline twin article-prototype       a simulated machine, over S7
+    sagline control article-prototype --plc ADDRESSES  a controller, line by line
+    sagline log run.mcap                 contents of a log, also after a crash
     sagline new my_robot.yaml            a robot of your own, by questions
-    sagline design cogiro design.yaml    a better one, by search
-    sagline calibrate winches_robot.yaml winches.csv  what it really is
+    sagline design cogiro design.yaml    a better robot, by search
+    sagline calibrate winches_robot.yaml winches.csv  parameters from a log
 """
 
 
 class Command(TyperCommand):
-    """A subcommand that refuses empty texts; its help names arguments without braces."""
+    """A subcommand that rejects empty texts; its help names arguments without braces."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse the arguments; an empty one is refused by its name: as a path it would mean the current folder."""
+        """Parse the arguments; an empty text is an error, because as a path it would mean the current folder."""
         if not ctx.resilient_parsing:  # which is the shell's, for completion
             given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
             parameter: Any  # typer has a kind of its own
@@ -81,7 +81,7 @@ class Command(TyperCommand):
 
 
 class Commands(Mapping[str, Command]):
-    """The subcommands by name; the module of each is imported when it is asked for."""
+    """The subcommands by name; the module of each is imported on demand."""
 
     def __getitem__(self, name: str) -> Command:
         """A subcommand."""
@@ -151,7 +151,7 @@ def _before(finished: Sequence[Path]) -> str:
     """Names of the files that were complete before an error."""
     names = ", ".join(file.name for file in finished[:MOST_NAMES])
     more = f" and {len(finished) - MOST_NAMES} more" if len(finished) > MOST_NAMES else ""
-    return f"Written before, and whole: {names}{more} in {finished[0].parent}"
+    return f"Complete files before the error: {names}{more} in {finished[0].parent}"
 
 
 def _print_version(wanted: bool) -> None:
@@ -168,7 +168,7 @@ def _help(text: str | None) -> str:
 
 @app.callback(
     help=_help(START),
-    epilog="Exit codes: 0 fine; 1 the path cannot be followed everywhere; 2 bad input, nothing written; "
+    epilog="Exit codes: 0 success; 1 the path is not feasible everywhere; 2 bad input, nothing written; "
     "70 a mistake in sagline; 130 Ctrl-C.",
 )
 def sagline(
@@ -176,7 +176,7 @@ def sagline(
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
     show_debug: Annotated[
-        bool, typer.Option(DEBUG, help="Show where an error happened; may stand after a command too.")
+        bool, typer.Option(DEBUG, help="Show the traceback of an error; allowed after a command too.")
     ] = False,
 ) -> None:
     """Define the options of all subcommands."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from sagline.robot.pose import Pose, PoseBox
     from sagline.robot.robot import Robot
 
-MIDDLE = 0.5  # of the frame's edges: where the feasible share is told
+MIDDLE = 0.5  # of the frame's edges: box of the printed feasible share
 GRID = 7  # poses along each edge of a box
 NEARLY_ALL = 0.95  # feasible poses of a box that the file recommends
 _BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # of the frame's edges, tried in this order
@@ -52,14 +52,14 @@ def new(
     cables: Annotated[str | None, option("NUMBER", "Number of cables, 6 to 8.")] = None,
     platform: Annotated[str | None, option("SIZE", 'Edges of the platform, "0.5 x 0.5 x 0.4 m".')] = None,
     mass: Annotated[str | None, option("MASS", 'Mass of the platform with its load, "30 kg".')] = None,
-    rope: Annotated[str | None, option("ROPE", f"What the cables are: {ROPE_NAMES}.")] = None,
+    rope: Annotated[str | None, option("ROPE", f"Rope of the cables: {ROPE_NAMES}.")] = None,
     diameter: Annotated[str | None, option("LENGTH", 'Diameter of the rope, "4 mm".')] = None,
     force: Annotated[bool, flag("Replace the file if it exists.", "--force")] = False,
-    look: Annotated[bool, flag("Look at it in the browser afterwards.", "--view")] = False,
+    look: Annotated[bool, flag("Show it in the browser afterwards.", "--view")] = False,
 ) -> int:
-    r"""Make a robot file of your own: asks for what no option says, checks it, explains it.
+    r"""Make a robot file of your own: the command asks for missing options, checks the robot and describes it.
 
-    Without a terminal, answers are the lines of the input; an empty line takes the default.
+    Without a terminal, the answers are the lines of the input; an empty line is the default.
 
     For example:
 
@@ -73,21 +73,21 @@ def new(
         "frame": frame, "layout": layout, "cables": cables, "platform": platform, "mass": mass, "rope": rope,
         "diameter": diameter,
     }  # fmt: skip
-    _refuse_existing(file, force=force)
+    _check_file(file, force=force)
     design, said = _answered(file.stem, answers)
     with working(f"checking {GRID**3} poses of each of a few boxes", INVERSE):
         robot, middle = _boxed(design)
     text = _header(said) + dump_robot(robot)
     made = parse_robot(text, file)
     write_text(file, text)
-    with working("looking at what came out"):
+    with working("checking the robot"):
         lines, share = _explained(made, design, middle)
     for line in lines:
         show(line)
     if share < NEARLY_ALL:
         note(
             "Advice: ",
-            "for more of it, try a larger platform, the other layout, a thicker rope or a lighter load.",
+            "for a larger share, try a larger platform, the other layout, a thicker rope or a lighter load.",
             style="bold",
         )
     for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
@@ -100,7 +100,7 @@ def new(
     return view_robot(made, file, Address("127.0.0.1", 8080, browser=True))
 
 
-def _refuse_existing(file: Path, *, force: bool) -> None:
+def _check_file(file: Path, *, force: bool) -> None:
     if file.suffix not in (".yaml", ".yml"):
         raise FileError(file, "is no name for a robot file", "Let it end in .yaml.")
     if file.exists() and not force:
@@ -108,7 +108,7 @@ def _refuse_existing(file: Path, *, force: bool) -> None:
 
 
 def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[str, str]]:
-    """The design and the answers it is made from; on a terminal a question with a wrong answer is asked again."""
+    """The design and its answers; on a terminal a question with a wrong answer is repeated."""
     asks = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
     said: dict[str, str] = {}
     for key, (question, default) in QUESTIONS.items():
@@ -132,7 +132,7 @@ def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[s
 
 
 def _read(key: str, question: str, default: str) -> str:
-    """An answer from a pipe or a file: a line, an empty one for the default."""
+    """An answer from a pipe or a file: a line; an empty line is the default."""
     line = "" if sys.stdin is None or sys.stdin.isatty() else sys.stdin.readline()
     if line:
         return line.strip() or default
@@ -143,7 +143,7 @@ def _read(key: str, question: str, default: str) -> str:
 
 
 def _design(name: str, said: dict[str, str]) -> Design:
-    """The design from the answers so far; valid values stand for those that are not known yet."""
+    """The design from the answers so far; valid values replace those that are not known yet."""
     from sagline.cables.rope import ROPES
     from sagline.cli.values import quantity
     from sagline.robot.design import COUNTS, LAYOUTS, Design
@@ -161,7 +161,7 @@ def _design(name: str, said: dict[str, str]) -> Design:
         layout=layout,
     )
     if len(said) == len(QUESTIONS):
-        design.robot()  # now that all is known: whether the rope carries the platform
+        design.robot()  # checks that the rope carries the platform
     return design
 
 
@@ -188,7 +188,7 @@ def _edges(text: str, item: str) -> Array:
 
 
 def _boxed(design: Design) -> tuple[Robot, Plan]:
-    """The robot with the largest box of poses of which nearly all are feasible, and the plan of its middle."""
+    """The robot with the largest box of nearly feasible poses, and the plan of the middle of its frame."""
     from sagline.kinematics.inverse import inverse
 
     robot = design.robot()

@@ -1,4 +1,4 @@
-"""Arguments and options that several subcommands share, and the choices that options offer."""
+"""Arguments and options of the subcommands: how they are declared, and those that several of them share."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Model(StrEnum):
 
 
 class Variable(StrEnum):
-    """Tensions in which the load can be shared."""
+    """Tensions between which a tension distribution is optimal."""
 
     CHORD = "chord"
     HORIZONTAL = "horizontal"
@@ -39,7 +39,7 @@ class Variable(StrEnum):
 
 
 class Tension(StrEnum):
-    """Ways of sharing the load, with their default options."""
+    """Tension distribution methods, with their default options."""
 
     CLOSEST = "closest"
     MINIMUM_NORM = "minimum-norm"
@@ -54,14 +54,14 @@ class Tension(StrEnum):
     POLYGON_WALK = "polygon-walk"
 
     def build(self, variable: Variable) -> TensionMethod:
-        """The method, in that tension."""
+        """The method for a tension."""
         from sagline.tension.methods import METHODS
 
         return METHODS[self.value.title().replace("-", "")](variable.value)
 
 
 def robot_completions(incomplete: str) -> list[str]:
-    """Presets and robot files that begin so, for the shell."""
+    """Presets and robot files that begin with a text, for the shell."""
     from glob import escape, glob
 
     from sagline.robot.catalogue import robot_names
@@ -80,9 +80,27 @@ def option(metavar: str, text: str, *names: str) -> Any:
     return typer.Option(*names, metavar=metavar, help=text)
 
 
-def choice(metavar: str, text: str, choices: type[StrEnum]) -> Any:
-    """An option whose value is one of a few words, which its help lists."""
-    return typer.Option(metavar=metavar, help=f"{text}: {', '.join(each.value for each in choices)}.")
+def converted_option(metavar: str, text: str, function: str, *names: str, **arguments: object) -> Any:
+    """An option whose value a function of `sagline.cli.values` makes from its text, its name and further arguments."""
+
+    def converted(parameter: typer.CallbackParam, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value  # the default
+        from sagline.cli import values
+
+        return getattr(values, function)(value, parameter.opts[-1], **arguments)
+
+    return typer.Option(*names, metavar=metavar, help=text, parser=_unchanged, callback=converted)
+
+
+def quantity_option(metavar: str, text: str, unit: str, *names: str, **limits: float) -> Any:
+    """An option whose value is a number in SI or a text with a unit: from `low` on, or above `above`."""
+    return converted_option(metavar, text, "quantity", *names, unit=unit, **limits)
+
+
+def choice_option(metavar: str, text: str, choices: type[StrEnum]) -> Any:
+    """An option whose value is one of a few words; its help lists them."""
+    return option(metavar, f"{text}: {', '.join(each.value for each in choices)}.")
 
 
 def flag(text: str, *names: str) -> Any:
@@ -91,39 +109,56 @@ def flag(text: str, *names: str) -> Any:
 
 
 def figures_flag(text: str) -> Any:
-    """`--figures/--no-figures`; the text says what is drawn."""
+    """`--figures/--no-figures`."""
     return flag(text, "--figures/--no-figures")
+
+
+def _unchanged(value: Any) -> Any:
+    """The value: a callback converts it, because an error of a parser would lose its form."""
+    return value
 
 
 RobotArgument = Annotated[
     str, argument("ROBOT", "A preset (see sagline robots) or a robot file, robot.yaml.", robot_completions)
 ]
-OutOption = Annotated[Path, option("DIR", "Folder for the files; created if missing.", "--out")]
+OutOption = Annotated[Path, option("DIR", "Folder for the files; it is created if missing.", "--out")]
 FileOption = Annotated[Path | None, option("FILE", "File to write. Default: stdout.", "--out")]
 JsonOption = Annotated[bool, flag("Print the numbers as JSON and nothing else on stdout.", "--json")]
-ModelOption = Annotated[Model, choice("MODEL", "Cable model", Model)]
-VariableOption = Annotated[Variable, choice("VARIABLE", "The tension in which it is shared", Variable)]
+ModelOption = Annotated[Model, choice_option("MODEL", "Cable model", Model)]
+VariableOption = Annotated[Variable, choice_option("VARIABLE", "Tension that the method distributes", Variable)]
 WrenchOption = Annotated[
-    str | None,
-    option(
+    Any,
+    converted_option(
         "FX,FY,FZ[,MX,MY,MZ]",
-        "Force [N] and moment [N m] that act on the platform besides its weight: at its center of mass, along "
-        "the world's axes.",
+        "Force [N] and moment [N m] on the platform besides its weight, about its center of mass, along the world's "
+        "axes.",
+        "wrench_of",
     ),
 ]
 PayloadOption = Annotated[
-    str | None,
-    option("MASS", "Mass that the platform carries besides its own, 20 or '20 kg'; its inertia grows in proportion."),
-]
-PoseOption = Annotated[
-    str | None,
-    option(
-        "X,Y,Z[,A,B,C]",
-        "Position [m] and angles about z, y, x [degrees]. Default: the middle of the robot's test box.",
+    float | None,
+    quantity_option(
+        "MASS",
+        "Mass that the platform carries besides its own, 20 or '20 kg'. The inertia grows in proportion.",
+        "kg",
+        low=0.0,
     ),
 ]
-TensionOption = Annotated[Tension, choice("METHOD", "How the load is shared among redundant cables", Tension)]
-LossTimeOption = Annotated[str, option("TIME", "Loss time [s] of the cables' stretch: EA (1 + i omega TIME).")]
-AirDampingOption = Annotated[str, option("NUMBER", "Force of the air on a cable over its velocity, a meter [N s/m^2].")]
-ModbusOption = Annotated[bool, flag("Speak Modbus TCP instead of S7.", "--modbus")]
-SeedOption = Annotated[str, option("NUMBER", "Of the load cells' noise.")]
+PoseOption = Annotated[
+    Any,
+    converted_option(
+        "X,Y,Z[,A,B,C]",
+        "Position [m] and angles about z, y, x [degrees]. Default: middle of the robot's test box.",
+        "pose_of",
+    ),
+]
+TensionOption = Annotated[Tension, choice_option("METHOD", "Tension distribution method", Tension)]
+LossTimeOption = Annotated[
+    float, quantity_option("TIME", "Loss time [s] of the cables' stretch: EA (1 + i omega TIME).", "s", low=0.0)
+]
+AirDampingOption = Annotated[
+    float,
+    quantity_option("NUMBER", "Air damping of a cable per length and velocity [N s/m^2].", "N*s/m^2", low=0.0),
+]
+ModbusOption = Annotated[bool, flag("Use Modbus TCP instead of S7.", "--modbus")]
+SeedOption = Annotated[str, option("NUMBER", "Seed of the load cells' noise.")]

@@ -1,9 +1,9 @@
-"""Tables that the commands print, of which no cell is ever cut, tables as CSV, and the files that they write."""
+"""Tables that the commands print and write as CSV, and the files that they write."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
 from itertools import pairwise
@@ -18,7 +18,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from sagline.cli.terminal import FREE, show, show_pieces
+from sagline.cli.terminal import FREE, show, show_json, show_pieces
 from sagline.core.errors import printable
 from sagline.files.writing import check_files, create_folder
 
@@ -31,14 +31,14 @@ SUFFIXES = ("png", "svg")  # of a figure
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """A table of texts that is split between columns where it would not fit.
+    """A table of texts; it is split between columns where it is too wide, and no cell is ever cut.
 
     Attributes:
-        heads: What stands over each column; in lines, if need be.
+        heads: Heads of the columns; they may have lines.
         rows: A text for each column.
-        title: Over the whole; "" for none.
-        keys: How many of the first columns say what a row is: they are repeated in each piece.
-        left: Numbers of the columns that are set flush left; the others flush right.
+        title: Title of the table; "" for none.
+        keys: Number of first columns that name a row; they are repeated in each piece.
+        left: Numbers of the columns that are set flush left; the others are flush right.
         prose: Numbers of the columns that may be broken into lines, between words.
     """
 
@@ -50,18 +50,10 @@ class Grid:
     prose: frozenset[int] = field(default=frozenset())
 
     def pieces(self, console: Console, width: int) -> list[tuple[Table, int]]:
-        """In as few pieces as fit, all of about the same number of columns.
-
-        Args:
-            console: Where they go.
-            width: Columns of it.
-
-        Returns:
-            Each table, and the columns that it needs for nothing in it to be cut.
-        """
+        """The fewest pieces that fit a width, with about the same number of columns, each with its least width."""
         full = self._filled(console, width)
         even = list(_split(range(self.keys, len(self.heads)), len(full)))
-        for parts in (even, full):  # evenly, if that takes no more pieces
+        for parts in (even, full):  # evenly, if that needs no more pieces
             tables = [self._table([*range(self.keys), *part], first=part[0] == self.keys) for part in parts]
             pieces = [(table, _least(console, table)) for table in tables]
             if all(least <= width for _, least in pieces):
@@ -69,7 +61,7 @@ class Grid:
         return pieces
 
     def _filled(self, console: Console, width: int) -> list[range]:
-        """Consecutive columns, as many in each piece as fit; one where not even one does."""
+        """Consecutive columns, as many in each piece as fit, at least one."""
         parts, first, count = [], self.keys, len(self.heads)
         while first < count:
             end = first + 1
@@ -117,49 +109,35 @@ def _split(columns: range, count: int) -> Iterable[range]:
 
 
 def written(number: float, form: str) -> str:
-    """A number with a true minus sign, or a dash where there is none."""
+    """A number with a true minus sign; a dash for NaN."""
     return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no minus zero
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
-    """The text of a CSV file: with units in brackets, every number to the last bit.
-
-    Args:
-        rows: The names of the columns, with units in brackets; then floats of Python, which are written to the last
-            bit, and words.
-    """
+    """The text of a CSV file: names of the columns with units in brackets, then rows; floats keep their last bit."""
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 
 class Output:
-    """The files that a command writes into a folder; it ends before any work where one could not be written."""
+    """The files that a command writes into a folder; the command fails before any work if one cannot be written."""
 
     def __init__(self, folder: Path, names: Iterable[str], figures: Sequence[str] = ()) -> None:
-        """Check that all files can be written.
-
-        Args:
-            folder: The folder; made when the first file is written.
-            names: Names of the files that are no figures.
-            figures: Names of the figures, without suffix; each is written as PNG and SVG.
-
-        Raises:
-            FileError: If the folder or the place of a file is taken.
-        """
+        """Check that all files can be written; figures are names without suffix, each is written as PNG and SVG."""
         self.folder, self.files = folder, list[Path]()
         self._figures = list(figures)
         if every := [*names, *(f"{name}.{suffix}" for name in figures for suffix in SUFFIXES)]:
             check_files(folder, every)
 
     def file(self, name: str) -> Path:
-        """The path of a file that is about to be written."""
+        """Path of a file that is about to be written; the folder is created if missing."""
         create_folder(self.folder)
         self.files.append(self.folder / name)
         return self.files[-1]
 
     def draw(self, *figures: Figure | Axes) -> None:
-        """Save figures under the names that were checked, in their order."""
+        """Save figures under the checked names, in their order."""
         from sagline.plot import save
 
         for figure in figures:
@@ -167,8 +145,18 @@ class Output:
             for suffix in SUFFIXES:
                 save(figure, self.file(f"{name}.{suffix}"))
 
+    def report(self, record: Callable[[], Mapping[str, object]], tell: Callable[[], None], *, as_json: bool) -> None:
+        """Print a record and the files as JSON, or what `tell` prints and the files for a person."""
+        if as_json:
+            show_json({**record(), "files": self.files})
+        else:
+            tell()
+            self.show()
+
     def show(self) -> None:
-        """Print the folder and the names of what was written in it; the two forms of a figure as one."""
+        """Print the folder and the names of the files in it; the two forms of a figure are one name."""
+        if not self.files:
+            return
         suffixes: dict[str, list[str]] = {}
         for file in self.files:
             suffixes.setdefault(file.stem, []).append(file.suffix)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
     from sagline.robot.winch import Winch
 
-WHOLE = {  # fields and their units; one value, or one that holds for all cables
+WHOLE = {  # fields of the robot and their units
     "motion_pattern": "",
     "plane_normal": "",
     "mass": "kg",
@@ -41,7 +41,7 @@ PER_CABLE = (*MATERIAL, "tension_min", "tension_max")
 
 
 def robots(as_json: JsonOption = False) -> None:
-    """List the robots that come with sagline."""
+    """List the preset robots."""
     from sagline.files.robot_file import load_robot
     from sagline.robot.catalogue import robot_names
 
@@ -56,7 +56,9 @@ def robots(as_json: JsonOption = False) -> None:
         for frame, platform in [(_frame(robot), _platform(robot))]
     ]
     show_table(Grid(heads, rows, left=frozenset({0, 2, 4, 5})))
-    show_text("Frame: length × width × height over the floor. Where a source gives no size, what the anchors span.")
+    show_text(
+        "Frame: length × width × height over the floor. Without a size in the source: size of the box of the anchors."
+    )
     show_text("")
     for robot in robots:
         show_text(robot.name, style="bold")
@@ -64,7 +66,7 @@ def robots(as_json: JsonOption = False) -> None:
 
 
 def show(name: RobotArgument, as_json: JsonOption = False) -> None:
-    """Show every value of a robot with its unit; what its source does not give is marked, with the reason.
+    """Show every value of a robot with its unit; assumed values are marked, with the reason.
 
     For example:
 

@@ -1,4 +1,4 @@
-"""`sagline run`: the article's test, both simulated robots along its path."""
+"""`sagline run`: the article's simulated robots along its path."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 ROBOTS = ("article-suspended", "article-mixed")
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
-HULLS = ("hull-suspended", "hull-mixed")  # the article's future work: where its robots can work, with sag
+HULLS = ("hull-suspended", "hull-mixed")  # workspaces with sag, the article's future work
 CELLS = 20  # along the longest edge of the frame: half a second a robot, volumes to 0.2 %
 
 
 def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     """Run the article's test: both simulated robots, its empirical model and the exact one, figures 18 to 22.
 
-    Tensions are the least norm of the horizontal tensions T_x, as the article's figures show them.
+    The tension distribution is the least norm of the horizontal tensions T_x, as in the article's figures.
     """
     from sagline.cables.models import Catenary, Empirical
     from sagline.cli.study import run_along, run_name, tell
@@ -36,8 +36,8 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     from sagline.workspaces.workspace import workspace
 
     models = Empirical(), Catenary()
-    # The article describes (55), closest to the tensions before, but shows lower cables near their minimum wherever
-    # they are not needed and curves that return to where they began: that is the least norm, in its variable T_x.
+    # The article describes (55), closest to the previous tensions, but its figures show lower cables near their minimum
+    # and curves that return to their start: this is the least norm of T_x.
     tension = MinimumNorm("horizontal")
     robots = [load_robot(name) for name in ROBOTS]
     plans = [f"{run_name(robot, model)}.nc" for robot in robots for model in models]
@@ -46,7 +46,7 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     with working("planning and confirming the article's path", INVERSE, FORWARD) as line:
         for robot in robots:
             runs += [run_along(robot, path, model, tension, line) for model in models]
-    with working("where both robots can work", SIGNED_MARGINS) as line:
+    with working("workspaces of both robots", SIGNED_MARGINS) as line:
         spaces = [workspace(robot, cells=CELLS, progress=line.progress) for robot in robots]
     with working("writing runs, hulls and figures"):
         from sagline import plot
@@ -61,7 +61,7 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
         show(f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions.")
         for space in spaces:
             name, mass = space.robot.name, space.robot.mass
-            show(f"{name} can work in {amount_of(space)} of its frame, level, bearing its {mass:g} kg.")
+            show(f"The workspace of {name} in its frame is {amount_of(space)}, level, with its {mass:g} kg.")
     return tell(runs, output, as_json=as_json)
 
 

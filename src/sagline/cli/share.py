@@ -1,4 +1,4 @@
-"""`sagline share`: a robot, or a run of it, as one page to give away."""
+"""`sagline share`: a robot or a run as one HTML page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sagline.share.course import Course
 
 ENDINGS: Final = (".html", ".htm")
-HEAD: Final = 2000  # bytes of a page, in which it says who made it
+HEAD: Final = 2000  # bytes of a page that have its mark
 
 
 def share(
@@ -24,17 +24,19 @@ def share(
         str,
         argument(
             "WHAT",
-            "A run, a simulation, run.nc, or a log of the controller, run.mcap: it plays. A preset (see sagline "
-            "robots) or a robot file, robot.yaml: its platform can be dragged.",
+            "A run or a simulation, run.nc, or a log of the controller, run.mcap: the page plays it. A preset (see "
+            "sagline robots) or a robot file, robot.yaml: the platform can be dragged.",
             robot_completions,
         ),
     ],
-    out: Annotated[Path | None, option("FILE.html", "Default: its name, here: run.html.", "--out")] = None,
+    out: Annotated[
+        Path | None, option("FILE.html", "File to write. Default: run.html or ROBOT.html here.", "--out")
+    ] = None,
 ) -> None:
-    """Make one page of a robot or a run, that needs no server and no network: for a phone, a mail, a lecture.
+    """Make one HTML page of a robot or a run that needs no server and no network: for a phone, a mail, a lecture.
 
-    A run plays, a robot can be dragged; the page itself computes how the cables hang. The picture turns by mouse, touch
-    and keys. The file is of some 80 kB, and 150 kB more for a minute of run.
+    A run is played, a robot can be dragged; the page computes the catenaries itself. The view turns by mouse, touch and
+    keys. The file has about 80 kB, and 150 kB more for each minute of a run.
 
     For example:
 
@@ -65,7 +67,7 @@ def share(
 
 
 def _found(source: Path) -> Robot | Course:
-    """A robot, or what is to be played."""
+    """A robot, or a run to play."""
     from sagline.files.calibration_file import FORMAT as CALIBRATION
     from sagline.files.calibration_file import load_calibration
     from sagline.files.netcdf import is_of
@@ -99,12 +101,12 @@ def _log(source: Path) -> Course:
         raise FileError.not_installed(error.name, "A page of a log needs it", "viewer") from None
     session = LogFollower(source).more()
     if session is None:
-        raise FileError(source, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+        raise FileError(source, "has no cycle", "Record at least one cycle.")
     return of_session(session)
 
 
 def _free(file: Path) -> Path:
-    """A name that nobody chose is not taken from a page of somebody else's."""
+    """The default file; FileError if it exists and is no page of sagline."""
     from sagline.share.page import MADE
 
     check_file(file)

@@ -1,4 +1,4 @@
-"""`sagline simulate`: a robot along a path in time, as it vibrates, with cables that may break."""
+"""`sagline simulate`: the motion of a robot along a path in time, with vibration and breaking cables."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ import re
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
-
-import numpy as np
 
 from sagline.cli.entries import CHAINS, SIMULATION, SIMULATION_OVER_PULLEYS, VIBRATION, needed_for
 from sagline.cli.options import (
@@ -21,22 +19,23 @@ from sagline.cli.options import (
     Variable,
     WrenchOption,
     argument,
-    choice,
+    choice_option,
     figures_flag,
     option,
+    quantity_option,
 )
 from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.terminal import note, show, working
 from sagline.cli.track import check_unit
 from sagline.core.errors import FileError, InvalidValueError
-from sagline.core.numbers import n
 
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
     from sagline.core.arrays import Array
-    from sagline.dynamics.simulation.results import Break, Simulation
+    from sagline.dynamics.simulation.results import Break, Occurrence, Simulation
     from sagline.kinematics.plan import Plan
     from sagline.motion.path import Path as MotionPath
+    from sagline.present.summaries import Summary
     from sagline.robot.equilibrium import Equilibrium
     from sagline.robot.robot import Robot
     from sagline.tension.method import TensionMethod
@@ -52,7 +51,7 @@ class ShaperKind(StrEnum):
 
 
 class CableMass(StrEnum):
-    """Models of the cables' mass in motion."""
+    """Models of the cable mass in motion."""
 
     NONE = "none"
     LUMPED = "lumped"
@@ -60,8 +59,7 @@ class CableMass(StrEnum):
 
 
 BREAK = re.compile(r"([0-9]{1,3})@([^@]+)")
-STEP = "Give the cable and when it breaks: --break 3@2.5s."
-LAST = 1.0  # s at the end, over which the residual vibration is taken
+STEP = "Give the cable and the time of the break: --break 3@2.5s."
 
 
 def simulate(
@@ -72,46 +70,48 @@ def simulate(
             "PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box."
         ),
     ] = None,
-    shaper: Annotated[ShaperKind, choice("SHAPER", "Shapes the path", ShaperKind)] = ShaperKind.NONE,
-    cable_mass: Annotated[CableMass, choice("KIND", "Mass of the cables", CableMass)] = CableMass.NONE,
+    shaper: Annotated[ShaperKind, choice_option("SHAPER", "Input shaper of the path", ShaperKind)] = ShaperKind.NONE,
+    cable_mass: Annotated[CableMass, choice_option("KIND", "Model of the cable mass", CableMass)] = CableMass.NONE,
     breaks: Annotated[
-        list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. May be given again.", "--break")
+        list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. The option can be repeated.", "--break")
     ] = None,
-    after: Annotated[str, option("TIME", "How long it goes on after the path's end [s].")] = "3",
-    step: Annotated[str | None, option("TIME", "Of the integrator [s]. Default: as the robot needs it.")] = None,
+    after: Annotated[float, quantity_option("TIME", "Simulated time after the end of the path [s].", "s", low=0.0)] = 3,
+    step: Annotated[
+        float | None,
+        quantity_option("TIME", "Time step of the integrator [s]. Default: chosen for the robot.", "s", above=0.0),
+    ] = None,
     tension: TensionOption = Tension.CLOSEST,
-    loss_time: LossTimeOption = "0",
-    air_damping: AirDampingOption = "0",
+    loss_time: LossTimeOption = 0,
+    air_damping: AirDampingOption = 0,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     out: Annotated[
         Path | None, option("FILE", "File to write. Default: ROBOT-simulation.nc in output.", "--out")
     ] = None,
-    figures: Annotated[bool, figures_flag("Draw the balance of energy beside it, as PNG and SVG.")] = True,
+    figures: Annotated[bool, figures_flag("Draw the energy balance, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
-    """Move a robot in time along a path, vibrating as it does, with cables that may break.
+    """Simulate a robot along a path in time: vibration, input shapers and breaking cables.
 
-    Lengths are planned as `sagline track` plans them. What is told: the largest tension, how far the platform still
-    swings at the end, the balance of energy, and what happened. Play the file with `sagline view ROBOT FILE`.
+    Lengths are planned as `sagline track` plans them. The result is the largest tension, the residual vibration at the
+    end, the energy balance and the events. Play the file with `sagline view ROBOT FILE`.
 
     For example:
 
         sagline simulate article-suspended own_path.yaml --shaper zvd
         sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
     """
-    from sagline.cli.values import damping_of, quantity, robot_with
-    from sagline.dynamics.simulation.simulate import simulate as integrated
+    from sagline.cli.values import robot_with
+    from sagline.dynamics.simulation.simulate import simulate as integrate
+    from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.files.path_file import load_path
-    from sagline.files.pose_text import wrench_of
     from sagline.files.writing import file_stem
+    from sagline.present.summaries import cable_mass_text, summary_of
     from sagline.robot.batch import has_routing
 
-    load, robot = wrench_of(wrench), robot_with(name, payload)
+    robot = robot_with(name, payload)
     events = tuple(_break(text, robot) for text in breaks or ())
-    rest = quantity(after, "--after", "s", low=0.0)
-    size = None if step is None else quantity(step, "--step", "s", above=0.0)
-    damping = damping_of(loss_time, air_damping)
+    damping = Damping(loss_time, air_damping)
     file = Path("output") / f"{file_stem(robot.name, 'simulation')}.nc" if out is None else out
     if file.suffix != ".nc":
         raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")
@@ -128,22 +128,24 @@ def simulate(
     method = tension.build(Variable.CHORD)
     needed = (*needed_for(method), VIBRATION, *moving)
     with working(f"{robot.name}: simulating", *needed) as line:
-        start = _start(robot, way, method, shaper, cable_mass, load, line)
-        end = rest if way is None else _duration(start) + rest
-        line.stage(f"{robot.name}: {end:g} s in time, {_cables(cable_mass.value)}")
+        start = _start(robot, way, method, shaper, cable_mass, wrench, line)
+        end = after if way is None else _duration(start) + after
+        line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass.value)}")
         kind: Any = cable_mass.value
-        simulation = integrated(start, duration=end, step=size, cable_mass=kind, events=events, damping=damping)
+        simulation = integrate(start, duration=end, step=step, cable_mass=kind, events=events, damping=damping)
         simulation.save(output.file(file.name))
         if figures:
             from sagline import plot
 
             line.stage("drawing")
             output.draw(plot.energy(simulation))
-    if as_json:
-        show_json({**_record(simulation), "files": output.files})
-    else:
-        _tell(simulation)
-        output.show()
+    summary = summary_of(simulation)
+    assert summary is not None
+    output.report(
+        lambda: {"robot": robot.name, **summary.json, "events": [_record(event) for event in simulation.events]},
+        lambda: _tell(simulation, summary),
+        as_json=as_json,
+    )
     return 0
 
 
@@ -169,7 +171,7 @@ def _start(
     load: Array | None,
     line: ProgressLine,
 ) -> Plan | Equilibrium:
-    """A plan along the path, shaped if asked for; or the robot at rest."""
+    """A plan along the path, shaped if a shaper is chosen; or the robot at rest."""
     from sagline.cli.values import middle_of
     from sagline.dynamics.trajectories.shapers import EI, ZV, ZVD, shaped
     from sagline.dynamics.vibration.vibration import to_shape, vibration
@@ -179,16 +181,18 @@ def _start(
     if way is None:
         plan = inverse(robot, middle_of(robot), tension=method, wrench=load)
         if not plan.feasible:
-            raise InvalidValueError("robot", "not held in the middle of its test box", "one that is", "Give a path.")
+            raise InvalidValueError(
+                "robot", "infeasible in the middle of its test box", "a feasible pose", "Give a path."
+            )
         return plan.state
     if shaper is not ShaperKind.NONE:
         state = inverse(robot, way.pose[len(way) - 1], wrench=load).state
         light = modes(state)
         heavy = cable_mass is not CableMass.NONE
         frequency = to_shape(vibration(state, up_to=float(light.frequency.max())) if heavy else light, way)
-        told = " and ".join(f"{value:.3f}" for value in frequency)
+        shaped_out = " and ".join(f"{value:.3f}" for value in frequency)
         kind = "with cable mass" if heavy else "massless"
-        note("Shaper: ", f"{shaper.value} for {told} Hz ({kind}), at the end of the path")
+        note("Shaper: ", f"{shaper.value} for {shaped_out} Hz ({kind}), at the end of the path")
         way = shaped(way, {ShaperKind.ZV: ZV, ShaperKind.ZVD: ZVD, ShaperKind.EI: EI}[shaper](frequency))
     return inverse(robot, way, tension=method, wrench=load, progress=line.stage(f"{robot.name}: planning"))
 
@@ -198,48 +202,8 @@ def _duration(start: Plan | Equilibrium) -> float:
     return 0.0 if path is None else float(path.time[-1] - path.time[0])
 
 
-def _cables(cable_mass: str) -> str:
-    """Model of the cables' mass, in words."""
-    return "massless" if cable_mass == CableMass.NONE else f"with cable mass ({cable_mass})"
-
-
-def _residual(simulation: Simulation) -> float:
-    """Largest distance of the platform from its mean position in the last second [m]."""
-    last = simulation.time >= simulation.time[-1] - LAST
-    place = simulation.pose.position[last]
-    return float(np.linalg.norm(place - place.mean(axis=0), axis=1).max())
-
-
-def _largest(simulation: Simulation) -> Array:
-    """The largest tension of each cable at any step, for which cables, anchors and winches are to be designed [N]."""
-    if simulation.largest_tension is not None:
-        return simulation.largest_tension
-    largest: Array = np.nanmax(simulation.tensions, axis=0)
-    return largest
-
-
-def _above(simulation: Simulation) -> list[int]:
-    """Cables whose tension exceeds the robot's limit."""
-    return np.flatnonzero(_largest(simulation) > simulation.robot.tension_max).tolist()
-
-
-def _tell(simulation: Simulation) -> None:
-    energy = simulation.energy
-    largest = _largest(simulation)
-    cable, above = int(np.argmax(largest)), _above(simulation)
-    size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
-    rows = [
-        ["simulated", f"{simulation.time[-1] - simulation.time[0]:g} s"],
-        ["cables", _cables(simulation.cable_mass)],
-        ["step", n(simulation.step, ".3g", "s")],
-        ["largest tension", f"{written(largest[cable], ',.1f')} N, cable {cable}"],
-        *([["above tension_max", f"cable{'s' * (len(above) > 1)} {', '.join(map(str, above))}"]] if above else []),
-        [f"residual, last {LAST:g} s", n(_residual(simulation), ".3g", "m", size=1e3)],
-        ["work supplied", n(energy.supplied[-1], ".4g", "J", size=size)],
-        ["energy lost", n(energy.lost[-1], ".4g", "J", size=size)],
-        *([["left with cables", n(energy.removed[-1], ".4g", "J", size=size)]] if energy.removed.any() else []),
-        ["error of the balance", n(np.nanmax(np.abs(energy.error)), ".2g", "J", size=size)],
-    ]  # fmt: skip
+def _tell(simulation: Simulation, summary: Summary) -> None:
+    rows = [[row.label, row.text] for row in summary.rows if row.text]
     show_table(Grid(["", simulation.robot.name], rows, left=frozenset({0, 1})))
     for event in simulation.events:
         what = event.kind if event.cable is None else f"{event.kind} of cable {event.cable}"
@@ -247,28 +211,11 @@ def _tell(simulation: Simulation) -> None:
         show(f"{event.time:.3f} s: {what}, {before} N before, then at most {after} N")
 
 
-def _record(simulation: Simulation) -> dict[str, Any]:
-    energy = simulation.energy
+def _record(event: Occurrence) -> dict[str, Any]:
     return {
-        "robot": simulation.robot.name,
-        "cable_mass": simulation.cable_mass,
-        "step_s": simulation.step,
-        "duration_s": float(simulation.time[-1] - simulation.time[0]),
-        "tension_max_n": float(_largest(simulation).max()),
-        "cables_above_tension_max": _above(simulation),
-        "residual_m": _residual(simulation),
-        "supplied_j": float(energy.supplied[-1]),
-        "lost_j": float(energy.lost[-1]),
-        "removed_j": float(energy.removed[-1]),
-        "energy_error_j": float(np.nanmax(np.abs(energy.error))),
-        "events": [
-            {
-                "time_s": event.time,
-                "kind": event.kind,
-                "cable": event.cable,
-                "tension_before_n": event.tension_before,
-                "tension_after_n": event.tension_after,
-            }
-            for event in simulation.events
-        ],
+        "time_s": event.time,
+        "kind": event.kind,
+        "cable": event.cable,
+        "tension_before_n": event.tension_before,
+        "tension_after_n": event.tension_after,
     }

@@ -13,7 +13,7 @@ from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note, show_json
+from sagline.cli.terminal import note
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import file_stem
@@ -28,7 +28,7 @@ from sagline.tension.method import TensionMethod
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
 
-ROWS = {  # of a summary: what a person reads, and how its number is written
+ROWS = {  # of a summary: label and number format
     "position_error_max_mm": ("position error, largest [mm]", ".3g"),
     "position_error_mean_mm": ("position error, mean [mm]", ".3g"),
     "chord_tension_min_n": ("chord tension, smallest [N]", ".1f"),
@@ -41,9 +41,9 @@ ROWS = {  # of a summary: what a person reads, and how its number is written
     "inverse_us_per_pose": ("inverse kinematics [µs a pose]", ".2f"),
 }
 NARROW, WIDE = 10, 30  # characters of a column's head: four narrow ones fit a line of 80
-MOST_GAPS = 5  # told in full
+MOST_GAPS = 5  # that are printed
 WIDEN = " Move the path, or widen the tension limits."
-SAME_PLACE = 1e-6  # m: far above rounding, far below any second equilibrium
+SAME_PLACE = 1e-6  # m: far above rounding, far below the distance of a second equilibrium
 
 
 class Run(NamedTuple):
@@ -71,7 +71,7 @@ class Run(NamedTuple):
     def lost(self) -> int:
         """Number of planned poses without a stable equilibrium of the platform."""
         stays = self.confirmation.held
-        if isinstance(self.plan.state.cables.model, Catenary):  # planned exactly: it rests elsewhere only if it left
+        if isinstance(self.plan.state.cables.model, Catenary):  # planned exactly: elsewhere is another equilibrium
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
         return int(np.sum(self.plan.feasible & ~stays))
 
@@ -84,24 +84,11 @@ def run_name(robot: Robot, model: CableModel) -> str:
 def run_along(
     robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: ProgressLine, wrench: Array | None = None
 ) -> Run:
-    """Plan a path, and confirm the plan with exact cables.
-
-    Args:
-        robot: The robot.
-        path: The path.
-        model: Cable model the lengths are planned with.
-        tension: How the load is shared.
-        line: Shows the progress of planning and confirming.
-        wrench: External wrench, shape (6,), as `inverse` takes it; None for none.
-
-    Raises:
-        InvalidValueError: If the robot's tensions cannot be determined.
-        CableGeometryError: If a cable has no length at some pose.
-    """
-    inverse(robot, path.pose[:1], model, tension, wrench)  # loads the compiled kernels, so that the work alone is timed
+    """Plan a path, and confirm the plan with exact cables."""
+    inverse(robot, path.pose[:1], model, tension, wrench)  # loads the compiled kernels, which are not timed
     start = perf_counter()
-    told = line.stage(f"{robot.name}: planning {len(path):,} poses")
-    plan = inverse(robot, path, model, tension, wrench, progress=told)
+    progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
+    plan = inverse(robot, path, model, tension, wrench, progress=progress)
     seconds = perf_counter() - start
     return Run(confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
 
@@ -122,7 +109,7 @@ def summary(run: Run) -> dict[str, float]:
     return dict(zip(ROWS, numbers, strict=True))
 
 
-def gap_text(gap: Gap, plan: Plan) -> str:
+def _gap_text(gap: Gap, plan: Plan) -> str:
     """Time, shortfall and limiting cables of a part of a path outside the feasible region."""
     assert plan.path is not None
     first, last = (f"{plan.path.time[k]:g} s" for k in (gap.first, gap.last))
@@ -132,25 +119,23 @@ def gap_text(gap: Gap, plan: Plan) -> str:
     count = plan.state.one_robot.cable_count
     cables = "all cables" if len(gap.cables) == count else f"cables {', '.join(map(str, gap.cables))}"
     if np.isinf(gap.shortfall):
-        return f"{when}: no change of the force alone would do; limits of {cables}"
+        return f"{when}: no additional force alone helps; limits of {cables}"
     short = f"short by up to {n(gap.shortfall, '.3g', 'N')}"
     if gap.hopeless:
-        short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no force alone would do"
+        short += f", and at {gap.hopeless} of {gap.last - gap.first + 1} poses no additional force alone helps"
     return f"{when}: {short}; limits of {cables}"
 
 
 def tell(runs: Sequence[Run], output: Output, *, as_json: bool) -> int:
-    """Print the summary and where the paths cannot be followed; returns the exit code."""
-    if as_json:
-        show_json({"runs": [_record(run) for run in runs], "files": output.files})
-    else:
-        show_table(summary_grid(runs))
-        output.show()
+    """Print the summary and the infeasible parts of the paths; returns the exit code."""
+    output.report(
+        lambda: {"runs": [_record(run) for run in runs]}, lambda: show_table(_summary_grid(runs)), as_json=as_json
+    )
     return max((_complaints(run) for run in runs), default=0)
 
 
-def summary_grid(runs: Sequence[Run]) -> Grid:
-    """One column a run, so that it fits any terminal; one row a number."""
+def _summary_grid(runs: Sequence[Run]) -> Grid:
+    """One column for each run, one row for each number."""
     heads = [""]
     for run in runs:
         name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)
@@ -161,18 +146,18 @@ def summary_grid(runs: Sequence[Run]) -> Grid:
 
 
 def _complaints(run: Run) -> int:
-    """Print where the path cannot be followed; returns the exit code of this run."""
+    """Print the infeasible parts of the path; returns the exit code of this run."""
     name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
     for gap in gaps[:MOST_GAPS]:
-        note(f"{name}: ", f"the path leaves the feasible region {gap_text(gap, plan)}", style="bold red")
+        note(f"{name}: ", f"the path leaves the feasible region {_gap_text(gap, plan)}", style="bold red")
     if len(gaps) > MOST_GAPS:
-        note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} times more", style="bold red")
+        note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} more times", style="bold red")
     if gaps:
         limits = all(gap.status is PoseStatus.INFEASIBLE for gap in gaps)
-        note("", "The file keeps the feasible part and marks the rest." + WIDEN * limits)
+        note("", "The file has the feasible part and marks the rest." + WIDEN * limits)
     if run.lost:
-        what = f"{run.lost} of the planned poses are no stable equilibria: there the platform would leave its path"
-        note(f"{name}: ", f"{what}; move it, or raise the tensions", style="bold red")
+        what = f"{run.lost} of the planned poses are no stable equilibria: the platform would leave its path"
+        note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
     return OUTSIDE if gaps or run.lost else 0
 
 

@@ -1,4 +1,4 @@
-"""`sagline sweep`: a request from a file, run into a folder, and how its requests ended."""
+"""`sagline sweep`: many robots, poses and wrenches, computed into a folder."""
 
 from __future__ import annotations
 
@@ -21,33 +21,32 @@ if TYPE_CHECKING:
 
 ENDS = {
     "feasible": "tensions within their limits",
-    "infeasible": "proved that there are none",
-    "unable": "no answer, the status says why",
-    "open": "so near the border that neither was found",
+    "infeasible": "proof that there are no such tensions",
+    "unable": "no result; see the status",
+    "open": "too close to the boundary for a verdict",
     "lost": "no verdict",
 }
 
 
 def sweep(
-    file: Annotated[Path, argument("SWEEP.yaml", "Robots, poses, wrenches and what is asked of each.")],
+    file: Annotated[Path, argument("SWEEP.yaml", "Robots, poses, wrenches and quantities.")],
     out: Annotated[
         Path | None,
         option(
-            "DIR", "Folder of the sweep; one that holds a part of it is taken up. Default: SWEEP in output.", "--out"
+            "DIR", "Folder of the sweep; an unfinished sweep in it is continued. Default: SWEEP in output.", "--out"
         ),
     ] = None,
-    workers: Annotated[str | None, option("COUNT", "Processes of this machine. Default: one a processor.")] = None,
+    workers: Annotated[str | None, option("COUNT", "Processes on this machine. Default: one per processor.")] = None,
     scheduler: Annotated[
         str | None,
-        option("tcp://HOST:PORT", "Use the workers of this Dask scheduler instead. All of them must see the folder."),
+        option("tcp://HOST:PORT", "Use the workers of this Dask scheduler; all of them must see the folder."),
     ] = None,
     as_json: JsonOption = False,
 ) -> int:
-    """Ask tensions, lengths or shortfalls of every robot at every pose under every wrench.
+    """Compute tensions, lengths or shortfalls of every robot at every pose under every wrench.
 
-    Results are on the disk from the first minute, a chunk for each task, and DIR/done says how far it is. What was
-    stopped goes on with the same command. Read the numbers with sl.sweep.load("DIR"), or as Zarr. Exit code 1 where
-    requests were left without a verdict.
+    Each task writes its chunk to the disk, and DIR/done has the progress. The same command continues a stopped sweep.
+    Read the numbers with sl.sweep.load("DIR"), or as Zarr. Exit code 1 if requests have no verdict.
 
     For example:
 
@@ -62,13 +61,15 @@ def sweep(
     count = None if workers is None else whole_of(workers, "--workers", 1, MOST_WORKERS)
     if scheduler is not None:
         if count is not None:
-            raise InvalidValueError("--workers", "given with --scheduler", "one of both", "A cluster has its own.")
+            raise InvalidValueError(
+                "--workers", "given with --scheduler", "one of both", "A cluster has its own workers."
+            )
         check_address(scheduler)
     request = load_sweep(file)
     folder = Path("output") / file.stem if out is None else out
     check_folder(folder)
     create_folder(folder.absolute().parent)
-    if (folder / "done").exists():  # another's is refused here, where nobody is told that it could be gone on with
+    if (folder / "done").exists():  # another sweep is an error here, without the advice to continue it
         open_matching_folder(folder, request)
     again = _again(file, folder, workers, scheduler)
     what = f"{len(request):,} requests"
@@ -76,11 +77,11 @@ def sweep(
         with working(what, *_entries(request)) as line:
             found = run(request, folder, count, scheduler=scheduler, progress=line.progress, tell=_tell)
     except KeyboardInterrupt:
-        note("", f"To go on: {again}")
+        note("", f"To continue: {again}")
         raise
     except SaglineError as error:
         if (folder / "done").exists():
-            error.add_note(f"What is done is kept. To go on: {again}")
+            error.add_note(f"The finished tasks are kept. To continue: {again}")
         raise
     if as_json:
         show_json(_record(found))
@@ -103,7 +104,7 @@ def _tell(text: str) -> None:
 
 
 def _again(file: Path, folder: Path, workers: str | None, scheduler: str | None) -> str:
-    """The command that goes on."""
+    """The command that continues the sweep."""
     words = ["sagline", "sweep", str(file), "--out", str(folder)]
     words += ["--workers", workers] if workers is not None else []
     words += ["--scheduler", scheduler] if scheduler is not None else []

@@ -1,4 +1,4 @@
-"""`sagline tension`: the feasible tensions of one pose, and what every way of sharing chooses."""
+"""`sagline tension`: tension distributions of one pose by all methods."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from sagline.cli.options import (
     figures_flag,
 )
 from sagline.cli.output import Grid, Output, show_table
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.terminal import note, show, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
     from sagline.tension.method import TensionMethod
 
-LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at one pose they choose what others do
+LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at one pose their tensions are those of others
 
 
 def tension(
@@ -45,13 +45,13 @@ def tension(
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, figures_flag("Draw the polygon, as PNG and SVG.")] = True,
+    figures: Annotated[bool, figures_flag("Draw the tension polygon, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
-    """Share the load of one pose in nine ways, and draw the polygon of feasible tensions with all of them in it.
+    """Compare nine tension distribution methods at one pose, and draw their tensions in the tension polygon.
 
-    Three ways are left out: at one pose, without targets, Closest and QuadraticProgram choose what MinimumNorm
-    does; PolygonWalk, by its optimum, what LowestSum, MinimumNorm or Centroid does.
+    Three methods are left out: at one pose, without targets, Closest and QuadraticProgram give the tensions of
+    MinimumNorm; PolygonWalk gives those of LowestSum, MinimumNorm or Centroid.
 
     For example:
 
@@ -59,28 +59,28 @@ def tension(
         sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
     from sagline.cli.values import middle_of, robot_with
-    from sagline.files.pose_text import pose_of, wrench_of
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.polygon import tension_polygon
     from sagline.tension.margin import capacity_margin
     from sagline.tension.methods import METHODS, MinimumNorm
 
-    load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
     robot = robot_with(name, payload)
-    place = middle_of(robot) if place is None else place
+    place = middle_of(robot) if pose is None else pose
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
     output = Output(folder, (), [file_stem(robot.name, "tension")] * drawn)
-    with working(f"{robot.name}: sharing the load", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
-        least = inverse(robot, place, model.build(), MinimumNorm(variable.value), load)  # refuses what none can share
+    with working(f"{robot.name}: tension distributions", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
+        least = inverse(
+            robot, place, model.build(), MinimumNorm(variable.value), wrench
+        )  # raises what no method can do
         plans = {
-            title: _plan(robot, place, model, method(variable.value), load)
+            title: _plan(robot, place, model, method(variable.value), wrench)
             for title, method in METHODS.items()
             if title not in LEFT_OUT
         }
         reason = _reason(robot, place, least)
         margin = float(capacity_margin(least.state))
-        shape = tension_polygon(robot, place, model.build(), load, variable.value) if drawn else None
+        shape = tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
     for text in least.warnings:
         note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):
@@ -91,14 +91,15 @@ def tension(
 
         points = {title: plan.chord_tension for title, plan in plans.items() if plan is not None}
         output.draw(plot.polygon(shape, points))
-    if as_json:
-        tensions = {title: _record(plan) for title, plan in plans.items()}
-        show_json({"capacity_margin": margin, "tensions": tensions, "files": output.files})
-        return 0
-    show_table(_grid(robot, plans))
-    show(f"Extra force in the worst direction before no tensions balance it: {n(margin, unit='N')}")
-    if output.files:
-        show(f"In {folder.resolve()}: {', '.join(file.name for file in output.files)}", whole=True)
+    tensions = {title: _record(plan) for title, plan in plans.items()}
+
+    def tell() -> None:
+        show_table(_grid(robot, plans))
+        show(
+            f"Capacity margin, the additional force in any direction that the cables can balance: {n(margin, unit='N')}"
+        )
+
+    output.report(lambda: {"capacity_margin": margin, "tensions": tensions}, tell, as_json=as_json)
     return 0
 
 
@@ -144,7 +145,7 @@ def _grid(robot: Robot, plans: dict[str, Plan | None]) -> Grid:
         if plan is not None and plan.feasible:
             rows.append([title, *(f"{value:.1f}" for value in plan.chord_tension), ""])
         else:
-            why = "cannot share here" if plan is None else PoseStatus(int(plan.status)).name.lower().replace("_", " ")
+            why = "not defined here" if plan is None else PoseStatus(int(plan.status)).name.lower().replace("_", " ")
             rows.append([title, *[""] * robot.cable_count, why])
     heads = ["", *map(str, range(robot.cable_count)), ""]
     if not any(row[-1] for row in rows):

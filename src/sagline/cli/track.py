@@ -1,4 +1,4 @@
-"""`sagline track`: one robot along one path."""
+"""`sagline track`: the plan of a robot along a path."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def track(
     ] = False,
     as_json: JsonOption = False,
 ) -> int:
-    """Plan a robot's cable lengths along a path, and prove them with the exact cable.
+    """Plan the cable lengths of a robot along a path, and confirm them with exact catenaries.
 
-    The lengths of the chosen model are wound onto exact catenaries; the position error is where the platform then
-    really rests, less where it was planned. The plan is written to DIR/ROBOT-MODEL.nc.
+    The lengths of the chosen model are given to exact catenaries; the position error is the distance of the resulting
+    equilibrium from the planned pose. The plan is written to DIR/ROBOT-MODEL.nc.
 
     For example:
 
@@ -73,10 +73,8 @@ def track(
     from sagline.cli.study import run_along, run_name, tell
     from sagline.cli.values import robot_with
     from sagline.files.path_file import load_path
-    from sagline.files.pose_text import wrench_of
     from sagline.motion.rest_to_rest import article_path
 
-    load = wrench_of(wrench)
     machine = robot_with(robot, payload)
     way = article_path() if path is None else load_path(path)
     if path is not None:
@@ -85,9 +83,9 @@ def track(
     name = run_name(machine, cable)
     drawn = [f"{name}-{figure}" for figure in FIGURES if figures]
     output = Output(folder, [f"{name}.nc", *[f"{name}.csv"] * table], drawn)
-    shared = tension.build(variable)
-    with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(shared), FORWARD) as line:
-        run = run_along(machine, way, cable, shared, line, load)
+    method = tension.build(variable)
+    with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(method), FORWARD) as line:
+        run = run_along(machine, way, cable, method, line, wrench)
     with working("writing"):
         run.plan.save(output.file(f"{name}.nc"))
         if table:
@@ -98,16 +96,7 @@ def track(
 
 
 def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
-    """Refuse a path so far from the robot that it must be in another unit.
-
-    Args:
-        file: Where the path is from.
-        way: The path.
-        robot: The robot.
-
-    Raises:
-        FileError: If it leads too far away.
-    """
+    """Raise FileError if the path of a file is so far from the robot that it must be in another unit."""
     size = float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0)))
     away = np.linalg.norm(way.pose.position - robot.frame_anchors.mean(axis=0), axis=1)
     k = int(np.argmax(away))

@@ -1,4 +1,4 @@
-"""`sagline twin`: a machine in real time behind servers of its own, until Ctrl-C."""
+"""`sagline twin`: a simulated machine in real time with servers of its own, until Ctrl-C."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from socket import gethostname
 from typing import TYPE_CHECKING, Annotated, Final
 
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
-from sagline.cli.options import ModbusOption, RobotArgument, SeedOption, option
+from sagline.cli.options import ModbusOption, RobotArgument, SeedOption, converted_option, option
 from sagline.cli.terminal import note, show, working
 
 if TYPE_CHECKING:
@@ -35,32 +35,28 @@ STATUS: Final = {  # the first that holds, by the names of `GroupStatus`
 
 def twin(
     name: RobotArgument,
-    true: Annotated[
-        str | None, option("ROBOT", "The robot as it really is, where that is another one; the PLCs still know ROBOT.")
-    ] = None,
+    true: Annotated[str | None, option("ROBOT", "The real robot if it differs; the PLCs still know ROBOT.")] = None,
     port: Annotated[
-        str, option("NUMBER", "Of the first group, the others follow; 0 takes any that are free.")
-    ] = "11021",
-    host: Annotated[
-        str, option("ADDRESS", "Address to listen on; 0.0.0.0 is every one of this machine.")
-    ] = "127.0.0.1",
+        int, converted_option("NUMBER", "Port of the first group, the others follow; 0 takes free ones.", "port_of")
+    ] = 11021,
+    host: Annotated[str, option("ADDRESS", "Address to listen on; 0.0.0.0 is all of this machine.")] = "127.0.0.1",
     modbus: ModbusOption = False,
     seed: SeedOption = "0",
     faults: Annotated[
         list[str] | None,
         option(
             "TEXT",
-            "What goes wrong, and when: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; "
-            "parts count from 0. May be given again.",
+            "A fault and its time: 'cell 3 sticks at 40 s', 'group 1 is silent at 20 s for 0.2 s'; parts count from 0. "
+            "The option can be repeated.",
             "--fault",
         ),
     ] = None,
-    log: Annotated[Path | None, option("FILE.mcap", "Write where the platform truly is, until Ctrl-C.")] = None,
+    log: Annotated[Path | None, option("FILE.mcap", "Write the true pose of the platform, until Ctrl-C.")] = None,
 ) -> int:
-    """Be the machine: plant, drives and PLCs of a robot, in real time, until Ctrl-C.
+    """Simulate plant, drives and PLCs of a robot in real time, until Ctrl-C.
 
-    Each group of two winches has a PLC, which is a server of its own with the data blocks of the real one. The first
-    lines say how a controller reaches them; then comes what the PLCs do. Exit code 130, as of every Ctrl-C.
+    Each group of two winches has a PLC, a server with the data blocks of the real one. The first lines show the command
+    that connects a controller; the next lines show the states of the PLCs. Exit code 130 after Ctrl-C.
 
     For example:
 
@@ -69,18 +65,18 @@ def twin(
         sagline twin article-prototype --true worn.yaml --log twin.mcap
         sagline twin article-prototype --modbus --port 5020
     """
-    from sagline.cli.values import port_of, whole_of
+    from sagline.cli.values import whole_of
     from sagline.files.robot_file import load_robot
     from sagline.twin.machine import MOST_SEED, Machine
     from sagline.twin.server import SCAN, Server
 
     robot = load_robot(name)
     real = robot if true is None else load_robot(true)
-    first, noise = port_of(port), whole_of(seed, "--seed", 0, MOST_SEED)
+    noise = whole_of(seed, "--seed", 0, MOST_SEED)
     with ExitStack() as stack:
         with working("switching the machine on", INVERSE, FORWARD, SIMULATION):
             machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
-            server = stack.enter_context(closing(Server(machine, host=host, port=first, modbus=modbus)))
+            server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
         watch = Watch(machine)
         if log is not None:
             from sagline.files.mcap_writer import Recorder
@@ -88,28 +84,28 @@ def twin(
             watch.recorder = stack.enter_context(Recorder(log, real, period=SCAN))
         _greet(name, server, host, modbus=modbus)
         gc.collect()
-        gc.freeze()  # nothing of all that was made so far is looked at again, while time counts
+        gc.freeze()  # the collector skips all objects made so far, because the loop is in real time
         try:
             server.run(watch)
         finally:
             if server.late > LATE:
-                note("Note: ", f"This computer was busy: the machine stood still for up to {server.late:.2f} s.")
+                note("Note: ", f"This computer was busy: the machine was up to {server.late:.2f} s late.")
     return 0
 
 
 def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
     machine = server.machine
     winches, groups = machine.robot.cable_count, len(machine.groups)
-    spoken = "Modbus TCP" if modbus else "S7"
-    show(f"{machine.nominal.name}: {winches} winches behind {groups} PLCs that speak {spoken}, brakes on.")
+    protocol = "Modbus TCP" if modbus else "S7"
+    show(f"{machine.nominal.name}: {winches} winches on {groups} PLCs with {protocol}, brakes on.")
     show("From another terminal:")
     show(f"  sagline control {name}{' --modbus' * modbus} \\", whole=True)
     everywhere = "0.0.0.0:"
     places = [place.replace(everywhere, f"{gethostname()}:") for place in server.addresses]
     show(f"    --plc {','.join(places)}", whole=True)
-    show("Ctrl-C switches it off.")
+    show("Ctrl-C stops it.")
     if host != "127.0.0.1":
-        note("Note: ", "everyone who can reach this machine can drive it: nothing asks for a password.", style="bold")
+        note("Note: ", "everyone who can reach this machine can drive it; there is no password.", style="bold")
 
 
 class Watch:
@@ -143,7 +139,7 @@ class Watch:
         self._known = now
         if self.recorder is not None and self.recorder.stopped != self._stopped:
             self._stopped = self.recorder.stopped
-            note("Note: ", f"nothing more is written: {self._stopped}", style="bold")
+            note("Note: ", f"the log has stopped: {self._stopped}", style="bold")
 
 
 def _doing(report: Report) -> str:

@@ -3,46 +3,38 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final, cast
+from math import prod
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
 from sagline.files.pose_text import FARTHEST, wrench_of
+from sagline.files.pose_text import pose_of as pose_of
 from sagline.files.quantity import in_si
 from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose, PoseBox
 
 if TYPE_CHECKING:
-    from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.robot.robot import Robot
     from sagline.workspaces.wrench_sets import WrenchSet
 
 LAST_PORT = 65535
+MOST_POSES = 1_000_000  # of a grid
 HEAVIEST = 1e12  # kg: beyond all machines, far below what overflows
 
 _KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # of loads, and their units
 _SIGN: Final = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
 _SPAN: Final = re.compile(r"(.*?)(?:\.\.|\bto\b)(.*)", re.DOTALL)
 _UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # and no exponent
+_POINTS: Final = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")
 _STEP: Final = "Give forces, moments and accelerations with units: --wrench '±100 N, ±20 N m'."
-_LONGEST: Final = 200  # letters of either
+_LONGEST: Final = 200  # letters of a set of loads or a box
 
 
 def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """A number in SI, or a text with its unit.
-
-    Args:
-        text: Such as "20" or "20 kg".
-        item: What it is, for the message.
-        unit: The SI unit.
-        low: Smallest value.
-        above: Only larger values will do.
-
-    Raises:
-        InvalidValueError: If it is no such quantity, or out of range.
-    """
+    """A number in SI from a text with or without unit, "20" or "20 kg"; from `low` on, or above `above`."""
     number = cast(float, in_si(text, unit, item))
     if abs(number) > HEAVIEST:
         raise InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
@@ -50,116 +42,58 @@ def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: fl
 
 
 def whole_of(text: str, item: str, least: int, most: int) -> int:
-    """A whole number from its digits.
-
-    Args:
-        text: Such as "8080".
-        item: What it is, for the message.
-        least: Smallest that will do.
-        most: Largest.
-
-    Raises:
-        InvalidValueError: If it is none of these.
-    """
+    """A whole number from its digits, from `least` to `most`."""
     if not re.fullmatch(r"[0-9]{1,20}", text) or not least <= int(text) <= most:
         raise InvalidValueError(item, repr(text), f"a whole number from {least} to {most}", "Choose another.")
     return int(text)
 
 
-def port_of(text: str) -> int:
-    """A TCP port from its digits; 0 for any.
-
-    Raises:
-        InvalidValueError: If it is none.
-    """
-    return whole_of(text, "--port", 0, LAST_PORT)
+def port_of(text: str, item: str) -> int:
+    """A TCP port from its digits; 0 for any free one."""
+    return whole_of(text, item, 0, LAST_PORT)
 
 
 def ratio(text: str, item: str) -> float:
-    """A number without unit, or one of hundred: "0.02" or "2 %".
-
-    Args:
-        text: The text.
-        item: What it is, for the message.
-
-    Raises:
-        InvalidValueError: If it is no such number, or negative.
-    """
+    """A ratio from 0 on: "0.02" or "2 %"."""
     number, percent = text.strip().removesuffix("%"), text.strip().endswith("%")
     return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
 
 
-def damping_of(loss_time: str, air_damping: str, modal_damping: str = "0") -> Damping:
-    """The losses of cables and modes.
-
-    Args:
-        loss_time: Of `--loss-time`, a time.
-        air_damping: Of `--air-damping`, a force on a length over a velocity.
-        modal_damping: Of `--damping`, a ratio.
-
-    Raises:
-        InvalidValueError: If one is no such quantity, or negative.
-    """
-    from sagline.dynamics.vibration.dynamic_stiffness import Damping
-
-    times = quantity(loss_time, "--loss-time", "s", low=0.0)
-    return Damping(times, quantity(air_damping, "--air-damping", "N*s/m^2", low=0.0), ratio(modal_damping, "--damping"))
-
-
 def middle_of(robot: Robot) -> Pose:
-    """The middle of the poses that a robot is meant for, level.
-
-    Raises:
-        InvalidValueError: If it does not say which these are.
-    """
+    """Level pose in the middle of a robot's test box; InvalidValueError if it has none."""
     if robot.test_box is None:
-        raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot names no box of poses.")
+        raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot has no test box.")
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
 
 
-def robot_with(name: str, payload: str | None) -> Robot:
-    """A robot by its name or file, whose platform carries a payload; its inertia grows in proportion.
-
-    Raises:
-        InvalidValueError: If the payload is no mass.
-    """
+def robot_with(name: str, payload: float | None) -> Robot:
+    """A robot by its name or file, with a payload [kg]; its inertia grows in proportion."""
     from sagline.files.robot_file import load_robot
 
     robot = load_robot(name)
-    if payload is None:
-        return robot
-    return with_mass(robot, robot.mass + quantity(payload, "--payload", "kg", low=0.0))
+    return robot if payload is None else with_mass(robot, robot.mass + payload)
 
 
-def wrenches_of(text: str | None) -> WrenchSet | None:
-    """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]"; None for none.
+def wrenches_of(text: str, item: str) -> WrenchSet:
+    """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]".
 
     One number of a kind counts along all axes, three along x, y and z.
-
-    Args:
-        text: Of `--wrench`.
-
-    Raises:
-        InvalidValueError: If it is none of these.
     """
-    if text is None:
-        return None
     from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope
 
     if len(text) > _LONGEST or not _SIGN.match(text):
         if "±" in text or len(text) > _LONGEST:
-            raise InvalidValueError("--wrench", repr(text), "each with ±, or none", _STEP)
-        one = wrench_of(text)
-        return WrenchPolytope([one if one is not None else np.zeros(6)])
+            raise InvalidValueError(item, repr(text), "each with ±, or none", _STEP)
+        return WrenchPolytope([cast(Any, wrench_of(text, item))])
     found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
     for part in text.split(","):
-        kind, size = _load_of(part)
+        kind, size = _load_of(part, item)
         found[kind].append(size)
     for kind, sizes in found.items():
         most = (0, 1, 3) if kind in ("force", "moment") else (0, 1)
         if len(sizes) not in most:
             allowed = f"{' or '.join(map(str, most[1:]))} of the unit {_KINDS[kind]}"
-            raise InvalidValueError("--wrench", f"{text!r} with {len(sizes)}", allowed, _STEP)
+            raise InvalidValueError(item, f"{text!r} with {len(sizes)}", allowed, _STEP)
     box = {kind: found[kind] if len(found[kind]) > 1 else sum(found[kind]) for kind in ("force", "moment")}
     whole: WrenchSet = WrenchBox(box["force"], box["moment"])
     if found["linear"] or found["angular"]:
@@ -167,32 +101,33 @@ def wrenches_of(text: str | None) -> WrenchSet | None:
     return whole
 
 
-def _load_of(part: str) -> tuple[str, float]:
+def _load_of(part: str, item: str) -> tuple[str, float]:
     """The kind of a load, and its size in SI."""
     sign = _SIGN.match(part)
     if sign is not None and _UNIT.search(part) is not None:
         for kind, unit in _KINDS.items():
             try:
-                size = in_si(part[sign.end() :], unit, "--wrench")
+                size = in_si(part[sign.end() :], unit, item)
             except InvalidValueError:
                 continue
             if isinstance(size, float) and 0.0 <= size < np.inf:
                 return kind, size
     units = ", ".join(_KINDS.values())
-    raise InvalidValueError("--wrench", repr(part.strip()), f"± and a number with one of the units {units}", _STEP)
+    raise InvalidValueError(item, repr(part.strip()), f"± and a number with one of the units {units}", _STEP)
 
 
-def box_of(text: str, item: str, tilt: float = 0.0) -> PoseBox:
-    """A box of positions from "-2..2, -1..1, 1..3 m"; one number stands for a plane.
+def points_of(text: str, item: str) -> tuple[int, ...]:
+    """Numbers of points of a grid along x, y and z, from "20x15x8"."""
+    found = _POINTS.fullmatch(text.strip())
+    points = tuple(map(int, found.groups())) if found else (0,)
+    if not 0 < prod(points) <= MOST_POSES:
+        step = f"Give the points along x, y and z: {item} 20x15x8."
+        raise InvalidValueError(item, repr(text), f"NXxNYxNZ, 1 to {MOST_POSES:,} poses", step)
+    return points
 
-    Args:
-        text: The text.
-        item: What it is, for messages.
-        tilt: How far the platform is tilted there [rad].
 
-    Raises:
-        InvalidValueError: If it is none.
-    """
+def box_of(text: str, item: str) -> PoseBox:
+    """A box of level poses from "-2..2, -1..1, 1..3 m"; one number stands for a plane."""
     step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
     parts = text.replace("−", "-").split(",")
     if len(parts) != 3 or len(text) > _LONGEST:
@@ -207,7 +142,7 @@ def box_of(text: str, item: str, tilt: float = 0.0) -> PoseBox:
     low, high = np.array(ends).T
     if (low > high).any() or np.abs(ends).max() > FARTHEST:
         raise InvalidValueError(item, repr(text), f"from low to high, up to {FARTHEST:g} m", step)
-    return PoseBox(low, high, tilt)
+    return PoseBox(low, high)
 
 
 def _ends_of(part: str) -> tuple[str, str]:

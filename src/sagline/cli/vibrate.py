@@ -1,11 +1,9 @@
-"""`sagline vibrate`: natural frequencies of a pose, with cable mass and massless, and what the platform answers."""
+"""`sagline vibrate`: natural frequencies with and without cable mass, and the frequency response of the platform."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from enum import StrEnum
-from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,12 +20,14 @@ from sagline.cli.options import (
     PoseOption,
     RobotArgument,
     WrenchOption,
-    choice,
+    choice_option,
+    converted_option,
     figures_flag,
     option,
+    quantity_option,
 )
 from sagline.cli.output import Grid, Output, csv_text, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.terminal import note, show, working
 from sagline.core.errors import InvalidValueError
 from sagline.files.writing import write_text
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 class Direction(StrEnum):
-    """Along which axis a force acts, or about which a moment."""
+    """Axes along which a force or about which a moment acts."""
 
     X = "x"
     Y = "y"
@@ -52,44 +52,44 @@ class Direction(StrEnum):
     ABOUT_Z = "about z"
 
 
-LEAST_SHARE = 0.05  # of the platform in a mode that is shown; the file has them all
-HEADER = ("mode", "kind", "frequency [Hz]", "platform_share", "cable", "cable_share", "damping_ratio")
-LOWEST = 3  # modes that are shown whatever swings
-POINTS = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")
-MOST_POSES = 1_000_000  # of a map
+LEAST_SHARE = 0.05  # of the platform in a mode that is shown; the file has all modes
+COLUMNS = ("mode", "kind", "frequency_hz", "platform_share", "cable", "cable_share", "damping_ratio")
+LOWEST = 3  # modes that are shown in any case
 FIGURES = ("frequency", "peak")  # of a map
 
 
 def vibrate(
     name: RobotArgument,
     pose: PoseOption = None,
-    grid: Annotated[
-        str | None,
-        option(
+    points: Annotated[
+        Any,
+        converted_option(
             "NXxNYxNZ",
-            "Lowest frequency and strongest answer at so many poses all over the test box, instead of one pose.",
+            "Map lowest frequency and largest response at so many poses of the test box, instead of one pose.",
+            "points_of",
             "--map",
         ),
     ] = None,
-    up_to: Annotated[str, option("HZ", "Frequency below which all modes are found.")] = "20",
+    up_to: Annotated[float, quantity_option("HZ", "All modes below this frequency are found.", "Hz", above=0.0)] = 20,
     damping: Annotated[
-        str, option("RATIO", "Damping ratio of every mode, 0.01 or '1 %', besides the cables'.")
-    ] = "0.01",
-    loss_time: LossTimeOption = "0",
-    air_damping: AirDampingOption = "0",
-    force: Annotated[Direction, choice("AXIS", "Of the response figure", Direction)] = Direction.X,
-    film: Annotated[int | None, option("MODE", "Film this mode, ten seconds of it, as GIF.")] = None,
+        float,
+        converted_option("RATIO", "Damping ratio of every mode, 0.01 or '1 %', besides that of the cables.", "ratio"),
+    ] = 0.01,
+    loss_time: LossTimeOption = 0,
+    air_damping: AirDampingOption = 0,
+    force: Annotated[Direction, choice_option("AXIS", "Force of the response figure", Direction)] = Direction.X,
+    film: Annotated[int | None, option("MODE", "Write a film of this mode, ten seconds, as GIF.")] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
     figures: Annotated[bool, figures_flag("Draw the response, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
-    """Find all natural frequencies of a pose: of the platform, and of the strings that its cables are.
+    """Find all natural frequencies of a pose: those of the platform and those of the cables as strings.
 
-    Each says how much of it is the platform's and which cable swings most; the frequencies that massless cables would
-    have stand beside. DIR/ROBOT-modes.csv has them all, the response figure both robots' answer to a force. Exit code
-    1 where the pose is not feasible, or no stable equilibrium.
+    The table shows the platform's share of each mode, the cable with the largest share, and the frequencies of
+    massless cables. DIR/ROBOT-modes.csv has all modes. The figure shows the response to a force with and without cable
+    mass. Exit code 1 if the pose is not feasible or no stable equilibrium.
 
     For example:
 
@@ -97,41 +97,39 @@ def vibrate(
         sagline vibrate article-suspended --damping "2 %" --force z --film 1
         sagline vibrate cogiro --map 8x6x4 --out maps
     """
-    from sagline.cli.values import damping_of, middle_of, quantity, robot_with
+    from sagline.cli.values import middle_of, robot_with
+    from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.dynamics.vibration.mode_list import listed_modes
     from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
-    from sagline.files.pose_text import pose_of, wrench_of
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.status import PoseStatus
 
-    limit = quantity(up_to, "--up-to", "Hz", above=0.0)
-    losses = damping_of(loss_time, air_damping, damping)
-    load, place = wrench_of(wrench), None if pose is None else pose_of(pose)
-    points = None if grid is None else _points_of(grid)
+    losses = Damping(loss_time, air_damping, damping)
     robot = robot_with(name, payload)
     if points is not None:
         for item, value in (("--pose", pose), ("--film", film), ("--wrench", wrench)):
             if value is not None:
-                raise InvalidValueError(item, "given with --map", "one of both", "A map is of the whole test box.")
-        return _vibrate_in_box(robot, points, limit, losses, folder, figures=figures, as_json=as_json)
+                raise InvalidValueError(item, "given with --map", "one of both", "A map covers the whole test box.")
+        return _vibrate_in_box(robot, points, up_to, losses, folder, figures=figures, as_json=as_json)
     table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
     output = Output(folder, [f"{table}.csv", *[reel] * (film is not None)], [drawing] * figures)
-    place = middle_of(robot) if place is None else place
-    with working(f"{robot.name}: modes up to {limit:g} Hz", INVERSE, VIBRATION, MODES, *[ANSWERS] * figures) as line:
-        plan = inverse(robot, place, wrench=load)
+    place = middle_of(robot) if pose is None else pose
+    with working(f"{robot.name}: modes up to {up_to:g} Hz", INVERSE, VIBRATION, MODES, *[ANSWERS] * figures) as line:
+        plan = inverse(robot, place, wrench=wrench)
         if not plan.feasible:
             note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
             return OUTSIDE
-        found = vibration(plan.state, up_to=limit, damping=losses)
+        found = vibration(plan.state, up_to=up_to, damping=losses)
         if found.status in (VibrationStatus.UNSTABLE, VibrationStatus.NO_LENGTHS):
             note("No modes: ", found.status.text, style="bold red")
             return OUTSIDE
         modes = listed_modes(found)
         _check_film(film, modes)
-        rows = [["" if value is None else value for value in _numbers(mode).values()] for mode in modes]
-        write_text(output.file(f"{table}.csv"), csv_text([HEADER, *rows]))
+        rows = [["" if value is None else value for value in _numbers(mode)] for mode in modes]
+        header = [column.replace("_hz", " [Hz]") for column in COLUMNS]
+        write_text(output.file(f"{table}.csv"), csv_text([header, *rows]))
         if figures and found.status is VibrationStatus.SOLVED and found.frequency.size:
             from sagline import plot
 
@@ -141,11 +139,7 @@ def vibrate(
             from sagline import plot
 
             plot.film(found, film, output.file(reel), progress=line.stage(f"filming mode {film}"))
-    if as_json:
-        show_json({**_record(found, modes), "files": output.files})
-    else:
-        _tell(found, modes, plan.state)
-        output.show()
+    output.report(lambda: _record(found, modes), lambda: _tell(found, modes, plan.state), as_json=as_json)
     if found.status is VibrationStatus.FOLDED:
         slack = ", ".join(map(str, found.slack_cables))
         note(f"Cables {slack}: ", found.status.text, style="bold")
@@ -161,7 +155,7 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
 
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
-    """The table, with each massless mode beside the one in which most of its motion is found."""
+    """Print the table, with each massless mode beside the mode that has most of its motion."""
     from sagline.dynamics.vibration.mode_list import MASSLESS, WITH_MASS, mode_correlation
 
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]
@@ -178,9 +172,9 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
         mode for k, mode in enumerate(swinging) if k < LOWEST or mode.platform_share >= LEAST_SHARE or k in beside
     ]
     if not swinging:
-        proof = "by the exact count" if found.complete else "as far as is known"
+        proof = "by the exact count" if found.complete else "not proved by the exact count"
         lowest = written(min(beyond, default=np.nan), ".3f")
-        below = f"No mode with cable mass lies below {found.up_to:g} Hz, {proof}"
+        below = f"No mode with cable mass is below {found.up_to:g} Hz, {proof}"
         show(f"{below}; the lowest massless one is at {lowest} Hz. Raise --up-to.")
         return
     rows = [
@@ -206,29 +200,23 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
     ]
     x, y, z = state.pose.position
     show_table(Grid(heads, rows, f"{state.one_robot.name} at {x:g}, {y:g}, {z:g} m", left=frozenset()))
-    proof = "none is missing, by the exact count" if found.complete else "some may be missing"
+    proof = "the list is complete by the exact count" if found.complete else "some may be missing"
     hidden = len(swinging) - len(chosen)
     text = f"{len(swinging)} modes with cable mass below {found.up_to:g} Hz: {proof}."
     if hidden:
-        text += f" Not shown: {hidden} in which cables swing alone (platform below {100.0 * LEAST_SHARE:.0f} %)."
+        text += f" Not shown: {hidden} modes of the cables alone (platform below {100.0 * LEAST_SHARE:.0f} %)."
     show(text)
     if beyond:
         higher = ", ".join(written(frequency, ".3f") for frequency in beyond)
-        show(f"Massless modes that are beyond it: {higher} Hz")
+        show(f"Massless modes above this frequency: {higher} Hz")
     elif swinging:
-        show("A massless frequency stands beside the mode that has the largest part of its motion.")
+        show("Each massless frequency is beside the mode that has most of its motion.")
 
 
-def _numbers(mode: ListedMode) -> dict[str, Any]:
-    return {
-        "mode": mode.number,
-        "kind": mode.kind,
-        "frequency_hz": mode.frequency,
-        "platform_share": mode.platform_share,
-        "cable": mode.cable,
-        "cable_share": mode.cable_share,
-        "damping_ratio": mode.loss,
-    }
+def _numbers(mode: ListedMode) -> tuple[Any, ...]:
+    """Values of a mode in the order of COLUMNS."""
+    shares = mode.platform_share, mode.cable, mode.cable_share
+    return (mode.number, mode.kind, mode.frequency, *shares, mode.loss)
 
 
 def _record(found: Vibration, modes: list[ListedMode]) -> dict[str, Any]:
@@ -238,24 +226,14 @@ def _record(found: Vibration, modes: list[ListedMode]) -> dict[str, Any]:
         "up_to_hz": found.up_to,
         "status": found.status.name,
         "complete": found.complete,
-        "modes": [_numbers(mode) for mode in modes],
+        "modes": [dict(zip(COLUMNS, _numbers(mode), strict=True)) for mode in modes],
     }
-
-
-def _points_of(text: str) -> tuple[int, ...]:
-    """Numbers of points along x, y and z, from "20x15x8"."""
-    found = POINTS.fullmatch(text.strip())
-    points = tuple(map(int, found.groups())) if found else (0,)
-    if not 0 < prod(points) <= MOST_POSES:
-        step = "Give the points along x, y and z: --map 20x15x8."
-        raise InvalidValueError("--map", repr(text), f"NXxNYxNZ, 1 to {MOST_POSES:,} poses", step)
-    return points
 
 
 def _vibrate_in_box(
     robot: Robot, points: Sequence[int], limit: float, damping: Damping, folder: Path, *, figures: bool, as_json: bool
 ) -> int:
-    """Compute the map over the test box, write and draw it; returns the exit code."""
+    """Compute, write and draw the map over the test box; returns the exit code."""
     from sagline.dynamics.vibration.frequency_map import frequency_map
     from sagline.files.writing import file_stem
 
@@ -272,26 +250,26 @@ def _vibrate_in_box(
             line.stage("drawing")
             output.draw(*(plot.frequency_map(found, figure) for figure in FIGURES))
     known = np.isfinite(found.frequency)
-    if as_json:
-        show_json({**_record_of_map(found), "files": output.files})
-    else:
+
+    def tell() -> None:
         if known.any():
             show_table(_table_of_map(found))
         show(f"{int(known.sum()):,} of {known.size:,} poses have modes below {limit:g} Hz.")
-        output.show()
+
+    output.report(lambda: _record_of_map(found), tell, as_json=as_json)
     if known.any():
         return 0
-    note("No modes: ", "no pose of the box is held with a mode below --up-to; raise it", style="bold red")
+    note("No modes: ", "no feasible pose of the box has a mode below --up-to; raise it", style="bold red")
     return OUTSIDE
 
 
 def _grid(robot: Robot, points: Sequence[int]) -> Pose:
-    """Level poses evenly over the test box, its middle where there is one point."""
+    """Level poses evenly over the test box; the middle of an axis with one point."""
     from sagline.robot.pose import Pose
 
     box = robot.test_box
     if box is None:
-        raise InvalidValueError("--map", "of a robot that names no box of poses", "one with a test_box", "Add it.")
+        raise InvalidValueError("--map", "of a robot without a test box", "one with a test_box", "Add it.")
     axes = [
         np.linspace(low, high, count) if count > 1 else np.array([0.5 * (low + high)])
         for low, high, count in zip(box.low, box.high, points, strict=True)
@@ -301,16 +279,16 @@ def _grid(robot: Robot, points: Sequence[int]) -> Pose:
 
 
 def _table_of_map(found: FrequencyMap) -> Grid:
-    """Least and greatest of each, and where."""
+    """Minimum and maximum of each quantity, and their positions."""
     rows = []
     for label, values, form in (
         ("lowest, with cable mass [Hz]", found.frequency, ".3f"),
         ("lowest, massless [Hz]", found.massless_frequency, ".3f"),
-        ("strongest answer [mm/N]", 1e3 * found.peak, ".3g"),
+        ("largest response [mm/N]", 1e3 * found.peak, ".3g"),
     ):
         first, last = int(np.nanargmin(values)), int(np.nanargmax(values))
         rows.append([label, *(text for k in (first, last) for text in (written(values[k], form), _place(found, k)))])
-    return Grid(["", "least", "at x, y, z [m]", "greatest", "at x, y, z [m]"], rows, found.robot.name)
+    return Grid(["", "minimum", "at x, y, z [m]", "maximum", "at x, y, z [m]"], rows, found.robot.name)
 
 
 def _place(found: FrequencyMap, k: int) -> str:

@@ -1,24 +1,33 @@
-"""`sagline view`: a robot, or a run of it, in the browser."""
+"""`sagline view`: a robot or a run in the browser."""
 
 from __future__ import annotations
 
 import re
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from sagline.cli.entries import FORWARD
-from sagline.cli.options import PayloadOption, WrenchOption, argument, flag, option, robot_completions
+from sagline.cli.options import (
+    PayloadOption,
+    PoseOption,
+    WrenchOption,
+    argument,
+    converted_option,
+    flag,
+    option,
+    robot_completions,
+)
 from sagline.cli.terminal import note, working
 from sagline.core.errors import FileError, InvalidValueError, SaglineError
 
 if TYPE_CHECKING:
     from sagline.cli.hosting import Address
     from sagline.robot.robot import Robot
-    from sagline.viewer.page import Page
+    from sagline.viewer.page import Page, Source
     from sagline.viewer.player import Beside, Played
     from sagline.viewer.session import LogFollower, Session
 
@@ -40,31 +49,28 @@ def view(
         Path | None,
         argument(
             "RUN",
-            "To play: a run of this robot, written by sagline track, a simulation, or a log of the controller; "
-            "or a calibration to show.",
+            "A run of this robot by sagline track, a simulation or a log of the controller, which is played; or a "
+            "calibration, which is shown.",
         ),
     ] = None,
     beside: Annotated[
-        Path | None, option("RUN", "Another run of the same robot beside it, with the same clock, as a ghost.")
+        Path | None, option("RUN", "Another run of the same robot, shown as a ghost with the same clock.")
     ] = None,
-    live: Annotated[bool, flag("Follow a log that is still written.", "--live")] = False,
+    live: Annotated[bool, flag("Follow a log that is still being written.", "--live")] = False,
     truth: Annotated[
-        Path | None, option("TWIN.mcap", "Beside a log: the twin's own, where the platform truly was.")
+        Path | None, option("TWIN.mcap", "With a log: the log of the twin, with the true pose of the platform.")
     ] = None,
-    pose: Annotated[
-        str | None,
-        option("X,Y,Z[,A,B,C]", "Where the platform is at first: position [m] and angles about z, y, x [degrees]."),
-    ] = None,
+    pose: PoseOption = None,
     mode: Annotated[str | None, option("NUMBER", "Natural mode that moves at first: 1, 2, ...; 'massless 1'.")] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     host: Annotated[
-        str, option("ADDRESS", "Address to listen on; 0.0.0.0 is every one, for others to look.")
+        str, option("ADDRESS", "Address to listen on; 0.0.0.0 is all of this machine, so that others can look.")
     ] = "127.0.0.1",
-    port: Annotated[str, option("NUMBER", "Port to listen on; 0 takes any that is free.")] = "8080",
+    port: Annotated[int, converted_option("NUMBER", "Port to listen on; 0 takes any free one.", "port_of")] = 8080,
     browser: Annotated[bool, flag("Open it in a browser here.", "--browser/--no-browser")] = True,
 ) -> int:
-    """Look at a robot in the browser: drag its platform, and the cables follow.
+    """Show a robot in the browser; its platform can be dragged, and the cables follow.
 
     Over SSH, forward the port (`ssh -L 8080:localhost:8080 ...`) and open http://localhost:8080 at home.
 
@@ -81,10 +87,9 @@ def view(
         sagline view run.mcap --truth twin.mcap
     """
     from sagline.cli.hosting import Address
-    from sagline.cli.values import port_of, robot_with
-    from sagline.files.pose_text import pose_of, wrench_of
+    from sagline.cli.values import robot_with
 
-    address = Address(host, port_of(port), browser)
+    address = Address(host, port, browser)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
     if log is None and (live or truth is not None):
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
@@ -95,7 +100,9 @@ def view(
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
     given = [item for item, value in alone.items() if value is not None]
     if (run is not None or log is not None or found is not None) and given:
-        raise InvalidValueError(given[0], "given with a run", "a robot alone", "A run has its own: leave one out.")
+        raise InvalidValueError(
+            given[0], "given with a run", "a robot alone", "A run has its own values: leave one out."
+        )
     if beside is not None and (found is not None or (run is None and log is None)):
         step = "Give both: sagline view cogiro run_a.nc --beside run_b.nc"
         raise InvalidValueError("--beside", "given without a run", "two runs of one robot", step)
@@ -103,7 +110,7 @@ def view(
         return view_log(log, robot if log is run else None, address, live=live, truth=truth, beside=beside)
     if found is not None:
         return view_calibration(found, robot if found is run else None, address)
-    start = {"pose": None if pose is None else pose_of(pose), "mode": _mode(mode), "wrench": wrench_of(wrench)}
+    start = {"pose": pose, "mode": _mode(mode), "wrench": wrench}
     machine = robot_with(robot, payload)
     if run is not None:
         return view_run(machine, run, address, beside)
@@ -111,32 +118,17 @@ def view(
 
 
 def view_robot(robot: Robot, name: str | Path, address: Address, mass: float | None = None, **start: Any) -> int:
-    """Serve a robot until Ctrl-C; returns the exit code.
-
-    Args:
-        robot: The robot.
-        name: Its name or file.
-        address: Where to listen.
-        mass: Its mass with a payload [kg]; None for its own.
-        start: Pose, mode and wrench at first, as the viewer takes them.
-    """
-    from sagline.cli.hosting import check_viewer, serve
-
-    check_viewer()
-    from sagline.viewer.page import Source
-
+    """Serve a robot, with its mass if it has a payload [kg], until Ctrl-C; returns the exit code."""
+    serve, Source = _viewer()
     return serve(robot, address, source=Source.of_robot(name, mass), **start)
 
 
 def view_run(robot: Robot, file: Path, address: Address, beside: Path | None = None) -> int:
-    """Serve a run or a simulation of a robot, perhaps another one beside it, until Ctrl-C; returns the exit code."""
-    from sagline.cli.hosting import check_viewer, serve
+    """Serve a run or a simulation of a robot, optionally with another run, until Ctrl-C; returns the exit code."""
     from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT
 
-    check_viewer()
-    from sagline.viewer.page import Source
-
+    serve, Source = _viewer()
     played = played_in(robot, file)
     other = None if beside is None else played_beside(played.robot, file, beside)
     source = Source.of_file("simulation" if is_of(file, FORMAT) else "plan", file)
@@ -144,17 +136,14 @@ def view_run(robot: Robot, file: Path, address: Address, beside: Path | None = N
 
 
 def view_calibration(file: Path, robot: str | None, address: Address) -> int:
-    """Serve a calibrated robot with its calibration until Ctrl-C; a robot that is named must be the same."""
-    from sagline.cli.hosting import check_viewer, serve
+    """Serve a calibrated robot with its calibration until Ctrl-C; returns the exit code."""
     from sagline.files.calibration_file import load_calibration
     from sagline.files.robot_file import load_robot
 
-    check_viewer()
+    serve, Source = _viewer()
     found = load_calibration(file)
     if robot is not None:
         _check_robot(file, "calibration", found.robot, load_robot(robot))
-    from sagline.viewer.page import Source
-
     return serve(found.robot, address, found=found, source=Source.of_file("calibration", file))
 
 
@@ -167,21 +156,10 @@ def view_log(
     truth: Path | None = None,
     beside: Path | None = None,
 ) -> int:
-    """Serve a log of the controller until Ctrl-C; returns the exit code.
-
-    Args:
-        file: The log.
-        robot: Robot that it must be of; None for any.
-        address: Where to listen.
-        live: Whether it still grows.
-        truth: The log of the twin that was driven.
-        beside: What is played beside it.
-    """
-    from sagline.cli.hosting import check_viewer, serve
+    """Serve a log of the controller, `live` while it grows, until Ctrl-C; returns the exit code."""
     from sagline.files.robot_file import load_robot
 
-    check_viewer()
-    from sagline.viewer.page import Source
+    serve, Source = _viewer()
     from sagline.viewer.session import LogFollower
 
     follower = LogFollower(file, truth)
@@ -191,7 +169,7 @@ def view_log(
         _check_robot(file, "log", session.robot, load_robot(robot), alone=True)
     other = None if beside is None else played_beside(session.robot, file, beside)
     if not live and not follower.log.complete:
-        note("Note: ", f"{file} was cut off: what was recorded in its last second is not there.", style="bold")
+        note("Note: ", f"{file} was cut off: its last second is missing.", style="bold")
     return serve(
         session.robot,
         address,
@@ -203,11 +181,7 @@ def view_log(
 
 
 def played_in(robot: Robot, file: Path) -> Played:
-    """The run, simulation or log in a file of a robot.
-
-    Raises:
-        FileError: If it cannot be read, or is another robot's.
-    """
+    """The run, simulation or log in a file of a robot; FileError if it is of another robot."""
     from sagline.files.netcdf import is_of
     from sagline.files.plan_file import load_plan
     from sagline.files.simulation_file import FORMAT, load_simulation
@@ -239,14 +213,14 @@ def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
 
 
 def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot, *, alone: bool = False) -> None:
-    """Refuse a file of another robot; the advice names the file alone, or the robot too."""
+    """Raise FileError for a file of another robot; the advice names the file alone, or the robot too."""
     if made_for.name != robot.name:
         step = f"View it as: sagline view {file if alone else f'{made_for.name} {file}'}"
         raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
 
 
 def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Session:
-    """The cycles in a log; of one that grows, as soon as all logs have begun and there is a cycle."""
+    """The cycles in a log; of a live one, as soon as all logs have begun and there is a cycle."""
     from sagline.files.mcap_reader import has_begun
 
     while live and not all(map(has_begun, logs)):
@@ -254,14 +228,14 @@ def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Se
     while (session := follower.more()) is None:
         if not live:
             file = follower.log.path
-            raise FileError(file, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
+            raise FileError(file, "has no cycle", "Record at least one cycle.")
         time.sleep(LOOK)
     return session
 
 
 @contextmanager
 def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
-    """While inside, what comes into the log comes onto the page."""
+    """Show new cycles of the log on the page while inside."""
     over = threading.Event()
 
     def look() -> None:
@@ -271,7 +245,7 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
                 if session is not None:
                     viewer.extend(session)
         except SaglineError as error:
-            note("Note: ", f"the log is followed no longer: {error}", style="bold")
+            note("Note: ", f"the page no longer follows the log: {error}", style="bold")
 
     thread = threading.Thread(target=look, name="sagline follows", daemon=True)
     thread.start()
@@ -282,6 +256,16 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
         thread.join()
 
 
+def _viewer() -> tuple[Callable[..., int], type[Source]]:
+    """The server of the viewer and the sources of its pages; FileError if its packages are missing."""
+    from sagline.cli import hosting
+
+    hosting.check_viewer()
+    from sagline.viewer.page import Source
+
+    return hosting.serve, Source
+
+
 def _is_calibration(file: Path) -> bool:
     from sagline.files.calibration_file import FORMAT as CALIBRATION
     from sagline.files.netcdf import is_of
@@ -290,9 +274,9 @@ def _is_calibration(file: Path) -> bool:
 
 
 def _mode(text: str | None) -> str:
-    """The name of a mode: "1", "massless 1"; "" for none."""
+    """Name of a mode: "1", "massless 1"; "" for none."""
     words = " ".join((text or "").split())
     if words and not re.fullmatch(r"(massless )?[1-9][0-9]{0,3}", words):
-        step = "The page lists them."
-        raise InvalidValueError("--mode", repr(text), "a number from 1 on, or massless 1 and so on", step)
+        step = "The page lists the modes."
+        raise InvalidValueError("--mode", repr(text), "a number from 1 on, or massless 1, massless 2", step)
     return words

@@ -1,12 +1,11 @@
-"""`sagline workspace`: where a robot can work, how much that is, and what limits it where."""
+"""`sagline workspace`: volume, boundary and limits of the workspace of a robot."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
-
-import numpy as np
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import CLEARANCES, INVERSE, PROOFS, SIGNED_MARGINS, VIBRATION
@@ -17,12 +16,14 @@ from sagline.cli.options import (
     OutOption,
     PayloadOption,
     RobotArgument,
+    converted_option,
     figures_flag,
     flag,
     option,
+    quantity_option,
 )
 from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.terminal import note, show, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 
@@ -30,22 +31,22 @@ if TYPE_CHECKING:
     from sagline.interference.pairs import Obstacle
     from sagline.workspaces.criterion import Criterion
     from sagline.workspaces.proof import Proof
-    from sagline.workspaces.space import Workspace
+    from sagline.workspaces.space import Limit, Workspace
 
-MOST_LIMITS = 12  # shares that are told
+MOST_LIMITS = 12  # shares that are shown
 LoadsOption = Annotated[
-    str | None,
-    option(
+    Any,
+    converted_option(
         "LOADS",
-        "Loads that the platform bears all over it besides its weight: '±100 N, ±20 N m', accelerations "
-        "'±2 m/s^2, ±1 rad/s^2', both, or one wrench FX,FY,FZ[,MX,MY,MZ].",
+        "Loads besides the weight at all poses: '±100 N, ±20 N m', accelerations '±2 m/s^2, ±1 rad/s^2', both, or one "
+        "wrench FX,FY,FZ[,MX,MY,MZ].",
+        "wrenches_of",
     ),
 ]
 
 
-def _criteria(robot: str, limits: dict[str, str | None], scene: str | None, *, in_frame: bool) -> list[Criterion]:
-    """The criteria of the options; a robot's own scene stands around it unless another one is given."""
-    from sagline.cli.values import quantity
+def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *, in_frame: bool) -> list[Criterion]:
+    """The criteria of the options; without --scene the scene of the robot file is used."""
     from sagline.workspaces.criteria import (
         Clearance,
         InFrame,
@@ -55,26 +56,21 @@ def _criteria(robot: str, limits: dict[str, str | None], scene: str | None, *, i
         MaximumSag,
     )
 
-    kinds: dict[str, tuple[Callable[[float], Criterion], str]] = {
-        "reserve": (LeastMargin, "N"),
-        "max_sag": (MaximumSag, "m"),
-        "min_stiffness": (LeastStiffness, "N/m"),
-        "min_frequency": (LeastFrequency, "Hz"),
-        "clearance": (lambda limit: Clearance(limit, around(robot if scene is None else scene)), "m"),
+    kinds: dict[str, Callable[[float], Criterion]] = {
+        "reserve": LeastMargin,
+        "max_sag": MaximumSag,
+        "min_stiffness": LeastStiffness,
+        "min_frequency": LeastFrequency,
+        "clearance": lambda limit: Clearance(limit, _obstacles(robot if scene is None else scene)),
     }
-    found: list[Criterion] = []
-    for name, text in limits.items():
-        if text is not None:
-            kind, unit = kinds[name]
-            bound = {"low" if name == "reserve" else "above": 0.0}
-            found.append(kind(quantity(text, f"--{name.replace('_', '-')}", unit, **bound)))
+    found = [kinds[name](limit) for name, limit in limits.items() if limit is not None]
     if scene is not None and limits["clearance"] is None:
-        step = 'Say how near things may come: --clearance "3 cm".'
+        step = 'Give the least distance: --clearance "3 cm".'
         raise InvalidValueError("--scene", f"{scene!r} without --clearance", "both", step)
     return found + [InFrame()] * in_frame
 
 
-def around(name: str) -> tuple[Obstacle, ...]:
+def _obstacles(name: str) -> tuple[Obstacle, ...]:
     """Obstacles: the scene of a robot file, a mesh file, none for the name of a preset."""
     from sagline.files.mesh_file import load_mesh
     from sagline.files.robot_file import load_scene
@@ -90,36 +86,51 @@ def workspace(
     wrench: LoadsOption = None,
     payload: PayloadOption = None,
     tilt: Annotated[
-        str | None, option("ANGLE", "The platform has to tilt so far about any axis, '10deg'. Default: it is level.")
-    ] = None,
+        float,
+        quantity_option(
+            "ANGLE", "The platform has to tilt by this angle about any axis, '10deg'. Default: level.", "rad", low=0.0
+        ),
+    ] = 0,
     box: Annotated[
-        str | None, option("BOX", "Where to look: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.")
+        Any,
+        converted_option("BOX", "Box of positions: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.", "box_of"),
     ] = None,
-    reserve: Annotated[str | None, option("FORCE", "Margin that is left everywhere [N].")] = None,
-    max_sag: Annotated[str | None, option("LENGTH", "No cable sags further, '5 cm'.")] = None,
+    reserve: Annotated[
+        float | None, quantity_option("FORCE", "Least capacity margin at all poses [N].", "N", low=0.0)
+    ] = None,
+    max_sag: Annotated[
+        float | None, quantity_option("LENGTH", "Largest sag of a cable, '5 cm'.", "m", above=0.0)
+    ] = None,
     min_stiffness: Annotated[
-        str | None, option("NUMBER", "A force moves the platform no further than force over this [N/m].")
+        float | None, quantity_option("NUMBER", "Least translational stiffness [N/m].", "N/m", above=0.0)
     ] = None,
-    min_frequency: Annotated[str | None, option("HZ", "The platform swings no slower, cables without mass.")] = None,
-    clearance: Annotated[str | None, option("LENGTH", "Cables, and what they pass, stay so far apart, '3 cm'.")] = None,
+    min_frequency: Annotated[
+        float | None, quantity_option("HZ", "Least natural frequency with massless cables.", "Hz", above=0.0)
+    ] = None,
+    clearance: Annotated[
+        float | None,
+        quantity_option("LENGTH", "Least distance of cables, platform and obstacles, '3 cm'.", "m", above=0.0),
+    ] = None,
     scene: Annotated[
         str | None,
         option("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
     ] = None,
     in_frame: Annotated[bool, flag("The whole platform stays within the frame.", "--in-frame")] = False,
-    to_prove: Annotated[str | None, option("BOX", "Prove that it can work in all of this box.", "--prove")] = None,
-    budget: Annotated[str, option("TIME", "Of the proof [s].")] = "10",
+    to_prove: Annotated[
+        Any, converted_option("BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove")
+    ] = None,
+    budget: Annotated[float, quantity_option("TIME", "Time for the proof [s].", "s", above=0.0)] = 10,
     cells: Annotated[int, option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
     model: ModelOption = Model.CATENARY,
     folder: OutOption = Path("output"),
-    figures: Annotated[bool, figures_flag("Draw hull and slice, as PNG and SVG.")] = True,
+    figures: Annotated[bool, figures_flag("Draw the hull and a slice, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:
-    """Find where a robot can work: volume with its error bar, and what limits it where.
+    """Find the workspace of a robot: its volume with an error bar, and the limits at its boundary.
 
-    The platform can be held wherever the cables, as they sag, bear all loads within their limits. DIR has the workspace
-    in NetCDF, its hull in GLB and figures. Exit code 1 where it is empty, when the nearest pose is told, and where not
-    all of the box of --prove is proved.
+    A pose belongs to it if the sagging cables can balance all loads with tensions within their limits. DIR has the
+    workspace in NetCDF, its hull in GLB, and figures. Exit code 1 if it is empty, with the nearest pose, or if the box
+    of --prove is not proved completely.
 
     For example:
 
@@ -128,8 +139,9 @@ def workspace(
         sagline workspace article-suspended --prove "-2..2, -1..1, 1..3 m"
         sagline workspace ipanema-1 --max-sag "5 cm" --box "-1..1, -1..1, 0..2 m"
     """
-    from sagline.cli.values import box_of, quantity, robot_with, wrenches_of
+    from sagline.cli.values import robot_with
     from sagline.files.writing import file_stem
+    from sagline.robot.pose import PoseBox
     from sagline.workspaces.orientations import Tilts
     from sagline.workspaces.proof import ProofVerdict, prove
     from sagline.workspaces.workspace import workspace
@@ -142,33 +154,30 @@ def workspace(
         "clearance": clearance,
     }
     cable = model.build()
-    loads, criteria = wrenches_of(wrench), _criteria(name, limits, scene, in_frame=in_frame)
-    angle = 0.0 if tilt is None else quantity(tilt, "--tilt", "rad", low=0.0)
-    if angle > np.pi:  # a number alone counts in radians
+    criteria = _criteria(name, limits, scene, in_frame=in_frame)
+    if tilt > pi:  # a number without unit is in radians
         step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
-        raise InvalidValueError("--tilt", repr(tilt), "0 to 180deg", step)
-    region = None if box is None else box_of(box, "--box")
-    claim = None if to_prove is None else box_of(to_prove, "--prove", angle)
-    seconds = quantity(budget, "--budget", "s", above=0.0)
+        raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = robot_with(name, payload)
     space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
     drawn = [file_stem(robot.name, what) for what in ("workspace", "slice") if figures]
     output = Output(folder, [space_file, hull], drawn)
-    with working(f"{robot.name}: workspace", *_entries(limits), *[PROOFS] * (claim is not None)) as line:
+    with working(f"{robot.name}: workspace", *_entries(limits), *[PROOFS] * (to_prove is not None)) as line:
         space = workspace(
             robot,
-            region,
-            loads,
-            orientations=Tilts(angle),
+            box,
+            wrench,
+            orientations=Tilts(tilt),
             criteria=criteria,
             model=cable,
             cells=cells,
             progress=line.progress,
         )
         proof = None
-        if claim is not None:
-            told = line.stage(f"{robot.name}: proof")
-            proof = prove(robot, claim, loads, budget=seconds, model=cable, progress=told)
+        if to_prove is not None:
+            claim = PoseBox(to_prove.low, to_prove.high, tilt)
+            stage = line.stage(f"{robot.name}: proof")
+            proof = prove(robot, claim, wrench, budget=budget, model=cable, progress=stage)
         space.save(output.file(space_file))
         if space.nearest is None:
             space.surface.export(output.file(hull))
@@ -179,38 +188,38 @@ def workspace(
                 output.draw(plot.workspace(space))
                 if space.unit == "m³":  # of a plane the first figure is the slice
                     output.draw(plot.slice(space))
-    if as_json:
-        show_json(
-            {**_record(space), "proof": None if proof is None else _record_of_proof(proof), "files": output.files}
-        )
-    else:
-        _tell(space)
-        if proof is not None:
-            _tell_proof(proof)
-        output.show()
+    output.report(lambda: _record(space, proof), lambda: _tell(space, proof), as_json=as_json)
     if space.nearest is not None:
-        note("Nowhere: ", space.nearest.reason, style="bold red")
+        note("Empty workspace: ", space.nearest.reason, style="bold red")
     proved = proof is None or proof.verdict is ProofVerdict.PROVED_INSIDE
     return 0 if space.nearest is None and proved else OUTSIDE
 
 
-def _entries(limits: dict[str, str | None]) -> tuple[str, ...]:
+def _entries(limits: dict[str, float | None]) -> tuple[str, ...]:
     """Entries of the kernels for these limits."""
-    given = {name for name, text in limits.items() if text is not None}
-    shaken, near = bool(given & {"min_stiffness", "min_frequency"}), "clearance" in given
-    tensions = shaken or near or "max_sag" in given
-    return (SIGNED_MARGINS, *[INVERSE] * tensions, *[VIBRATION] * shaken, *[CLEARANCES] * near)
+    names = {name for name, limit in limits.items() if limit is not None}
+    vibrates, near = bool(names & {"min_stiffness", "min_frequency"}), "clearance" in names
+    tensions = vibrates or near or "max_sag" in names
+    return (SIGNED_MARGINS, *[INVERSE] * tensions, *[VIBRATION] * vibrates, *[CLEARANCES] * near)
 
 
-def _tell(space: Workspace) -> None:
-    from sagline.workspaces.space import amount_of, facts_of
+def _tell(space: Workspace, proof: Proof | None) -> None:
+    from sagline.workspaces.space import amount_of, facts_of, span_of
 
     facts = [("area" if space.unit == "m²" else "volume", amount_of(space))]
     facts += [(head, text) for head, text in facts_of(space) if head != "nearest"]
     show_table(Grid(["robot", space.robot.name], facts, left=frozenset({0, 1}), prose=frozenset({1})))
-    limits = space.limits
-    if not limits:
-        return
+    if limits := space.limits:
+        show_table(_limits(limits))
+    if proof is not None:
+        spans = span_of(proof.box)
+        shares = {"proved inside": proof.inside, "proved outside": proof.outside, "open": proof.open}
+        rows = [[word, written(100.0 * share, ".2f"), f"{share * proof.volume:.4g}"] for word, share in shares.items()]
+        show_table(Grid([f"{spans} m", "share [%]", "volume [m³]"], rows))
+        show(f"{proof.verdict.name}: {proof.verdict.text}.")
+
+
+def _limits(limits: Sequence[Limit]) -> Grid:
     rows = [
         [written(100.0 * limit.share, ".1f"), limit.criterion, "–" if limit.cable < 0 else str(limit.cable)]
         for limit in limits[:MOST_LIMITS]
@@ -218,20 +227,7 @@ def _tell(space: Workspace) -> None:
     if len(limits) > MOST_LIMITS:
         rest = sum(limit.share for limit in limits[MOST_LIMITS:])
         rows.append([written(100.0 * rest, ".1f"), counted(len(limits) - MOST_LIMITS, "other"), ""])
-    show_table(Grid(["surface [%]", "limited by", "cable"], rows, left=frozenset({1})))
-
-
-def _tell_proof(proof: Proof) -> None:
-    from sagline.workspaces.space import span_of
-
-    spans = span_of(proof.box)
-    shares = ((f"proved {word}", getattr(proof, word)) for word in ("inside", "outside"))
-    rows = [
-        [word, written(100.0 * share, ".2f"), f"{share * proof.volume:.4g}"]
-        for word, share in (*shares, ("open", proof.open))
-    ]
-    show_table(Grid([f"{spans} m", "share [%]", "volume [m³]"], rows))
-    show(f"{proof.verdict.name}: {proof.verdict.text}.")
+    return Grid(["surface [%]", "limited by", "cable"], rows, left=frozenset({1}))
 
 
 def _record_of_proof(proof: Proof) -> dict[str, Any]:
@@ -246,7 +242,7 @@ def _record_of_proof(proof: Proof) -> dict[str, Any]:
     }
 
 
-def _record(space: Workspace) -> dict[str, Any]:
+def _record(space: Workspace, proof: Proof | None) -> dict[str, Any]:
     unit = "m3" if space.unit == "m³" else "m2"
     near = space.nearest
     return {
@@ -276,4 +272,5 @@ def _record(space: Workspace) -> dict[str, Any]:
             "cables": list(near.cables),
             "reason": near.reason,
         },
+        "proof": None if proof is None else _record_of_proof(proof),
     }

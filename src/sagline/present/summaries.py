@@ -1,9 +1,9 @@
-"""A summary of each result type: title, verdict and further lines."""
+"""A summary of each result type: title, verdict, rows with values, and further lines; as text and as JSON."""
 
 from __future__ import annotations
 
 from functools import singledispatch
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +24,28 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.workspaces.space import Workspace
 
+if TYPE_CHECKING:
+    from sagline.core.arrays import Array
+
 MOST_GAPS = 5  # that are listed
 MOST_MODES = 8
+LAST = 1.0  # s at the end of a simulation, of which the residual vibration is taken
+
+
+class Row(NamedTuple):
+    """A value of a summary.
+
+    Attributes:
+        key: Name in JSON, with the unit.
+        label: Words for people.
+        value: Value in JSON.
+        text: Value for people, with the unit; "" if only programs need it.
+    """
+
+    key: str
+    label: str
+    value: Any
+    text: str
 
 
 class Summary(NamedTuple):
@@ -33,20 +53,32 @@ class Summary(NamedTuple):
 
     Attributes:
         title: Type and name of the object.
-        verdict: In one line.
+        verdict: Verdict in one line.
         good: True or False if the verdict is one; None for neither.
-        lines: Further lines.
+        notes: Further lines.
+        rows: Values.
     """
 
     title: str
     verdict: str
     good: bool | None
-    lines: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    rows: tuple[Row, ...] = ()
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The rows and the further lines as text."""
+        return (*(f"{row.label}: {row.text}" for row in self.rows if row.text), *self.notes)
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The values by their keys."""
+        return {row.key: row.value for row in self.rows}
 
 
 @singledispatch
 def summary_of(thing: object) -> Summary | None:
-    """Summary of a robot, a path, a plan or a result; None if its ordinary text says as much."""
+    """Summary of a robot, a path, a plan or a result; None for other objects."""
     if isinstance(thing, Result) and type(thing).__str__ is not object.__str__:
         first, *rest = str(thing).splitlines()
         return Summary(type(thing).__name__, first, None, tuple(rest))
@@ -73,7 +105,7 @@ def _(robot: Robot) -> Summary:
 
 
 def plan_of(robot: Robot) -> Plan | None:
-    """Plan of the middle of a robot's test box; None without a box, or if compiling would take long."""
+    """Plan of the middle of a robot's test box; None without a box or without compiled kernels."""
     from sagline.kernels.inverse.feasibility import decide_poses
     from sagline.kernels.inverse.poses import inverse_poses
 
@@ -132,13 +164,49 @@ def _(found: ForwardSolution) -> Summary:
 
 
 @summary_of.register
-def _(run: Simulation) -> Summary:
+def _(simulation: Simulation) -> Summary:
+    energy, duration = simulation.energy, float(simulation.time[-1] - simulation.time[0])
+    largest, last = _largest_tensions(simulation), simulation.time >= simulation.time[-1] - LAST
+    cable, above = int(np.argmax(largest)), np.flatnonzero(largest > simulation.robot.tension_max).tolist()
+    place = simulation.pose.position[last]
+    residual = float(np.linalg.norm(place - place.mean(axis=0), axis=1).max())
+    size = float(np.nanmax(np.abs(energy.kinetic) + np.abs(energy.potential)))
+    cables = f"cable{'s' * (len(above) > 1)} {', '.join(map(str, above))}" if above else ""
+    strongest = f"{n(largest[cable], ',.1f')} N, cable {cable}"
+    rows = [
+        Row("duration_s", "simulated", duration, n(duration, "g", "s")),
+        Row("cable_mass", "cables", simulation.cable_mass, cable_mass_text(simulation.cable_mass)),
+        Row("step_s", "step", simulation.step, n(simulation.step, ".3g", "s")),
+        Row("tension_max_n", "largest tension", float(largest[cable]), strongest),
+        Row("cables_above_tension_max", "above tension_max", above, cables),
+        Row("residual_m", f"residual vibration, last {LAST:g} s", residual, n(residual, ".3g", "m", size=1e3)),
+    ]
+    energies = {"supplied_j": ("work supplied", energy.supplied), "lost_j": ("energy lost", energy.lost)}
+    energies["removed_j"] = ("energy of removed cables and loads", energy.removed)
+    for key, (label, course) in energies.items():
+        text = n(course[-1], ".4g", "J", size=size) if key != "removed_j" or course.any() else ""
+        rows.append(Row(key, label, float(course[-1]), text))
+    error = float(np.nanmax(np.abs(energy.error)))
+    rows.append(Row("energy_error_j", "error of the energy balance", error, n(error, ".2g", "J", size=size)))
     happened = [
         f"{event.time:.4g} s: {event.kind}" + ("" if event.cable is None else f", cable {event.cable}")
-        for event in run.events[:MOST_GAPS]
+        for event in simulation.events[:MOST_GAPS]
     ]
-    verdict = f"{n(run.time[-1] - run.time[0], '.4g', 's')}, tensions at the frame {_range(run.tensions)}"
-    return Summary(f"Simulation of {run.robot.name}", verdict, None, tuple(happened))
+    verdict = f"{n(duration, '.4g', 's')}, tensions at the frame {_range(simulation.tensions)}"
+    return Summary(f"Simulation of {simulation.robot.name}", verdict, None, tuple(happened), tuple(rows))
+
+
+def _largest_tensions(simulation: Simulation) -> Array:
+    """Largest tension of each cable at any step of a simulation [N], shape (m,)."""
+    if simulation.largest_tension is not None:
+        return simulation.largest_tension
+    largest: Array = np.nanmax(simulation.tensions, axis=0)
+    return largest
+
+
+def cable_mass_text(cable_mass: str) -> str:
+    """Model of the cable mass in words."""
+    return "massless" if cable_mass == "none" else f"with cable mass ({cable_mass})"
 
 
 @summary_of.register
