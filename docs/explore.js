@@ -28,8 +28,8 @@ const cable = (() => {
 /* The page. */
 (() => {
   const POINTS = 80;
-  const HIGH = 310; // of both pictures, 360 wide: about as much as a phone
-  const PLACE = { left: 22, top: 88, meter: 23 }; // where the frame end is in the first picture
+  const HIGH = 310; // px, of both pictures, 360 wide: about the width of a phone
+  const PLACE = { left: 22, top: 88, meter: 23 }; // frame end in the first picture
   const AXES = { left: 46, right: 344, top: 26, bottom: 272 }; // of the second
 
   const written = (value, digits = 0) => value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
@@ -67,7 +67,7 @@ const cable = (() => {
       forces.map((force) => [force, model({ ...found, tension: (force * found.chord) / found.span }).vertical]);
     const curve = course(cable.exact), straight = [[0, closed.vertical - (found.rise / found.span) * found.horizontal]];
     straight.push([most, straight[0][1] + (found.rise / found.span) * most]);
-    // what the slackest cables do leaves the picture: they weigh without end
+    // the values of the slackest cables are outside the picture
     const heights = [...curve.filter(([force]) => force > 0.6 * found.horizontal), ...straight].map(([, height]) => height);
     const low = Math.min(0, ...heights), high = 1.1 * Math.max(0, ...heights);
     const x = (force) => AXES.left + ((AXES.right - AXES.left) * force) / most;
@@ -100,8 +100,8 @@ const cable = (() => {
 
   function sentence(found, closed) {
     const more = 1e3 * (closed.length - found.length);
-    const apart = Math.abs(more) < 0.05 ? "as long to 0.1 mm" : `${written(Math.abs(more), 1)} mm ${more > 0 ? "longer" : "shorter"}`;
-    const outside = closed.valid ? "" : " It is outside its range: the lowest point of the cable lies inside the span.";
+    const apart = Math.abs(more) < 0.05 ? "equal to 0.1 mm" : `${written(Math.abs(more), 1)} mm ${more > 0 ? "longer" : "shorter"}`;
+    const outside = closed.valid ? "" : " It is outside its range: the lowest point of the cable is inside the span.";
     return `Exact length ${written(found.length, 3)} m, sag ${written(1e3 * found.sag)} mm; the article’s cable is ${apart}.${outside}`;
   }
 
@@ -140,7 +140,7 @@ const cable = (() => {
     const tell = () => (said.textContent = show());
     for (const slider of sliders) {
       slider.addEventListener("input", show);
-      slider.addEventListener("change", tell); // once the slider stands: a reader of the screen hears one sentence
+      slider.addEventListener("change", tell); // after the drag, so that a screen reader announces one sentence
     }
     for (const button of page.querySelectorAll("button")) {
       button.addEventListener("click", () => {

@@ -1,4 +1,4 @@
-"""Where a robot can hold its platform: 4,000 poses, what others lack."""
+"""Feasible region: 4,000 poses, and the shortfall of the infeasible ones."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""A controller that knows its robot: planned lengths and tensions every ms."""
+"""Feedforward control: planned lengths and tensions every ms."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -8,12 +8,12 @@ import sagline as sl
 robot = sl.load_robot("article-prototype")
 path = sl.septic_path([(0, 0, 1.0), (0.3, 0.2, 1.1)], durations=2.5, rate=1000)
 plan = sl.inverse(robot, path, tension=sl.MinimumNorm())
-# the same poses as if the platform had no inertia
+# the same poses without the inertia of the platform
 still = sl.inverse(robot, path.pose, tension=sl.MinimumNorm())
 
 
 def follow(these: sl.Plan) -> list[float]:
-    """Distance from the path, every ms, and for three seconds after it [m]."""
+    """Distance from the path [m], every ms, to three seconds after its end."""
     machine = sl.Simulator(robot, plan.state[0])
     lengths = these.unstrained_length
     tensions = these.state.cables.frame_end_tension
@@ -30,7 +30,7 @@ distance = {"planned": follow(plan), "static": follow(still)}
 for name, away in distance.items():
     largest, left = 1e3 * max(away[: len(path)]), 1e3 * max(away[-2000:])
     print(
-        f"{name} lengths: {largest:.2f} mm on the way, {left:.2f} mm after it"
+        f"{name} lengths: {largest:.2f} mm on the path, {left:.2f} mm after it"
     )
 
 figure = Figure(figsize=(6.0, 3.0), layout="constrained")

@@ -1,4 +1,4 @@
-"""A load on three ropes: how it swings, and lengths that leave it at rest."""
+"""A load on three ropes: its vibration, and lengths that avoid it."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -19,13 +19,13 @@ robot = sl.Robot(
 first, last = np.array([4.0, 4.0, 4.0]), np.array([3.6, 4.1, 4.1])
 start, goal = sl.forward(robot, first), sl.forward(robot, last)
 _, aside, height = goal.pose.position - start.pose.position
-print(f"it goes {aside:.2f} m aside and {height:.2f} m up")
+print(f"it moves {aside:.2f} m aside and {height:.2f} m up")
 swing = sl.modes(goal.state).frequency[:2]
-print(f"it swings at {swing.round(2)} Hz, massless cables")
+print(f"it vibrates at {swing.round(2)} Hz, massless cables")
 
-# a path whose x says how much of the change of lengths is done
+# x of this path is the completed share of the change of lengths
 share = sl.quintic_path([(0, 0, 0), (1, 0, 0)], durations=0.8, rate=1000.0)
-ways = {"as it is": share, "shaped": sl.shaped(share, sl.ZV(swing))}
+ways = {"unshaped": share, "shaped": sl.shaped(share, sl.ZV(swing))}
 figure = Figure(figsize=(6.0, 3.0), layout="constrained")
 ax = figure.subplots()
 left = {}

@@ -1,4 +1,4 @@
-"""How fast may it go: the same way in less and less time, inertia included."""
+"""Speed limit: the same path in shorter times, with inertia."""
 
 import sagline as sl
 

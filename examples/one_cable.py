@@ -1,4 +1,4 @@
-"""One cable between two points: its sag, and what other models make of it."""
+"""One cable between two points: its sag, and the errors of other models."""
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -1,6 +1,6 @@
-"""A cascade: 1 kHz loops in the drives, and a slow one on the pose.
+"""Cascade control: 1 kHz loops in the drives, and a slow loop on the pose.
 
-The platform that is built is heavier than the planned one.
+The real platform is heavier than the planned one.
 """
 
 import numpy as np
@@ -10,22 +10,22 @@ import sagline as sl
 
 PERIOD, GAIN = 0.01, 0.5  # s, 1/s
 planned = sl.load_robot("article-prototype")
-built = planned.replace(mass=1.2 * planned.mass)  # the loop does not know it
+built = planned.replace(mass=1.2 * planned.mass)  # unknown to the loop
 goal = sl.Pose.from_euler([0.3, 0.2, 1.2], 0.0, 0.0, 0.0)
 plan = sl.inverse(planned, goal, tension=sl.MinimumNorm())
-start = sl.forward(built, plan.unstrained_length, start=goal).state  # it sags
+start = sl.forward(built, plan.unstrained_length, start=goal).state  # lower
 rope = sl.Damping(loss_time=5e-3, air_damping=0.5)  # assumed
 
 
 def settle(gain: float) -> list[float]:
-    """Distance from the goal, period by period, in twenty seconds [m]."""
+    """Distance from the goal [m] in each period of twenty seconds."""
     machine = sl.Simulator(built, start, damping=rope)
     solver = sl.InverseSolver(planned, tension=sl.MinimumNorm())
     lengths, aim = start.unstrained_length.copy(), goal.position.copy()
     away = []
     for _ in range(2000):
         seen = machine.step(lengths, PERIOD)
-        error = goal.position - seen.position  # as a tracker would see it
+        error = goal.position - seen.position  # simulated reading of a tracker
         aim += gain * PERIOD * error
         status = solver.step_into(aim, goal.quaternion, lengths)
         if status != sl.PoseStatus.SOLVED:

@@ -1,4 +1,4 @@
-"""What pulleys and dead cable cost where a plan leaves them out."""
+"""Position errors of plans without pulleys and dead length."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,12 +9,12 @@ robots = ("cogiro", "article-prototype", "ipanema-1", "expo2015-lucia")
 left_out = {
     "pulleys of 25 mm": sl.Winch(0.025),  # m
     "pulleys of 50 mm": sl.Winch(0.050),
-    "3 m of dead cable": sl.Winch(dead_cable=3.0),
+    "3 m of dead length": sl.Winch(dead_cable=3.0),
 }
 
 
 def errors(robot: sl.Robot, winch: sl.Winch) -> np.ndarray:
-    """How far off the platform rests [mm], at 405 level poses of the box."""
+    """Position errors [mm] at 405 level poses of the test box."""
     box = robot.test_box
     assert box is not None
     steps = map(np.linspace, box.low, box.high, (9, 9, 5))
@@ -23,7 +23,7 @@ def errors(robot: sl.Robot, winch: sl.Winch) -> np.ndarray:
     home = sl.Pose.from_euler(0.5 * (box.low + box.high), 0.0, 0.0, 0.0)
     real = robot.replace(winches=winch)
     planned = sl.inverse(robot, poses).unstrained_length
-    # the winches count from home, where they hold the platform well
+    # the zeros are set at home, where the position is correct
     wound = planned - sl.inverse(robot, home).unstrained_length
     lengths = sl.inverse(real, home).unstrained_length + wound
     found = sl.forward(real, lengths, start=poses)

@@ -1,4 +1,4 @@
-"""From a robot and a path to cable lengths, and the proof of them."""
+"""Quickstart: cable lengths of a robot along a path, and their proof."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ import sagline as sl
 robot = sl.load_robot("article-suspended")
 path = sl.quintic_path([(0, 0, 1.5), (4, 3, 1.5), (-4, 3, 3)], speed=1.5)
 plan = sl.inverse(robot, path)  # tensions within limits, lengths to wind
-proof = sl.confirm(plan)  # where the platform really rests on exact cables
+proof = sl.confirm(plan)  # true position of the platform on exact cables
 error = np.linalg.norm(proof.position_error, axis=1).max()
 shortest, longest = plan.unstrained_length.min(), plan.unstrained_length.max()
 print(f"{len(path)} poses, lengths {shortest:.2f} to {longest:.2f} m")

@@ -1,7 +1,7 @@
-"""Where a robot can work, and what loads leave of it.
+"""Workspace of a robot with different loads.
 
-The hull is exact at each of its corners, the slice at each of its points; the
-mesh goes into any program that shows meshes.
+The hull is exact at its corners, the slice at its points. The mesh opens in any
+program for meshes.
 """
 
 import sagline as sl

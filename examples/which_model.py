@@ -1,4 +1,4 @@
-"""What a cable model costs: how far off the platform rests on its lengths."""
+"""Errors of cable models: position errors with lengths from each model."""
 
 import numpy as np
 from matplotlib.figure import Figure

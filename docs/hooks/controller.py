@@ -1,4 +1,4 @@
-"""The controller's states, faults and blocks as the library has them: its tables, and a picture of the first.
+"""Tables of the controller's states, faults and blocks, and a diagram of the states, made from the library.
 
 The line `<!-- of the controller: states -->` of a page becomes the table of that name.
 """
@@ -28,16 +28,16 @@ PLACES: Final = {  # column and row of each state
     State.JOGGING: (2, 3),
 }
 COLUMN, LINE, WIDE, HIGH, EDGE = 190.0, 96.0, 124.0, 36.0, 24.0  # px
-IN_WORDS: Final = (State.STOPPING, State.EMERGENCY, State.OFF)  # where most states lead to: no arrows
+IN_WORDS: Final = (State.STOPPING, State.EMERGENCY, State.OFF)  # targets of most states: without arrows
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the tables in the place of the lines that ask for them."""
+    """Replace the marked lines of a page by the tables."""
     return MARK.sub(lambda found: MADE[found[1]](), markdown)
 
 
 def states() -> str:
-    """What winches do in each state, and where it leads to."""
+    """Table of the states with the action of the winches and the transitions."""
     rows = (
         f"| `{row.state.name}` | {row.winches} | {'; '.join(f'`{way.to.name}`: {way.by}' for way in row.exits)} |"
         for row in TABLE
@@ -46,17 +46,17 @@ def states() -> str:
 
 
 def picture() -> str:
-    """The states and the ways between them, drawn; where many lead to one state, in words."""
+    """Diagram of the states and transitions; targets of most states as text."""
     ways = {(row.state, way.to) for row in TABLE for way in row.exits if way.to not in IN_WORDS}
     drawn = "".join(_arrow(*way, way[::-1] in ways) for way in sorted(ways))
     boxes = "".join(_box(state) for state in PLACES)
     width, height = 2 * COLUMN + WIDE + 4 * EDGE, 3 * LINE + HIGH + 2 * EDGE
     head = '<defs><marker id="tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="8" markerHeight="8" orient="auto">'
     tip = f'{head}<path d="M0 0 8 4 0 8z" fill="currentColor"/></marker></defs>'
-    label = "The states of the controller and the ways between them; the table below says the same."
+    label = "The states of the controller and their transitions; the table below has the same content."
     svg = f'<svg class="states" viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{label}">'
     words = "\n".join(f"- to `{state.name}`: {', '.join(_sources(state))}" for state in IN_WORDS)
-    return f"{svg}{tip}{drawn}{boxes}</svg>\n\nNot drawn, because most states lead there:\n\n{words}"
+    return f"{svg}{tip}{drawn}{boxes}</svg>\n\nTransitions from most states, not drawn:\n\n{words}"
 
 
 def _sources(to: State) -> Iterator[str]:
@@ -75,7 +75,7 @@ def _box(state: State) -> str:
 
 
 def _arrow(start: State, end: State, both_ways: bool) -> str:
-    """From border to border; beside the way back where there is one, around a state that stands between."""
+    """Arrow between two states, beside the arrow back if there is one, around states in between."""
     (x, y), (to_x, to_y) = _middle(start), _middle(end)
     if x == to_x and abs(to_y - y) > LINE:
         side = x + WIDE / 2
@@ -92,18 +92,18 @@ def _arrow(start: State, end: State, both_ways: bool) -> str:
 
 
 def _half(size: float, distance: float) -> float:
-    """What share of a distance lies within a box of a size around its start."""
+    """Share of a distance within a box of a given size around its start."""
     return 0.5 * size / abs(distance) if distance else float("inf")
 
 
 def faults() -> str:
-    """Every fault with its rule, what follows, and how soon."""
+    """Table of the faults with rule, reaction and time."""
     rows = (f"| {row.name} | {_plain(row.rule)} | {row.to} | {row.within} | {row.by} |" for row in FAULT_TABLE)
-    return "\n".join(("| fault | there when | leads to | within | seen by |", "|---|---|---|---|---|", *rows))
+    return "\n".join(("| fault | condition | leads to | within | detected by |", "|---|---|---|---|---|", *rows))
 
 
 def blocks() -> str:
-    """Every value of the data blocks, with type and offset."""
+    """Table of all values of the data blocks, with type and offset."""
     return "\n\n".join(
         f"`DB{block.number}`, `{block.name}`, {block.size} bytes:\n\n" + "\n".join((*HEAD, *_rows(block.fields)))
         for block in BLOCKS
@@ -123,5 +123,5 @@ def _plain(text: str) -> str:
     return text.replace("|", "\\|")
 
 
-HEAD: Final = ("| name | type | at byte | what |", "|---|---|---|---|")
+HEAD: Final = ("| name | type | byte | meaning |", "|---|---|---|---|")
 MADE: Final = {"blocks": blocks, "faults": faults, "picture": picture, "states": states}

@@ -1,6 +1,6 @@
-"""The cable of docs/explore.md: its sliders and its table, and what a page without JavaScript shows in their place.
+"""Sliders and table of docs/explore.md, and their replacement without JavaScript.
 
-The line `<!-- one cable, to be moved -->` becomes the controls, which docs/explore.js brings to life, and the line
+The line `<!-- one cable, to be moved -->` becomes the controls for docs/explore.js, and the line
 `<!-- one cable, standing still -->` a table of the library's own numbers.
 """
 
@@ -22,20 +22,20 @@ CATENARY: Final = Path(__file__).parents[2] / "src/sagline/share/page/catenary.j
 MOVED, STILL = "<!-- one cable, to be moved -->", "<!-- one cable, standing still -->"
 SPAN, RISE, DENSITY, STIFFNESS, GRAVITY = 12.0, -4.0, 0.067, 44e3, 9.81  # m, m, kg/m, N, m/s^2: the article's cable
 TENSIONS: Final = (30.0, 100.0, 300.0, 1000.0)  # N, of the table
-HEAVY, STANDING = 0.5, (20.0, 40.0, 200.0)  # kg/m and N, of the picture that stands still
-POINTS, METER, LEFT, TOP = 60, 26.0, 24.0, 20.0  # of that picture: how many a cable; px a meter, and of the frame end
+HEAVY, STANDING = 0.5, (20.0, 40.0, 200.0)  # kg/m and N, of the static picture
+POINTS, METER, LEFT, TOP = 60, 26.0, 24.0, 20.0  # of that picture: points per cable; px per meter, and of the frame end
 
 
 class Slider(NamedTuple):
     """A control.
 
     Attributes:
-        name: As docs/explore.js knows it.
-        label: What it moves.
-        unit: In which it is written.
-        factor: SI units in one of these.
-        base: The value at the beginning, in that unit.
-        ratio: By how much a step multiplies it; None where the steps are added to zero.
+        name: Name in docs/explore.js.
+        label: Name of the quantity.
+        unit: Printed unit.
+        factor: Printed unit in SI units.
+        base: Initial value, in the printed unit.
+        ratio: Factor of a step; None for steps that are added to zero.
         low: Lowest step.
         high: Highest step.
     """
@@ -67,25 +67,25 @@ SLIDERS: Final = (
     Slider("tension", "Tension along the chord", "N", 1.0, 100.0, 1.05, -33, 61),
     Slider("rise", "Height of the platform end", "m", 1.0, RISE, None, -5.0, 3.0),
 )
-TRIED: Final = {  # what a button sets the sliders to, in steps; the others go back to where they began
+TRIED: Final = {  # positions of the sliders for each button, in steps; other sliders return to zero
     "The article’s cable": {},
     "Heavy and slack": {"density": 41, "tension": -33},
     "Level": {"rise": 0.0, "tension": -20},
     "Soft": {"stiffness": -22, "tension": 61},
     "Steel, taut": {"density": 36, "stiffness": 30, "tension": 55},
 }
-QUANTITIES: Final = {  # as docs/explore.js knows it -> what it is
+QUANTITIES: Final = {  # name in docs/explore.js -> meaning
     "length": "unstrained length, m",
     "sag": "sag, mm",
     "vertical": "vertical force on the platform end, N",
     "frameEnd": "tension at the frame end, N",
     "platformEnd": "tension at the platform end, N",
 }
-NOTE: Final = "Outside the article’s range: the lowest point of the cable lies inside the span."
+NOTE: Final = "Outside the article’s range: the lowest point of the cable is inside the span."
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the exact cable, which the pages of `sagline share` have too."""
+    """Add the script of the exact cable, shared with the pages of `sagline share`."""
     from mkdocs.structure.files import File
 
     files.append(File.generated(config, CATENARY.name, abs_src_path=str(CATENARY)))
@@ -93,12 +93,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the cable in the place of the lines that ask for it."""
+    """Replace the marked lines of the page by the cable."""
     return markdown.replace(MOVED, moved()).replace(STILL, standing())
 
 
 def moved() -> str:
-    """What the script moves, hidden until it does, and the picture that it puts away."""
+    """Controls, hidden until the script runs, and the static picture that it hides."""
     model = Empirical()
     constants = {"span": SPAN, "gravity": GRAVITY, "kh": model.k_h, "kp": model.k_p}
     data = "".join(f' data-{name}="{value:g}"' for name, value in constants.items())
@@ -136,7 +136,7 @@ def moved() -> str:
 
 
 def still_picture() -> str:
-    """A heavy cable at three tensions: exact, and the article's beside it."""
+    """Picture of a heavy cable at three tensions, exact and by the article's form."""
     drawn = []
     for tension in STANDING:
         for model, kind in ((Catenary(), "exact"), (Empirical(), "closed")):
@@ -153,7 +153,7 @@ def still_picture() -> str:
 
 
 def standing() -> str:
-    """Both models at some tensions, in numbers."""
+    """Table of both models at some tensions."""
     head = "| tension, N | exact length, m | article, m | difference, mm | exact sag, mm | article, mm |"
     rows = [head, "|---|---|---|---|---|---|"]
     for tension in TENSIONS:

@@ -1,4 +1,4 @@
-"""Formulas: LaTeX between dollars becomes MathML, which a browser sets by itself, without a script or a network."""
+"""Formulas: LaTeX between dollars becomes MathML, which browsers draw without a script or a network."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ BLOCK = re.compile(r'<div class="arithmatex">\\\[(.*?)\\\]</div>', re.DOTALL)
 INLINE = re.compile(r'(\(?)<span class="arithmatex">\\\((.*?)\\\)</span>([.,;:)]*)', re.DOTALL)
 UNKNOWN = re.compile(r"\\[A-Za-z]+|&(?!#?\w+;)")
 SPACE = '<mspace width="0.17em" />'
-MENDED = (  # what latex2mathml writes, and what browsers set as TeX would
-    # a name of a function stands upright, without the space of a sign, and apart from what is before and after it
+MENDED = (  # output of latex2mathml -> form that browsers draw like TeX
+    # a function name is upright, without the space of an operator, but with space around it
     (r"<mo>(\w{2,})</mo>", r"<mi>\1</mi>"),
     (r"((?:<msup>)?<mi>[a-z]{2,}</mi>(?:<mn>\d</mn></msup>)?)(?=<m(?:i|n|row|sub|sup|frac|sqrt)\b)", rf"\1{SPACE}"),
     (r"(</m(?:i|n|sub|sup|subsup|row)>)(?=(?:<msup>)?<mi>[a-z]{2,}</mi>)", rf"\1{SPACE}"),
@@ -32,15 +32,15 @@ def on_page_content(html: str, **_: Any) -> str:
 
 
 def kept(before: str, formula: str, after: str) -> str:
-    """A formula and the marks around it, which stay on one line."""
+    """A formula with its adjacent punctuation, kept on one line."""
     return f'<span class="kept">{before}{formula}{after}</span>' if before or after else formula
 
 
 def mathml(latex: str, display: str) -> str:
-    """One formula; LaTeX that is not understood stops the build."""
+    """One formula; unknown LaTeX stops the build."""
     text = convert(latex.strip(), display=display)
     if unknown := UNKNOWN.search(text):
-        raise PluginError(f"{unknown[0]} is not understood in the formula {latex}")
+        raise PluginError(f"{unknown[0]} is unknown LaTeX in the formula {latex}")
     for written, mended in MENDED:
         text = re.sub(written, mended, text)
     return text

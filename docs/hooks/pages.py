@@ -1,6 +1,6 @@
-"""Hooks of MkDocs: the pages that are made rather than written, so that none of them can be out of date.
+"""Hooks of MkDocs: generated pages, which are always up to date.
 
-The gallery runs the examples, the reference lists what `sagline.__all__` lists, the command's page is its own help.
+The gallery runs the examples, the reference lists `sagline.__all__`, and the command's page is its help text.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from sagline.cli.main import app
 
 RINGS = {  # package -> title and opening line of its page of reference
     "cables": ("Cables", "One cable: its material, its models, its state."),
-    "robot": ("Robots", "Where cables are fixed, what they carry, and where the platform is."),
+    "robot": ("Robots", "Anchors, cables, platform and pose."),
     "motion": ("Motion", "Paths of the platform."),
-    "kinematics": ("Kinematics", "From motion to lengths, from lengths to the pose, and the proof of a plan."),
-    "calibration": ("Calibration", "What a robot really is, from its own readings, and where to read them."),
-    "dynamics": ("Dynamics", "How the robot vibrates and moves."),
-    "workspaces": ("Workspaces", "Where a robot can work: loads, margins, criteria, the boundary, and proofs."),
-    "interference": ("Interference", "What comes too near to what."),
-    "tension": ("Tension", "How redundant cables share the load."),
+    "kinematics": ("Kinematics", "Lengths from a motion, the pose from lengths, and the proof of a plan."),
+    "calibration": ("Calibration", "Parameters of a robot from its readings, and informative poses."),
+    "dynamics": ("Dynamics", "Vibration and motion in time."),
+    "workspaces": ("Workspaces", "Loads, margins, criteria, the boundary, and proofs."),
+    "interference": ("Interference", "Clearances of cables, platform and obstacles."),
+    "tension": ("Tension", "Tension distribution methods."),
     "statics": ("Statics", "Structure matrix, wrenches, stiffness."),
-    "optimization": ("Better robots", "What may change, what is wanted, and who searches."),
-    "control": ("Controller", "`sl.control`: what drives a machine, cycle by cycle."),
-    "plc": ("Links", "`sl.plc`: the way to real controllers of drives, over S7 or Modbus."),
-    "twin": ("Twin", "`sl.twin`: the machine behind a link, in this process or behind servers of its own."),
+    "optimization": ("Optimization", "Design variables, goals and optimizers."),
+    "control": ("Controller", "`sl.control`: the controller of a machine, cycle by cycle."),
+    "plc": ("Links", "`sl.plc`: links to PLCs, over S7 or Modbus."),
+    "twin": ("Twin", "`sl.twin`: a simulated machine, in this process or behind servers."),
     "article": ("Identification", "Constants of cables and of the empirical model, from measurements."),
-    "files": ("Files", "What is read and written."),
+    "files": ("Files", "Input and output files."),
     "sweep": ("Sweeps", "`sl.sweep`: every robot at every pose under every wrench, on many cores."),
     "plot": ("Figures", "`sl.plot`: figures for papers, on Matplotlib."),
-    "errors": ("Errors", "What sagline raises."),
+    "errors": ("Errors", "Exceptions of sagline."),
 }
 SCENE = """\
 import numpy as np
@@ -105,7 +105,7 @@ LOADED = re.compile(
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Complete the navigation: background pages as they stand in the folder, one page of reference for each ring."""
+    """Complete the navigation: existing background pages, and one page of reference for each package."""
     nav: list[dict[str, list[str]] | str] = config.nav or []
     for section in nav:
         if isinstance(section, dict) and "Background" in section:
@@ -117,7 +117,7 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the pages and figures that are made here."""
+    """Add the generated pages and figures."""
     fresh_folder()
     files.append(File.generated(config, "gallery.md", content=gallery(files, config)))
     files.append(File.generated(config, "api/command.md", content=command_reference()))
@@ -130,7 +130,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def names_by_ring() -> dict[str, list[str]]:
-    """Full names of everything public, by the package it lives in; what `sl.plot` and its like list among them."""
+    """Full names of everything public, by package, including the lists of public modules such as `sl.plot`."""
     modules = (getattr(sl, name) for name in sl.__all__)
     places = [(sl, sl.__all__), *((module, module.__all__) for module in modules if isinstance(module, ModuleType))]
     listed = [(name, getattr(place, name)) for place, names in places for name in names]
@@ -154,22 +154,22 @@ def reference(ring: str, names: list[str]) -> str:
 
 
 def with_figures(text: str) -> str:
-    """The reference of `sl.plot`, each function with a figure that it draws."""
+    """The reference of `sl.plot`, each function with an example figure."""
     calls = "".join(f'sl.plot.save(sl.plot.{call}, "plot-{name}.svg")\n' for name, call in FIGURES.items())
     ran("-c", f"import sagline as sl\n{SCENE}{calls}")
     head, *functions = text.split("::: ")
-    shown = [f"{head}The figures below are drawn of these:\n{fenced(SCENE, 'python')}"]
+    shown = [f"{head}The figures below use these objects:\n{fenced(SCENE, 'python')}"]
     for function in functions:
         name = function.strip().rsplit(".", 1)[1]
         if name not in (*FIGURES, "film", "save", "style"):
-            raise PluginError(f"sl.plot.{name} has no figure in its reference; give it a call that draws one")
+            raise PluginError(f"sl.plot.{name} has no figure in its reference; add a call to FIGURES")
         figure = f"`sl.plot.{FIGURES[name]}`:\n\n![sl.plot.{name}](plot-{name}.svg)\n" if name in FIGURES else ""
         shown.append(f"::: {function.strip()}\n\n{figure}")
     return "\n".join(shown)
 
 
 def gallery(files: Files, config: MkDocsConfig) -> str:
-    """Source, output and figures of every example, quickstart first; above them all figures, small."""
+    """Source, output and figures of every example, quickstart first, below small cards of all."""
     scripts = sorted(EXAMPLES.glob("*.py"), key=lambda script: (script.stem != "quickstart", script.stem))
     head = (
         "# Gallery\n\nThe scripts are in the folder `examples`; output and figures were made with this page. "
@@ -182,7 +182,7 @@ def gallery(files: Files, config: MkDocsConfig) -> str:
 
 
 def example(script: Path, files: Files, config: MkDocsConfig) -> tuple[str, str]:
-    """A card for one example, and the example: title and opening line, its figures, its code, what it prints."""
+    """A card for one example, and the example with title, first line, figures, code and output."""
     before = set(WORK.iterdir())
     output = ran(script.name)
     source = script.read_text(encoding="utf-8")
@@ -191,7 +191,7 @@ def example(script: Path, files: Files, config: MkDocsConfig) -> tuple[str, str]
     what = f"`{script.name}`" + (f": {rest.strip()}." if rest else "")
     figures = sorted(file for file in set(WORK.iterdir()) - before if file.suffix == ".png")
     if not figures:
-        raise PluginError(f"{script.name} draws nothing that its card could show")
+        raise PluginError(f"{script.name} draws no figure for its card")
     for figure in figures:
         files.append(File.generated(config, f"gallery/{figure.name}", abs_src_path=str(figure)))
     shown = "\n\n".join(f"![{title}](gallery/{figure.name})" for figure in figures)
@@ -201,7 +201,7 @@ def example(script: Path, files: Files, config: MkDocsConfig) -> tuple[str, str]
 
 
 def command_reference() -> str:
-    """The help of `sagline` and of each of its commands, with the figures that it draws."""
+    """The help of `sagline` and of each of its commands, with figures."""
     text = ran("-m", "typer", "sagline.cli.main", "utils", "docs", "--name", "sagline")
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     lines = [f"- [`sagline {name}`](#sagline-{name}): {first_line(command.help)}" for name, command in commands.items()]
@@ -219,7 +219,7 @@ def command_reference() -> str:
 
 
 def every_command() -> str:
-    """Each command with its picture, its page or what it tells."""
+    """Each command with its figure, page or output."""
     commands = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     shown = _shown("images/")
     if missing := commands.keys() ^ shown.keys():
@@ -229,11 +229,11 @@ def every_command() -> str:
         f"\n{shown[name]}\n"
         for name, command in commands.items()
     )
-    return "\n## Every command\n\nWhat each of them draws, makes or tells.\n" + "".join(entries)
+    return "\n## Every command\n\nFigure, page or output of each command.\n" + "".join(entries)
 
 
 def _shown(images: str) -> dict[str, str]:
-    """What there is of each command, for a page from which the images are there."""
+    """Figure, page or output of each command, for a page with this path to the images."""
     return {name: text.replace("{images}", images) for name, text in SHOWN.items()}
 
 
@@ -248,7 +248,7 @@ def fenced(text: str, language: str) -> str:
 
 
 def on_post_page(output: str, page: Any, **_: Any) -> str:
-    """Make sure that a page loads nothing from elsewhere."""
+    """Check that a page loads nothing from other servers."""
     if found := LOADED.search(output):
-        raise PluginError(f"{page.file.src_uri} loads something from elsewhere: {found[0]}")
+        raise PluginError(f"{page.file.src_uri} loads a file from another server: {found[0]}")
     return output

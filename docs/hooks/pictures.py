@@ -1,4 +1,4 @@
-"""Pictures that commands draw: made with the pages, so that they show what the command draws today.
+"""Figures of commands, generated with the pages, so that they are up to date.
 
 The line `<!-- drawn by: sagline track cogiro -->` of a page becomes the figures that this command writes, in a folder
 where the page's files (`<!-- file: name -->` before a block of code) and those of the examples are. The line
@@ -29,12 +29,12 @@ _drawn: dict[str, list[File]] = {}
 
 
 def on_pre_build(**_: Any) -> None:
-    """Forget the pictures of the last build."""
+    """Delete the figures of the last build."""
     _drawn.clear()
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Put the pictures in the place of the lines that ask for them."""
+    """Replace the marked lines of a page by the figures."""
     for name, text in NAMED.findall(markdown):
         (WORK / name).write_text(text, encoding="utf-8")
     if names := ABOVE.findall(markdown):
@@ -44,7 +44,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def _run(markdown: str, names: list[str], config: MkDocsConfig, files: Files) -> None:
-    """Run a page's blocks of Python, and take the figures of these names."""
+    """Run the Python blocks of a page, and return the figures with these names."""
     ran("-c", "\n".join(PYTHON.findall(markdown)))
     for name in names:
         content = (WORK / name).read_text(encoding="utf-8")
@@ -67,10 +67,10 @@ def _shown(command: str, page: Page, config: MkDocsConfig, files: Files) -> str:
 
 
 def draw(command: str) -> list[tuple[Path, str | bytes]]:
-    """The figures that a command writes, in the order in which it writes them, as SVG, and films as GIF."""
+    """The figures of a command in the order of writing, as SVG, and films as GIF."""
     folder = WORK / sha256(command.encode()).hexdigest()[:8]
     words = shlex.split(command)
-    out = f"{folder.name}/sim.nc" if words[0] == "simulate" else folder.name  # which names its file, not a folder
+    out = f"{folder.name}/sim.nc" if words[0] == "simulate" else folder.name  # `simulate` writes a file
     ran("-m", "sagline.cli", *words, "--out", out)
     written = sorted([*folder.glob("*.svg"), *folder.glob("*.gif")], key=lambda file: file.stat().st_mtime_ns)
     figures: list[tuple[Path, str | bytes]] = [
@@ -84,7 +84,7 @@ def draw(command: str) -> list[tuple[Path, str | bytes]]:
 
 
 def first_drawing(html: str) -> str:
-    """The first drawing of a report, as a file of its own."""
+    """The first drawing of a report, as a separate file."""
     found = re.search(r"<svg\b.*?</svg>", html, re.DOTALL)
     if not found:
         raise PluginError("there is no drawing in the report")

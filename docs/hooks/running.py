@@ -1,4 +1,4 @@
-"""Where the pages' own programs run, and how."""
+"""Execution of the programs of the pages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ WORK = ROOT / "build" / "pages"
 
 
 def fresh_folder() -> None:
-    """Empty the folder, and put the files of the examples there."""
+    """Empty the folder, and copy the files of the examples there."""
     shutil.rmtree(WORK, ignore_errors=True)
     WORK.mkdir(parents=True)
     for file in EXAMPLES.iterdir():
@@ -26,7 +26,7 @@ def fresh_folder() -> None:
 
 
 def environment() -> dict[str, str]:
-    """Of the programs: they import this tree, and write no colors."""
+    """Environment of the programs: they import this tree, and write no colors."""
     return {**os.environ, "PYTHONPATH": str(ROOT / "src"), "NO_COLOR": "1"}
 
 
@@ -36,7 +36,7 @@ def command_of(arguments: Sequence[str]) -> list[str]:
 
 
 def ran(*arguments: str, answers: str | None = None) -> str:
-    """What Python prints with these arguments, perhaps answered on its standard input; a failure stops the build."""
+    """Output of Python with these arguments and this standard input; a failure stops the build."""
     done = subprocess.run(
         command_of(arguments), cwd=WORK, env=environment(), input=answers, capture_output=True, text=True, check=False
     )

@@ -1,6 +1,6 @@
-"""What the gallery and the command's reference show of each command: a figure, a page to touch, or what it tells.
+"""Content of the gallery and of the command's reference for each command: figure, interactive page, or output.
 
-Lines of Markdown that the other hooks make pictures, pages and texts of.
+The values are lines of Markdown that the other hooks replace by figures, pages and texts.
 """
 
 from __future__ import annotations
@@ -9,22 +9,22 @@ from typing import Final
 
 
 def drawn(line: str) -> str:
-    """The figures that a command writes."""
+    """Line for the figures of a command."""
     return f"<!-- drawn by: sagline {line} -->"
 
 
 def told(*lines: str) -> str:
-    """What the last of some commands tells."""
+    """Line for the output of the last command."""
     return f"<!-- told by: {' && '.join(f'sagline {line}' for line in lines)} -->"
 
 
 def shared(*lines: str) -> str:
-    """The page that the last of some commands makes."""
+    """Line for the page of the last command."""
     return f"<!-- shared by: {' && '.join(f'sagline {line}' for line in lines)} -->"
 
 
 def driven(what: str) -> str:
-    """What one of three tells of a machine and who drives it: `twin`, `control`, `log`."""
+    """Line for the output of `twin`, `control` or `log` during a run of a machine."""
     return f"<!-- told of a machine: {what} -->"
 
 

@@ -1,8 +1,8 @@
-"""What commands tell on a terminal: made with the pages, so that it is what they tell today.
+"""Output of commands on a terminal, generated with the pages, so that it is up to date.
 
-The line `<!-- told by: sagline a && sagline b -->` becomes the commands and what the last of them tells, in a folder
-with the files of the examples; `<!-- told of a machine: twin -->` what `sagline twin`, or `control` or `log`, tells
-while a machine is driven.
+The line `<!-- told by: sagline a && sagline b -->` becomes the commands and the output of the last one, in a folder
+with the files of the examples; `<!-- told of a machine: twin -->` the output of `sagline twin`, or `control` or `log`,
+during a run of a machine.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from running import WORK, command_of, environment, ran
 
 MARK = re.compile(r"^<!-- told by: (sagline .+?) -->$", re.MULTILINE)
 MACHINE = re.compile(r"^<!-- told of a machine: (twin|control|log) -->$", re.MULTILINE)
-MOST: Final = 24  # lines that are shown
+MOST: Final = 24  # largest number of printed lines
 ROBOT: Final = "article-prototype"
 PLCS: Final = "127.0.0.1:11021,127.0.0.1:11022,127.0.0.1:11023,127.0.0.1:11024"
 TWIN: Final = ("twin", ROBOT, "--port", "0")
 CONTROL: Final = ("control", ROBOT, "--log", "driven.mcap")
 INTERRUPTED: Final = 130  # exit code
-# the machine in the same process and nobody waits for a clock: sites are built on busy computers too
+# the machine runs in the same process without a real-time clock, because the build computer may be busy
 IN_PROCESS: Final = """\
 import sagline as sl
 from sagline.cli import control, main
@@ -40,13 +40,13 @@ _machine: dict[str, str] = {}
 
 
 def on_pre_build(**_: Any) -> None:
-    """Forget what was told in the last build."""
+    """Delete the texts of the last build."""
     _told.clear()
     _machine.clear()
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the texts in the place of the lines that ask for them."""
+    """Replace the marked lines of a page by the texts."""
     markdown = MARK.sub(lambda found: _shown(found[1]), markdown)
     return MACHINE.sub(lambda found: _of_machine(found[1]), markdown)
 
@@ -67,7 +67,7 @@ def _of_machine(what: str) -> str:
 
 
 def _drive() -> dict[str, str]:
-    """What a twin says when it begins; a controller that is told by a pipe what to do; and its log."""
+    """Output of a starting twin, of a controller with piped commands, and of its log."""
     driven = ran("-c", IN_PROCESS.format(words=[*CONTROL, "--plc", PLCS]), answers=DRIVEN)
     return {
         "twin": _terminal([f"sagline {' '.join(TWIN)}"], _first_words(TWIN)),
@@ -77,7 +77,7 @@ def _drive() -> dict[str, str]:
 
 
 def _first_words(words: Sequence[str]) -> str:
-    """What a command says until it has told its addresses; then it is interrupted."""
+    """Output of a command up to its addresses; then it is interrupted."""
     command = command_of(["-m", "sagline.cli", *words])
     with subprocess.Popen(command, cwd=WORK, env=environment(), stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -92,9 +92,9 @@ def _first_words(words: Sequence[str]) -> str:
 
 
 def _terminal(commands: list[str], text: str) -> str:
-    """Commands and what the last of them tells, cut where nobody would read on."""
+    """Commands and the output of the last one, cut after `MOST` lines."""
     lines = [line.rstrip() for line in text.replace(str(WORK), "~").strip("\n").splitlines()]
     if len(lines) > MOST:
-        lines = [*lines[:MOST], f"… and {len(lines) - MOST:,} lines more"]
+        lines = [*lines[:MOST], f"… and {len(lines) - MOST:,}more lines"]
     head = "\n".join(f"$ {command}" for command in commands)
     return "```text\n" + "\n".join((head, *lines)) + "\n```"
