@@ -1,4 +1,4 @@
-"""`make bench`: one table of times, ratios and residuals; one core, peers in the same run."""
+"""`make bench`: one table of times, ratios and residuals; one core, compared functions in the same run."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def speed_of_cables() -> Iterator[Row]:
 
 
 def in_the_box(robot: sl.Robot, count: int) -> sl.Pose:
-    """So many poses of a robot's test box, the infeasible ones left out."""
+    """Feasible poses among `count` random ones of a robot's test box."""
     rng, box = np.random.default_rng(3), robot.test_box
     assert box is not None
     pose = sl.Pose.from_euler(rng.uniform(box.low, box.high, (count, 3)), *rng.uniform(-0.05, 0.05, (3, count)))
@@ -111,7 +111,7 @@ def inverse_kinematics() -> Iterator[Row]:
     """The article's suspended robot on random poses, and one pose at a time."""
     robot = sl.load_robot("article-suspended")
     rng = np.random.default_rng(1)
-    drawn = 6 * POSES // 5  # some have no feasible tensions: they take another way and are left out
+    drawn = 6 * POSES // 5  # infeasible poses run other code and are left out
     pose = sl.Pose.from_euler(
         rng.uniform((-5, -3.5, 1), (5, 3.5, 4), (drawn, 3)), *rng.uniform(-0.05, 0.05, (3, drawn))
     )
@@ -146,7 +146,7 @@ def inverse_kinematics() -> Iterator[Row]:
 
 
 def two_threads() -> Iterator[Row]:
-    """Two threads on two cores, half of the poses each, against one thread; before this process keeps to one core."""
+    """Two threads on two cores, half of the poses each, against one thread; runs before `one_core`."""
     cores = len(os.sched_getaffinity(0))
     if cores < 2:
         return
@@ -161,7 +161,7 @@ def two_threads() -> Iterator[Row]:
 
 
 def whole_processes() -> Iterator[Row]:
-    """Memory of a long plan, and what a user waits for."""
+    """Memory of a long plan, and times of whole processes."""
     memory = process_peak_memory(
         "import numpy as np, sagline as sl\n"
         "path = sl.article_path(rate=1_000_000 / 60)\n"

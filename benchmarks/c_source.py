@@ -1,4 +1,4 @@
-"""The C99 of `sagline export-c`, compiled by the machine's own compiler with -O2; one core."""
+"""The C99 of `sagline export-c`, compiled by the system's compiler with -O2; one core."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ int main(void)
 
 
 def c_source() -> Iterator[Row]:
-    """Times a cable and a pose, and sizes."""
+    """Times per cable and per pose, and sizes."""
     with TemporaryDirectory() as name:
         folder = Path(name)
         source, header, _ = sl.export_c(sl.load_robot("article-prototype"), folder / "sagline.c")

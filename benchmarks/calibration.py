@@ -1,4 +1,4 @@
-"""Calibration: one of 60 poses, what it leaves, a million of them, poses worth measuring; one core."""
+"""Calibration: of 60 poses, its remaining error, of a million rows, and recommended poses; one core."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ ALL = (*ANCHORS, "linear_density", "axial_stiffness", "mass", "center_of_mass") 
 UNKNOWNS = [sl.Unknown(name, deviation=error) for name, error in ERRORS.items()]
 COGIRO = with_drums()
 ROBOTS = 16
-TILED = 100_000  # rows of which a pass is timed
+TILED = 100_000  # rows of a timed iteration
 MILLION = 1_000_000
 
 
 def problem_of(log: sl.WinchLog) -> FitProblem:
-    """What a calibration of the CoGiRo by a log is to find."""
+    """Unknowns of a calibration of CoGiRo by a log."""
     sensors = active_sensors(log)
     return FitProblem(
         COGIRO, sl.Catenary(), sensors, parameters_of(COGIRO, UNKNOWNS, sensors, counted=True), readings_table(log)
@@ -38,7 +38,7 @@ def problem_of(log: sl.WinchLog) -> FitProblem:
 
 
 def plain_seconds(log: sl.WinchLog) -> float:
-    """Seconds of scipy's least squares, slopes by differences, numbers and lengths its unknowns."""
+    """Time of scipy's least squares with differences, unknowns and lengths together [s]."""
     problem = problem_of(log)
     state = start_of(problem, log.commanded)
     width, deviation = len(problem.prior), log.sensors.tension_deviation
@@ -76,7 +76,7 @@ def single() -> Iterator[Row]:
 
 
 def accuracy() -> Iterator[Row]:
-    """What position error a calibration leaves."""
+    """Remaining position error after a calibration."""
     chosen = sl.calibration_poses(COGIRO, 60, UNKNOWNS, usual_sensors())
     for words, positions, goal in (
         ("no measured position, up to shift and yaw", 0, "<= 3.5 mm from 46"),
@@ -136,7 +136,7 @@ def large() -> Iterator[Row]:
 
 
 def poses() -> Iterator[Row]:
-    """40 poses of 500 to find 63 numbers by: against random ones."""
+    """40 recommended poses of 500 for 63 unknowns, against random ones."""
     for name in ("cogiro", "article-suspended"):
         robot, sensors = with_drums(name), usual_sensors()
         seconds = best_seconds(lambda robot=robot, sensors=sensors: sl.calibration_poses(robot, 40, ALL, sensors), 3)  # type: ignore[misc]

@@ -1,4 +1,4 @@
-"""What a first run costs, with nothing compiled yet; on all cores there are: `python -m benchmarks.cold`."""
+"""Times of a first run, without compiled kernels, on all cores: `python -m benchmarks.cold`."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def viewer() -> Iterator[Row]:
     _, seconds, told = cold((sys.executable, "-c", VIEW, str(time.time())))
     first, region, everything = map(float, told.split())
     yield Row("sagline view, cold: cables, verdict and table", "<= 25 s", f"{first:.1f} s")
-    yield Row("where the platform may go, after these", "<= 10 s", f"{region - first:.1f} s")
+    yield Row("region of the platform, after these", "<= 10 s", f"{region - first:.1f} s")
     yield Row("all readings, all models", "", f"{everything:.1f} s; {seconds:.1f} s of processor")
 
 

@@ -1,4 +1,4 @@
-"""The controller: what a cycle takes, alone and with a machine in the same process; one core."""
+"""The controller: time of a cycle, alone and with a machine in the same process; one core."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ SPEED, STAND = 0.047, 3.0  # m/s, s: fourteen minutes through the ten poses
 
 
 class Timed(Spy):
-    """A link that says how long the machine behind it took."""
+    """A link that measures the time of the machine behind it."""
 
     seconds = 0.0
 
     def exchange(self, command: Command | None) -> Sample | Missing:
-        """Exchange, and measure."""
+        """Exchange and measure."""
         begin = time.perf_counter()
         answer: Sample | Missing = self.link.exchange(command)
         self.seconds += time.perf_counter() - begin
@@ -31,7 +31,7 @@ class Timed(Spy):
 
 
 def cycles() -> Iterator[Row]:
-    """Home and the ten poses without standing, cycle by cycle: what of each is the controller's."""
+    """Home and the ten poses without stops: time of the controller in each cycle."""
     control, machine = rig(imperfect(zero=2e-3))
     link = control._context.link = Timed(machine.link())
     path = sl.quintic_path([HOME.position, *table2().desired], speed=0.2)
@@ -62,7 +62,7 @@ def stops() -> Iterator[Row]:
     errors = [float(np.sqrt(np.mean(one.tension**2))) for one in (off, on)]
     moved = 1e3 * np.linalg.norm(on.place - off.place, axis=1).max()
     yield Row("zeros wrong by 2 mm rms: null-space tension", "<= 1.5 N", f"{errors[0]:.1f} -> {errors[1]:.2f} N")
-    yield Row("what the loop moves the platform", "<= 0.05 mm", f"{moved:.3f} mm, acting {1e2 * on.acting:.1f} %")
+    yield Row("platform displacement by the loop", "<= 0.05 mm", f"{moved:.3f} mm, acting {1e2 * on.acting:.1f} %")
 
 
 PARTS = (cycles, stops)

@@ -1,4 +1,4 @@
-"""Better robots: how much better the article's robot gets in 600 tries, and what that takes; one core."""
+"""Design: improvement of the article's robot in 600 evaluations, and its time; one core."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OPTIMIZERS = ("cma", "differential_evolution", "nsga2")
 
 
 def searches() -> Iterator[Row]:
-    """The article's suspended robot, posts' anchors lower by up to 3 m, upper and lower cables each by their own."""
+    """The article's suspended robot with anchors up to 3 m lower, separately for upper and lower cables."""
     robot, load = sl.load_robot("article-suspended"), sl.WrenchBox(force=50.0, moment=5.0)
     free, box = posts(), inside(0.3)
     for optimizer in OPTIMIZERS:
@@ -31,7 +31,7 @@ def searches() -> Iterator[Row]:
 
 
 def posts() -> list[sl.FreeAnchors]:
-    """Upper and lower cables of each post of the article's robot, down along its verticals, all posts alike."""
+    """Design variables: upper and lower anchors, vertically, equal at all posts."""
     return [
         sl.FreeAnchors("frame", -3.0, 0.0, along=[0, 0, 1], symmetry="together", cables=cables)
         for cables in ((0, 2, 4, 6), (1, 3, 5, 7))

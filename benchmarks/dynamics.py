@@ -1,4 +1,4 @@
-"""Dynamics: what motions leave, and how fast they may be; one core."""
+"""Dynamics: residual vibration, and fastest motions; one core."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def residuals() -> Iterator[Row]:
 
 
 def shortest() -> Iterator[Row]:
-    """The same way as fast as the tension limits allow."""
+    """The same path at the tension limits."""
     robot, path = scene().robot, sl.quintic_path(WAYPOINTS, durations=2.0)
     for jerk in (None, 200.0):
         start = time.perf_counter()

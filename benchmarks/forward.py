@@ -1,6 +1,6 @@
-"""Forward kinematics: how often it is right, how fast, how exact. One table, one core.
+"""Forward kinematics: success, speed and accuracy; one table, one core.
 
-python -m benchmarks.forward            # full counts, as the numbers to reach are stated
+python -m benchmarks.forward            # full counts, as in the targets
 python -m benchmarks.forward --quick    # a tenth of the poses
 """
 
@@ -22,11 +22,11 @@ BOX_POSES = 10_000
 PRESET_POSES = 1_000
 TIMED_POSES = 1_000
 ARTICLE_TILT = np.radians(10.0)
-SAME = 1e-6  # [m], and radians: closer poses are one
+SAME = 1e-6  # [m], and radians: closer poses count as equal
 
 
 def wider(robot: sl.Robot) -> sl.Robot:
-    """The article's robots with tilts to 10 degrees, as the numbers to reach ask for."""
+    """The article's robots with tilts to 10 degrees, as in the targets."""
     box = robot.test_box
     assert box is not None
     if not robot.name.startswith("article"):
@@ -35,14 +35,14 @@ def wider(robot: sl.Robot) -> sl.Robot:
 
 
 def plan_of(robot: sl.Robot, feasible: int, seed: int) -> sl.Plan:
-    """A plan of exactly so many feasible poses of the test box."""
+    """A plan of exactly `count` feasible poses of the test box."""
     plan = feasible_plan(robot, int(1.5 * feasible) + 20, seed)
     keep = slice(0, feasible)
     return sl.inverse(robot, plan.state.pose[keep], tension=sl.MinimumNorm())
 
 
 def right(found: sl.ForwardSolution, pose: sl.Pose) -> Flags:
-    """Whether the original pose was found, sample by sample."""
+    """True for samples at which the original pose was found."""
     return np.asarray((position_error(found, pose) < SAME) & (angle_error(found, pose) < SAME))
 
 

@@ -1,4 +1,4 @@
-"""Least distances of hanging cables, rods, boxes and meshes; one core."""
+"""Least distances of sagging cables, rods, boxes and meshes; one core."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.interference.scenes import box_mesh
 from tests.kernels.interference.hanging import agreement, all_pairs, nearest_cable_pairs
 
 ROBOTS = ("article-suspended", "cogiro", "ipanema-1", "expo2015-lucia-pulleys")
-POSES = 40  # so few that a run ends before another program disturbs it
+POSES = 40  # few, so that a run ends before another program disturbs it
 RUNS = 50
 
 
@@ -44,7 +44,7 @@ def measured(rows: Array, pairs: Indices, precision: float, together: bool = Fal
 
 
 def pairs_of_cables() -> Iterator[Row]:
-    """Two hanging cables, and all pairs of a pose."""
+    """Two sagging cables, and all pairs of a pose."""
     for name in ROBOTS:
         state = states(name)
         rows = locked(cable_rows(state, np.zeros(1)))
@@ -52,7 +52,7 @@ def pairs_of_cables() -> Iterator[Row]:
         for precision, reach in ((1e-3, 3), (1e-4, 5)):
             seconds, value, low = measured(rows, pairs, precision)
             yield Row(
-                f"two hanging cables of {name}, certified to {1e3 * precision:g} mm",
+                f"two sagging cables of {name}, certified to {1e3 * precision:g} mm",
                 f"<= {reach} us a pair" + (", 28 pairs <= 60 us" if precision == 1e-4 else ""),
                 f"{1e6 * seconds / 28:.2f} us, {1e6 * seconds:.1f} us a pose, {1e3 * (value - low).max():.3g} mm",
             )
@@ -67,7 +67,7 @@ def brute_force() -> Iterator[Row]:
 
 
 def obstacles() -> Iterator[Row]:
-    """Cables against what stands around."""
+    """Cables against obstacles."""
     state = states("cogiro")
     robot = state.one_robot
     around = (

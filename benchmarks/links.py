@@ -1,4 +1,4 @@
-"""The links to PLCs, on the loopback: four servers in a process of their own, as of `sagline twin`; write and read."""
+"""The links to PLCs, on the loopback: four servers in another process, as of `sagline twin`; write and read."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from sagline.twin.block_servers import BlockServers
 
 GROUPS, WINCHES, OWNER = 4, 8, 7
 CYCLES = 600
-SLOW = 3e-3  # s, in which a slow server answers
+SLOW = 3e-3  # s, response time of a slow server
 KINDS = {"s7": sl.plc.S7Link, "slow": sl.plc.S7Link, "modbus": sl.plc.ModbusLink}
 
 
 def blocks(counter: int) -> list[bytes]:
-    """What four PLCs say that have nothing to do."""
+    """Blocks of four idle PLCs."""
     head = {"counter": counter, "owner": OWNER, "winches": 2}
     return [FROM_PLC.pack({**head, "group": group + 1}) for group in range(GROUPS)]
 
 
 def serve(kind: str) -> None:
-    """Be the servers, until stdin ends."""
+    """Run the servers until stdin ends."""
     servers = _block_servers(kind)
     sys.stdout.write(",".join(servers.addresses) + "\n")
     sys.stdout.flush()
@@ -77,7 +77,7 @@ def linked(kind: str) -> Iterator[BlockLink]:
 
 
 def round_trips(kind: str) -> tuple[Array, Array]:
-    """Of the slowest group in each cycle, and how long `exchange` took [s]."""
+    """Time of the slowest group in each cycle, and time of `exchange` [s]."""
     none, on = np.zeros(WINCHES), np.ones(WINCHES, dtype=np.bool_)
     slowest, taken = [], []
     with linked(kind) as link:
@@ -94,7 +94,7 @@ def links() -> Iterator[Row]:
     """Four groups: write a command and read a block of each."""
     for kind, name, target in (
         ("s7", "four S7 servers, write and read, slowest group", "p50 <= 1.5 ms"),
-        ("slow", "the same where each takes 3 ms to answer", "not their sum, 12 ms"),
+        ("slow", "the same with a response time of 3 ms each", "not their sum, 12 ms"),
         ("modbus", "four Modbus servers", "about 3.7 ms"),
     ):
         slowest, taken = round_trips(kind)

@@ -1,4 +1,4 @@
-"""The machine between encoder and cable: pulleys, dead cable and drums; one core."""
+"""The machine between encoder and cable: pulleys, dead length and drums; one core."""
 
 from __future__ import annotations
 
@@ -40,14 +40,14 @@ def counts() -> Iterator[Row]:
 
 
 def hard_cables() -> Iterator[Row]:
-    """Random cables over pulleys, with dead cable: length from tension, and the tension back."""
+    """Random cables over pulleys, with dead length: length from tension, and the tension back."""
     tension, found, expected, _statuses = there_and_back(38_000, seed=3)
     worst = (np.abs(found - tension) / expected).max()
     yield Row("38,000 random cables there and back, of one rounding of the length", "4", f"{worst:.1f} at most")
 
 
 def speed() -> Iterator[Row]:
-    """The same robots with pulleys and dead cable and without, in turn."""
+    """The same robots with pulleys and dead length and without, in turn."""
     for name in ROBOTS:
         bare = sl.load_robot(name)
         over = bare.replace(winches=sl.Winch(0.05, dead_cable=4.0))
@@ -69,7 +69,7 @@ def speed() -> Iterator[Row]:
 
 
 def ratio_of(run: Callable[[sl.Robot], object], one: sl.Robot, other: sl.Robot) -> tuple[float, float]:
-    """Least time of one by that of the other, measured in turn, and the first itself [s]."""
+    """Ratio of two least times, measured in turn, and the first one [s]."""
     times: list[list[float]] = [[], []]
     for _ in range(TURNS):
         for kept, robot in zip(times, (one, other), strict=True):
@@ -91,7 +91,7 @@ def formula() -> Iterator[Row]:
         for name in ROBOTS:
             robot = sl.load_robot(name).replace(winches=sl.Winch(0.05, dead_cable=dead))
             worst = max(worst, formula_error(robot, random_poses(robot, 500, np.random.default_rng(1))))
-        what = f"{dead:g} m of dead cable" if dead else "no dead cable"
+        what = f"{dead:g} m of dead length" if dead else "no dead length"
         yield Row(f"straight exit and catenary from it, {what}", "none", f"{1e6 * worst:.1f} um off at most")
 
 

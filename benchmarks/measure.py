@@ -1,4 +1,4 @@
-"""How the benchmarks measure: the best of many short runs on one core, because other programs disturb."""
+"""Measurement of times: the best of many short runs on one core, because other programs disturb."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def one_core() -> None:
 
 
 def best_seconds(run: Callable[[], object], repeats: int = 7) -> float:
-    """Shortest wall time of several runs [s], after one that is not counted."""
+    """Shortest wall time of several runs [s], without the first."""
     run()
     times = []
     for _ in range(repeats):
@@ -48,7 +48,7 @@ def best_of_calls(call: Callable[[], object], calls: int = 500, repeats: int = 2
 
 
 def process_seconds(arguments: Sequence[str], repeats: int = 3) -> float:
-    """Shortest wall time of a whole process [s], after one that is not counted."""
+    """Shortest wall time of a whole process [s], without the first."""
     return best_seconds(lambda: subprocess.run(arguments, check=True, capture_output=True), repeats)
 
 
@@ -60,7 +60,7 @@ def process_peak_memory(code: str) -> float:
 
 
 def show(title: str, rows: Sequence[Row], console: Console) -> None:
-    """Print a table, as Markdown where the output is no terminal."""
+    """Print a table, as Markdown if the output is not a terminal."""
     if console.is_terminal:
         table = Table(*Row._fields, title=title)
         for row in rows:

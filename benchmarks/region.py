@@ -1,6 +1,6 @@
-"""The region in the viewer: how soon it is there after a slider moved, and how often the page is drawn meanwhile.
+"""The region in the viewer: its time after the move of a slider, and the update rate of the page meanwhile.
 
-By the clock on the wall, with a client that hears what a browser hears: on a busy machine it tells of the machine.
+Wall times, with a client that receives the messages of a browser; they depend on the load of the machine.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from tests.viewer.client import Client, await_that
 ROBOTS = ("cogiro", "falcon-7", "fast", "article-suspended", "ipanema-2-pulleys")
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 MOVES, DRAGGED = 7, 3.0  # moves of a slider, and seconds of a drag
-QUIET = 0.02  # s without a word: all has been heard
+QUIET = 0.02  # s without a message: all messages have been received
 
 
 class Shown(NamedTuple):
-    """A page with its region, and a client.
+    """A viewer with its region, and a client.
 
     Attributes:
         viewer: The viewer.
@@ -43,7 +43,7 @@ class Shown(NamedTuple):
 
 @contextmanager
 def shown(robot: sl.Robot) -> Iterator[Shown]:
-    """A page of a robot, its region drawn."""
+    """A viewer of a robot with its region."""
     server = start_server(port=0)
     viewer = Page(server, FEATURES, robot)
     thread = threading.Thread(target=viewer.serve)
@@ -64,7 +64,7 @@ def _name(field: Any) -> str:
 
 
 def heard_until(client: Client, words: str) -> float:
-    """How long until a region is told for the last time, after which nothing more is told for a second [s]."""
+    """Time of the last message of a region that is followed by a second without messages [s]."""
     start = time.monotonic()
     last = 0.0
     while not last or time.monotonic() - start - last < 1.0:
@@ -75,7 +75,7 @@ def heard_until(client: Client, words: str) -> float:
 
 
 def regions() -> Iterator[Row]:
-    """After a slider moved, until a client has heard of the region in full."""
+    """Time from the move of a slider to the full region at a client."""
     for name in ROBOTS:
         robot = sl.load_robot(name)
         cells = region_in(WorkspaceQuery(robot, LEVEL, sl.Catenary(), sl.WrenchBox()), rough=False).cells
@@ -90,7 +90,7 @@ def regions() -> Iterator[Row]:
 
 
 def work() -> Iterator[Row]:
-    """What it takes of a processor, with the rough one that comes first."""
+    """Processor time of a region, with the coarse one before it."""
     robot = sl.load_robot("cogiro")
     asked = WorkspaceQuery(robot, LEVEL, sl.Catenary(), sl.WrenchBox())
     taken = []
@@ -103,7 +103,7 @@ def work() -> Iterator[Row]:
 
 
 def drags() -> Iterator[Row]:
-    """How often the cables are drawn while something is dragged that the region follows."""
+    """Update rate of the cables during a drag that changes the region."""
     robot = sl.load_robot("cogiro")
     with shown(robot) as (viewer, client, mass):
         assert viewer.view is not None

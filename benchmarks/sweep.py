@@ -19,13 +19,13 @@ from sagline.sweep.folder import make_folder
 from sagline.sweep.work import measured_size, task
 
 ROBOT = Path(__file__).parents[1] / "examples" / "own_planar.yaml"
-PUBLISHED = 5844.0  # s, of as many requests on eight workers, 57,952 of which were lost
+PUBLISHED = 5844.0  # s, of the same number of requests on eight workers, 57,952 of them lost
 POSES, LOADS = 31_000, 1_000
 SHARE = 10  # of them, for a loop and workers side by side
 
 
 def asked(poses: int, loads: int) -> sl.sweep.Request:
-    """Level poses all over the plane but for its edges, under forces of up to 100 N and moments of up to 3 N m."""
+    """Level poses in the plane except its edges, with forces to 100 N and moments to 3 N m."""
     rng = np.random.default_rng(31)
     place = rng.uniform((0.6, 0.0, 0.5), (3.4, 0.0, 2.5), (poses, 3))
     wrenches = rng.uniform(-1.0, 1.0, (loads, 6)) * [100.0, 0.0, 100.0, 0.0, 3.0, 0.0]
@@ -52,10 +52,10 @@ def in_a_loop_and_on_workers() -> Iterator[Row]:
 
 
 def without_the_start() -> Iterator[Row]:
-    """Tasks a second of one worker and of two, once they run: what a long sweep goes by."""
+    """Tasks per second of one worker and of two after their start, as in a long sweep."""
     from sagline.sweep.cluster import local_workers, run_tasks
 
-    request = asked(POSES // 4, LOADS)  # of some twenty tasks; with a few only the first and the last would count
+    request = asked(POSES // 4, LOADS)  # of some twenty tasks; with fewer the first and the last would dominate
     size, rates = measured_size(request), []
     with tempfile.TemporaryDirectory() as place:
         make_folder(alone := Path(place) / "alone", request, size)
@@ -71,10 +71,10 @@ def without_the_start() -> Iterator[Row]:
         with local_workers(2, lambda text: None) as client:
             job = (str(together), _digest(together))
             run_tasks(client, job, range(count), lambda *_: done.append(time.perf_counter()), lambda text: None)
-        # between the fourth task and the last but one: both workers are at work
+        # between the fourth task and the second to last: both workers are busy
         rates.append((len(done) - 6) / (done[-2] - done[4]))
     text = f"{rates[1] / rates[0]:.2f} x ({rates[0]:.2f} tasks a second, {rates[1]:.2f})"
-    yield Row("two workers at work against a plain loop", ">= 1.8 x", text)
+    yield Row("two busy workers against a plain loop", ">= 1.8 x", text)
 
 
 def tension_requests() -> Iterator[Row]:
@@ -97,7 +97,7 @@ def tension_requests() -> Iterator[Row]:
         "<= 90 s, 0 lost",
         f"{seconds:.0f} s, {sum(spent.values()):.0f} s of processor by the workers ({PUBLISHED / seconds:.0f} x the "
         f"published run); {counts.feasible:,} feasible, "
-        f"{counts.infeasible:,} proved not to be, {counts.open + counts.unable} open, {counts.lost} lost; "
+        f"{counts.infeasible:,} proved infeasible, {counts.open + counts.unable} open, {counts.lost} lost; "
         f"{gigabytes:.1f} GB",
     )
 
@@ -112,7 +112,7 @@ PARTS = (in_a_loop_and_on_workers, without_the_start, tension_requests)
 
 
 def sweeps() -> Iterator[Row]:
-    """All of it; before the process keeps to one core."""
+    """Measure and print, before `one_core`."""
     if len(os.sched_getaffinity(0)) > 1:
         for part in PARTS:
             yield from part()

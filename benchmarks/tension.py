@@ -1,4 +1,4 @@
-"""Tension distribution: verdicts and their proofs, times of every method, and how continuous each is; one core."""
+"""Tension distribution: verdicts with proofs, times and continuity of every method; one core."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ SAG = {"PNorm(p=4)": 5, "PNorm(p=16)": 5, "AnalyticCenter": 5}  # us more
 def share_batch(  # type: ignore[no-untyped-def]
     sharing_terms, strips, nulls, references, room, previous, otherwise, statuses
 ):
-    """The sharing alone, of many poses that are already factored; otherwise as in `inverse_poses`."""
+    """The tension distribution alone, of many factored poses; otherwise as in `inverse_poses`."""
     sharing = Distribution(*sharing_terms)
     r, m = nulls[0].shape
     near, rest = new_reference_point(Memory(*room), previous, r)
@@ -75,7 +75,7 @@ def share_batch(  # type: ignore[no-untyped-def]
 
 
 def factored(robot: sl.Robot, poses: sl.Pose) -> tuple[Array, Array]:
-    """Strips and null spaces of poses with weightless cables."""
+    """Bounds and null spaces of poses with weightless cables."""
     m = robot.cable_count
     limits = np.zeros((len(poses), STRIP_ROWS, m))
     nulls = np.empty((len(poses), m - 6, m))
@@ -88,7 +88,7 @@ def factored(robot: sl.Robot, poses: sl.Pose) -> tuple[Array, Array]:
 
 
 def times() -> Iterator[Row]:
-    """Time of each method: the sharing alone, and a whole inverse with straight and with exact cables."""
+    """Time of each method: the tension distribution alone, and a whole inverse with straight and with exact cables."""
     robot = sl.load_robot("article-mixed")
     poses = random_poses(robot, POSES, np.random.default_rng(0))
     limits, nulls = factored(robot, poses)
@@ -132,7 +132,7 @@ def verdicts() -> Iterator[Row]:
 
 
 def continuity() -> Iterator[Row]:
-    """Largest slope of a tension on lines through four robots' boxes; with smaller steps it grows where one jumps."""
+    """Largest slope of a tension on lines through four robots' boxes; it grows with smaller steps if tensions jump."""
     for name, method in METHODS.items():
         figures = [max(_steepest(robot, method, count) for robot in LINES) for count in (2001, 20001)]
         yield Row(
@@ -198,12 +198,12 @@ def main() -> None:
     """Measure and print."""
     console = Console()
     rows: list[Row] = []
-    rows.extend(requests())  # on all processors, before this process keeps to one
+    rows.extend(requests())  # on all processors, before `one_core`
     one_core()
     for part in (times, verdicts, continuity):
         Console(stderr=True).print(f"[dim]{part.__doc__}[/dim]")
         rows.extend(part())
-    show("Distribution the load", rows, console)
+    show("Tension distribution", rows, console)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Verdicts with sag: the time of poses without an answer, in the open and next to the border; one core."""
+"""Verdicts with sag: time of infeasible poses, far from the border and near it; one core."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def in_the_open(name: str) -> Row:
 
 
 def at_the_border(name: str) -> Iterator[Row]:
-    """Poses whose load is a little more than the largest that is feasible."""
+    """Poses with a load slightly above the largest feasible one."""
     border = found_border(name, 100, 3)
     weight = border.robot.mass * border.robot.gravity
     for over in OVERLOADS:
@@ -64,7 +64,7 @@ def at_the_border(name: str) -> Iterator[Row]:
 
 
 def decision_seconds(robot: sl.Robot, poses: sl.Pose, loads: Array) -> float:
-    """Time to decide poses that the rounds of sharing left open."""
+    """Time to decide poses that the iterations of the tension distribution left open."""
     options = kernel_options(robot, sl.Catenary(), METHOD)
     rows, nothing = pose_rows(poses), np.full(robot.cable_count, np.nan)
     found = solve_inverse_rows(robot, METHOD, options, rows, loads, nothing)

@@ -1,4 +1,4 @@
-"""Vibrations of robots whose cables have mass: what they agree with, and how long they take; one core."""
+"""Vibrations of robots with cable mass: comparisons and times; one core."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ UP_TO: Final = 20.0  # Hz
 
 
 def cables() -> Iterator[Row]:
-    """One cable: held frequencies against closed forms and chains of springs."""
+    """One cable: frequencies with fixed ends against closed forms and chains of springs."""
     table = string(30.0, 40.0, 7.0, 0.1, 1e6)
     table[0, 3] = 0.0
     exact = np.sqrt(50.0 / (0.1 * (1.0 + 50.0 / 1e6))) / 14.0
@@ -36,7 +36,7 @@ def cables() -> Iterator[Row]:
 
 
 def robots() -> Iterator[Row]:
-    """Robots: stored finite elements, the exact count, other cuts."""
+    """Robots: stored finite elements, the exact count, other element sizes."""
     for position, expected in LOWEST_SIX.items():
         found = sl.vibration(at("article-suspended", position), up_to=3.0).frequency[:6]
         off = np.abs(found - expected).max()
@@ -56,7 +56,7 @@ def robots() -> Iterator[Row]:
 
 
 def speed() -> Iterator[Row]:
-    """How long vibrations, maps and responses take."""
+    """Times of vibrations, maps and responses."""
     for name in ("cogiro", "article-suspended"):
         state = middle(name)
         setting = vibration_model(state)

@@ -1,4 +1,4 @@
-"""What the viewer takes, warm: `python -m benchmarks.viewer`. A process serves, this one is its clients."""
+"""Times of the viewer, warm: `python -m benchmarks.viewer`. Another process is the server, this one the clients."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from tests.viewer.client import Client
 ROBOT = "cogiro"
 REPEATS = 5
 WATCHED = 5.0  # s
-RENDERING = 0.05  # s that a picture takes the one who films
+RENDERING = 0.05  # s, time of a picture for the filming client
 CUT = ("falcon-7", "cogiro", "fast")
-SETTLED, QUIET = 6.0, 1.0  # s without a word: everything stands
+SETTLED, QUIET = 6.0, 1.0  # s without a message: the page is complete
 PORT = ("--no-browser", "--port", "0")
 
 
 @contextmanager
 def serving(*arguments: str) -> Iterator[tuple[int, Callable[[], float]]]:
-    """A viewer of its own: the port that it has told, and how much of a processor it has used [s]."""
+    """A viewer process with its port and its processor time [s]."""
     command = (sys.executable, "-m", "sagline.cli", "view", *arguments, *PORT)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     assert process.stdout is not None
@@ -52,12 +52,12 @@ def used(pid: int) -> float:
 
 
 def cables_in(message: dict[str, Any]) -> bool:
-    """Whether a message moves the cables."""
+    """True if a message moves the cables."""
     return message.get("name") == "/cables" and "points" in message.get("updates", {})
 
 
 def first_cables() -> Iterator[Row]:
-    """From the command to its first cables."""
+    """Time from the command to its first cables."""
     waits, spent, whole = [], [], []
     for _ in range(REPEATS):
         with serving(ROBOT) as (port, processor):
@@ -75,7 +75,7 @@ def first_cables() -> Iterator[Row]:
 
 
 def two_while_a_third_films() -> Iterator[Row]:
-    """One drags, one looks on, a third films."""
+    """Update rates with one client that drags, one that watches, and a third that films."""
     with tempfile.TemporaryDirectory() as folder:
         robot = sl.load_robot(ROBOT)
         ends = sl.Pose(np.array([[0.0, 0.0, 2.0], [2.0, 1.0, 2.0]]), np.stack([np.eye(3)] * 2))
@@ -98,11 +98,11 @@ def two_while_a_third_films() -> Iterator[Row]:
         films = "" if name == "alone" else f"; {pictures:.0f} pictures/s"
         reach = "" if name == "alone" else ">= 20 updates/s"
         rates = f"{one:.0f} and {two:.0f} updates/s, {100 * share:.0f}% of a processor{films}"
-        yield Row(f"one client drags {ROBOT}, one looks on, {name}", reach, rates)
+        yield Row(f"one client drags {ROBOT}, one watches, {name}", reach, rates)
 
 
 def watched(dragging: Client, looking: Client, processor: Callable[[], float]) -> tuple[float, float, float]:
-    """Updates a second of both, and the share of a processor that it takes."""
+    """Updates per second of both, and the share of a processor."""
     counts = [0, 0]
     until = time.perf_counter() + WATCHED
 
@@ -124,10 +124,10 @@ def watched(dragging: Client, looking: Client, processor: Callable[[], float]) -
 
 
 class Filming(threading.Thread):
-    """A client that films, and gives each picture in its own time."""
+    """A filming client, with its own time for each picture."""
 
     def __init__(self, client: Client) -> None:
-        """Begin with `start`; `stopped` ends it."""
+        """Film from `start` until `stopped`."""
         super().__init__(daemon=True)
         self.client = client
         self.count = 0
@@ -138,7 +138,7 @@ class Filming(threading.Thread):
         self.picture = buffer.getvalue()
 
     def run(self) -> None:
-        """Press the button, and answer what is asked."""
+        """Press the button and answer the requests."""
         for message in self.client.heard(60.0):
             if self.stopped.is_set():
                 return
@@ -156,7 +156,7 @@ class Filming(threading.Thread):
 
 
 def cut_cables() -> Iterator[Row]:
-    """From the click on "Cut" to the first picture in which the platform has moved."""
+    """Time from the click on "Cut" to the first picture with a moved platform."""
     for name in CUT:
         waits, spent = [], []
         with serving(name) as (port, processor), Client(port) as client:
@@ -178,7 +178,7 @@ def cut_cables() -> Iterator[Row]:
 
 
 def platform_in(message: dict[str, Any]) -> bool:
-    """Whether a message moves the platform."""
+    """True if a message moves the platform."""
     return bool(message["type"] == "SetPositionMessage" and message["name"] == "/platform")
 
 

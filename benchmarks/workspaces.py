@@ -1,4 +1,4 @@
-"""Where a robot can work: hulls, volumes and their error bars; one core."""
+"""Workspaces: hulls, volumes and their error bars; one core."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ CENTER = (0.0, 0.0, 1.0)
 MODELS = (sl.Straight(), sl.Catenary())
 FRAME = (-7.5, -5.5, 0.0), (7.5, 5.5, 6.0)
 POSES = 4_000
-SETTINGS = ((24, 0.5), (64, 2.0))  # cells, and seconds they may take
+SETTINGS = ((24, 0.5), (64, 2.0))  # cells, and largest time [s]
 
 
 def hulls() -> Iterator[Row]:
-    """4,098 rays of ipanema-1, 1 to 10 N, no gravity: what WireX calls its workspace (9.734 m3 in 0.13 s)."""
+    """4,098 rays of ipanema-1, 1 to 10 N, no gravity: its workspace in WireX (9.734 m3 in 0.13 s)."""
     robot, low, high = ipanema()
     for model, reach in zip(MODELS, (0.13, 0.2), strict=True):
         level = level_of(robot, model)
@@ -69,7 +69,7 @@ def frames() -> Iterator[Row]:
 
 
 def proofs() -> Iterator[Row]:
-    """Boxes of poses proved: what a cell takes of the processor, and how near to the true volume of that hull."""
+    """Proofs of boxes of poses: processor time of a cell, and distance from the true volume of that hull."""
     robot, low, high = ipanema()
     box = sl.PoseBox(low, high)
     sl.prove(robot, sl.PoseBox(CENTER, CENTER))  # compiles
@@ -144,4 +144,4 @@ def calls() -> Iterator[Row]:
 PARTS = (margins, calls, hulls, volumes, frames, proofs)
 
 if __name__ == "__main__":
-    print_table("Where a robot can work", PARTS)
+    print_table("Workspace", PARTS)

@@ -1,4 +1,4 @@
-"""Size of the source: `make size` prints one table of counts, so that a change can be compared with the state before.
+"""Size of the source: `make size` prints one table of counts, to compare a change with the state before.
 
 Code lines are lines with a token that is neither a comment nor part of a docstring. A record type is a NamedTuple, a
 dataclass or an attrs class. A public-looking name is that of a function or class at the top of a module that does not
@@ -46,7 +46,7 @@ def code_lines(source: str, docstrings: set[int]) -> set[int]:
 
 
 def is_record(node: ast.ClassDef) -> bool:
-    """Whether a class is a NamedTuple, a dataclass or an attrs class."""
+    """True for a NamedTuple, a dataclass or an attrs class."""
     words = " ".join(ast.unparse(each) for each in (*node.bases, *node.decorator_list))
     return bool(re.search(r"NamedTuple|dataclass|attrs\.|\bdefine\b|\bfrozen\b", words))
 
@@ -117,7 +117,7 @@ def without_examples() -> list[str]:
 
 
 def functions_of(node: ast.AST, path: tuple[str, ...] = ()) -> Iterator[tuple[str, ast.AST]]:
-    """Functions and methods of a module with their qualified names; functions inside functions belong to those."""
+    """Functions and methods of a module with their qualified names; nested functions belong to the outer one."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, Function):
             yield ".".join((*path, child.name)), child

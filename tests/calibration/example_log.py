@@ -76,7 +76,7 @@ def text_of(log: sl.WinchLog) -> str:
     angles = np.degrees(log.commanded.rotation.as_euler("ZYX")).round(1)
     rows = np.column_stack((log.time, log.counts, log.load_cells, log.commanded.position, angles)) + 0.0
     lines = [
-        "# What the winches of winches_robot.yaml read at 60 poses where the platform stood.",
+        "# Readings of the winches of winches_robot.yaml at 60 poses at rest.",
         "# length_deviation: 0.5 mm",
         "# tension_deviation: 5 N",
         ",".join(names),
