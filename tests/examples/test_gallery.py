@@ -65,7 +65,7 @@ def test_how_fast(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_few_cables(run: Run) -> None:
     left = run("few_cables")["left"]
-    assert left["as it is"] == pytest.approx(0.289, abs=0.002)  # m
+    assert left["unshaped"] == pytest.approx(0.289, abs=0.002)  # m
     assert left["shaped"] == pytest.approx(0.012, abs=0.001)
 
 
