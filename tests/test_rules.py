@@ -1,4 +1,4 @@
-"""Rules for the tests (parts of errors, public names) and for docstrings (their first word)."""
+"""Rules for the tests (parts of errors, public names), for docstrings and for the language."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from functools import cache
 from pathlib import Path
 
 from tests.tiers import extended
-from tools import size
+from tools import prose, size
 
 TESTS = Path(__file__).parent
-SOURCE = TESTS.parent / "src"
-CLAUSE = re.compile(r"(What|How|Whether|Where|Which|Who|Whatever)\b")
 LETTERS = re.compile(r"[A-Za-z]{2}")
 SENTENCES = 25  # literal sentences that may be left, outside the snapshots
 FOREIGN = 65  # imports of inner modules of another folder that may be left
@@ -92,16 +90,24 @@ assert value == "25 N"
     assert sorted(sentences(ast.parse(code))) == [2, 4, 5]
 
 
-@extended
-def test_docstrings_begin_with_a_noun_or_a_verb() -> None:
-    found = []
-    for file in sorted(SOURCE.rglob("*.py")):
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-                text = ast.get_docstring(node) or ""
-                if CLAUSE.match(text):
-                    found.append(f"{file.relative_to(SOURCE)}: {text.splitlines()[0]}")
-    assert found == []
+def test_the_linter_of_the_prose_finds_forbidden_words_and_openings() -> None:
+    code = '''
+def stop():
+    """What stops the servers, and lets go of who is connected."""
+    # all is settled: `told` in code counts for nothing
+    raise ValueError(f"the dead cable of {name} hangs\\nbeforehand")
+'''
+    found = [(line, words) for text in prose.python(code) for line, words, _ in prose.faults(text)]
+    expected = [(3, "What"), (3, "of who"), (4, "settled"), (5, "dead cable"), (5, "hangs"), (6, "beforehand")]
+    assert sorted(found) == expected
+    marked = "Smallest is the first; `told` and $told$ are skipped.\\n\\n```sh\\ntold\\n```\\n\\nAll is\\nanew."
+    text = marked.replace("\\\\n", "\\n")
+    assert [each[:2] for part in prose.page(text) for each in prose.faults(part)] == [(1, "Smallest is"), (8, "anew")]
+
+
+def test_the_pages_are_in_plain_english() -> None:
+    read = [file for file in prose.files() if "src" not in file.parts]
+    assert [(file.name, *fault) for file in read for text in prose.prose(file) for fault in prose.faults(text)] == []
 
 
 @extended

@@ -22,7 +22,6 @@ from typing import Final
 ROOT: Final = Path(__file__).parents[1]
 LONG_FUNCTION, LONG_FILE = 60, 400  # code lines of a function, lines of a file
 LAYOUT: Final = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENCODING}
-CLAUSE: Final = re.compile(r"(What|How|Whether|Where|Which|Who|Whatever)\b")
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -156,9 +155,8 @@ def counts() -> tuple[Counter[str], Counter[str]]:
             if isinstance(node, Function):
                 inside = code & set(range(node.lineno, (node.end_lineno or node.lineno) + 1))
                 total[f"functions of more than {LONG_FUNCTION} code lines"] += len(inside) > LONG_FUNCTION
-            if isinstance(node, ast.ClassDef | Function | ast.Module) and (text := ast.get_docstring(node)):
-                total["docstrings"] += 1
-                total["docstrings that open with a clause"] += bool(CLAUSE.match(text))
+            if isinstance(node, ast.ClassDef | Function | ast.Module):
+                total["docstrings"] += ast.get_docstring(node) is not None
     total["names in more than one module"] = sum(len(files) > 1 for name, files in modules.items() if name[0] != "_")
     return total, folders
 
