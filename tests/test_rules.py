@@ -100,8 +100,7 @@ def stop():
     found = [(line, words) for text in prose.python(code) for line, words, _ in prose.faults(text)]
     expected = [(3, "What"), (3, "of who"), (4, "settled"), (5, "dead cable"), (5, "hangs"), (6, "beforehand")]
     assert sorted(found) == expected
-    marked = "Smallest is the first; `told` and $told$ are skipped.\\n\\n```sh\\ntold\\n```\\n\\nAll is\\nanew."
-    text = marked.replace("\\\\n", "\\n")
+    text = "Smallest is the first; `told` and $told$ are skipped.\n\n```sh\ntold\n```\n\nAll is\nanew."
     assert [each[:2] for part in prose.page(text) for each in prose.faults(part)] == [(1, "Smallest is"), (8, "anew")]
 
 

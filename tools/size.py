@@ -91,7 +91,7 @@ def public_functions() -> dict[tuple[str, str], FunctionType]:
 
 
 def overrides_documented(module: str, name: str) -> bool:
-    """Whether a method overrides one of a base class that has an Args section, whose arguments it takes."""
+    """True for a method that overrides one of a base class with an Args section."""
     kind, _, method = name.rpartition(".")
     bases = getattr(sys.modules[module], kind).__mro__[1:]
     return any("Args:" in (getattr(vars(base).get(method), "__doc__", None) or "") for base in bases)
