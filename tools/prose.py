@@ -66,7 +66,8 @@ WORDS: Final = {  # pattern, without regard to case -> suggestion
 FORBIDDEN: Final = [(re.compile(rf"\b(?:{pattern})\b", re.I | re.M), words) for pattern, words in WORDS.items()]
 FIRST: Final = [(re.compile(rf"\s*(?:{pattern})\b"), words) for pattern, words in OPENINGS.items()]
 SKIPPED: Final = re.compile(
-    r"`[^`]*`|\$\$[^$]*\$\$|\$[^$]*\$|\]\([^)]*\)|<[^>]*>|https?://\S+|^\s*(>>>|\.\.\.) .*$", re.MULTILINE
+    r"`[^`]*`|\$\$[^$]*\$\$|\$[^$]*\$|\]\([^)]*\)|<[^>]*>|https?://\S+|^\s*(>>>|\.\.\.) .*$|^ {4,}\w+(?=: )",
+    re.MULTILINE,
 )
 DOCUMENTED: Final = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
