@@ -39,15 +39,15 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 def states() -> str:
     """Table of the states with the action of the winches and the transitions."""
     rows = (
-        f"| `{row.state.name}` | {row.winches} | {'; '.join(f'`{way.to.name}`: {way.by}' for way in row.exits)} |"
-        for row in TABLE
+        f"| `{state.name}` | {winches} | {'; '.join(f'`{to.name}`: {condition}' for to, condition in exits.items())} |"
+        for state, (winches, exits) in TABLE.items()
     )
     return "\n".join(("| state | winches | leads to |", "|---|---|---|", *rows))
 
 
 def picture() -> str:
     """Diagram of the states and transitions; targets of most states as text."""
-    ways = {(row.state, way.to) for row in TABLE for way in row.exits if way.to not in IN_WORDS}
+    ways = {(state, to) for state, (_, exits) in TABLE.items() for to in exits if to not in IN_WORDS}
     drawn = "".join(_arrow(*way, way[::-1] in ways) for way in sorted(ways))
     boxes = "".join(_box(state) for state in PLACES)
     width, height = 2 * COLUMN + WIDE + 4 * EDGE, 3 * LINE + HIGH + 2 * EDGE
@@ -60,7 +60,7 @@ def picture() -> str:
 
 
 def _sources(to: State) -> Iterator[str]:
-    return (f"`{row.state.name}`" for row in TABLE if to in {way.to for way in row.exits})
+    return (f"`{state.name}`" for state, (_, exits) in TABLE.items() if to in exits)
 
 
 def _middle(state: State) -> tuple[float, float]:

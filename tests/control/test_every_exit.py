@@ -157,7 +157,7 @@ def test_every_exit_is_driven_and_no_other() -> None:
         drive(control, machine)
         changes = [event.state for event in control.events if event.kind is EventKind.STATE]
         driven |= set(pairwise([State.OFF, *changes]))
-    listed = {(row.state, exit.to) for row in TABLE for exit in row.exits}
+    listed = {(state, after) for state, (_, exits) in TABLE.items() for after in exits}
     names = {(a.name, b.name) for a, b in listed - driven}
     assert names == set()
     assert driven <= listed

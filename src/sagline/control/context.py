@@ -14,7 +14,6 @@ from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.control.checks import Motion
 from sagline.control.commands import Sender, disagreement
-from sagline.control.estimator import Estimator
 from sagline.control.evidence import Cycle, Fault, Reaction
 from sagline.control.execution import Execution, ExecutionStatus, execution_of
 from sagline.control.faults import faults_of
@@ -27,9 +26,11 @@ from sagline.control.tension_loop import TensionLoop, TensionSettings
 from sagline.core.arguments import brief, instance, optional, whole_number
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
+from sagline.kinematics.forward_solver import ForwardSolver
 from sagline.kinematics.plan import Plan
-from sagline.kinematics.status import ForwardStatus
+from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.robot.drum import drum_lever
+from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest
@@ -39,7 +40,44 @@ SAME: Final = 1e-9  # of a period
 MARGIN: Final = 500  # cycles on the tape besides those of the plan: ramps, pauses
 
 
-class Run:
+class Estimator:
+    """Forward kinematics of each sample, started at the pose before.
+
+    Attributes:
+        position: Of the platform's origin [m], shape (3,); NaN where it was never known.
+        quaternion: Rotation platform -> world, scalar last, shape (4,).
+        status: Code of its `ForwardStatus`; -1 where there is none.
+    """
+
+    def __init__(self, robot: Robot, model: CableModel) -> None:
+        """Begin without a pose."""
+        self._solver = ForwardSolver(robot, model)
+        self.forget()
+
+    @property
+    def pose(self) -> Pose | None:
+        """Pose of the platform; None where it is not known."""
+        return Pose.from_quaternion(self.position, self.quaternion) if self.status in STABLE else None
+
+    def forget(self) -> None:
+        """Forget the pose."""
+        self.position, self.quaternion, self.status = np.full(3, np.nan), np.full(4, np.nan), -1
+
+    def begin_at(self, pose: Pose) -> None:
+        """Start at a known pose."""
+        self._solver.reset(pose)
+        self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
+
+    def locate(self, length: Array, wrench: Array | None) -> ForwardStatus | None:
+        """Solve for the pose; the status where it has just been lost. length [m] (m,), wrench (6,) or None."""
+        position, quaternion = np.empty(3), np.empty(4)
+        status = self._solver.step_into(length, position, quaternion, wrench)
+        lost = status not in STABLE and self.status in STABLE
+        self.position, self.quaternion, self.status = position, quaternion, int(status)
+        return status if lost else None
+
+
+class _Run:
     """The motion that is executed now or was executed last, and its record.
 
     Attributes:
@@ -115,7 +153,7 @@ class Context:
         self.zero, self.homed = np.zeros(m), False
         self.unknown = np.full(m, nan)
         self.number, self.time = 0, 0.0
-        self.run = Run()
+        self.run = _Run()
         self.previous_plan: Plan | None = None
         self.clear_faults()
         self.reset_tension_loop()

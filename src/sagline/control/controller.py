@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from concurrent.futures import Future
-from typing import Final, TypeVar
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
-from sagline.control.active_states import Connecting, Following, Holding, HomingState, Off, idle_at
+from sagline.control.active_states import Following, HomingState
 from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
-from sagline.control.commands import Disagreement
 from sagline.control.context import Context
 from sagline.control.execution import Execution
-from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog, checked_displacement, checked_winch, winch_jog
-from sagline.control.link import Link, Sample
-from sagline.control.loop import Loop
-from sagline.control.real_time import Pace, in_background, interrupt_calls, load_kernels
-from sagline.control.recording import Event, EventKind, Recorder
+from sagline.control.link import Link
+from sagline.control.preparation import Preparation
+from sagline.control.real_time import Pace, load_kernels
+from sagline.control.recording import Recorder
 from sagline.control.set_points import Along, Course, SetPoint, Standing
-from sagline.control.states import MOTION, RefusedError, State, check_transition
+from sagline.control.states import RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
-from sagline.core.arguments import instance, whole_number
-from sagline.core.arrays import Array, number
+from sagline.core.arguments import instance
+from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import septic_path
@@ -33,14 +29,12 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-SETTLING: Final = 3.0  # s, at most, in which homing compares tensions
 SPEED: Final = 0.1  # m/s, of go_to
 TURNING: Final = 0.2  # rad/s
 SPEEDING_UP: Final = 0.5  # s, to full speed at least: a short way is a slow one
-T = TypeVar("T")
 
 
-class Controller:
+class Controller(Preparation):
     """Drives a robot through a `Link`.
 
     All it knows comes from samples; each `cycle` sends one checked command. The methods that begin something (`start`,
@@ -90,186 +84,9 @@ class Controller:
             >>> print(done.status.name, done.position[-1].round(3))
             DONE [0.1 0.  1.5]
         """
-        self._context = c = Context(robot, link, pace, model, tension, loop, record, bool(shadow), seed)
-        self._loop = Loop(c)
+        super().__init__(Context(robot, link, pace, model, tension, loop, record, bool(shadow), seed))
         if pace is not None:
-            load_kernels(robot, c.period, c.model, c.method)
-
-    @property
-    def state(self) -> State:
-        """State of the controller."""
-        return self._context.state
-
-    @property
-    def robot(self) -> Robot:
-        """The robot as it is planned for."""
-        return self._context.robot
-
-    @property
-    def period(self) -> float:
-        """Period of a cycle [s]."""
-        return self._context.period
-
-    @property
-    def sample(self) -> Sample | None:
-        """The newest sample of the machine; None before the first."""
-        return self._context.sample
-
-    @property
-    def zero(self) -> Array:
-        """Lengths that homing found are to be added to those that are read [m], shape (m,)."""
-        return self._context.zero
-
-    @property
-    def homed(self) -> bool:
-        """True if the pose of the platform is known."""
-        return self._context.homed
-
-    @property
-    def owner(self) -> int:
-        """The controller's id."""
-        return self._context.owner
-
-    @property
-    def degraded(self) -> bool:
-        """True if tensions are not to be believed: the tension loop keeps its correction, and learns nothing."""
-        return self._context.degraded
-
-    @property
-    def events(self) -> tuple[Event, ...]:
-        """All events so far."""
-        return tuple(self._context.journal.events)
-
-    def events_from(self, first: int) -> list[Event]:
-        """The events from one of them on.
-
-        Args:
-            first: Number of events that are known already.
-
-        Raises:
-            InvalidValueError: If it is no whole number, or not between 0 and the number of events.
-        """
-        events = self._context.journal.events
-        return events[whole_number(first, "first", 0, len(events)) :]
-
-    @property
-    def pace(self) -> Pace | None:
-        """Real time; None on a lockstep clock."""
-        return self._context.pace
-
-    @property
-    def clock(self) -> tuple[float, float] | None:
-        """Time on the path, and its duration [s]; None where no path is followed."""
-        course = self._loop.active.course
-        if not isinstance(course, Along):
-            return None
-        return course.clock, self.period * (len(course.motion) - 1)
-
-    @property
-    def execution(self) -> Execution | None:
-        """The last motion, or its cycles so far; None before the first."""
-        return self._context.execution()
-
-    @property
-    def estimate(self) -> Pose:
-        """Pose of the platform by the encoders.
-
-        Raises:
-            RefusedError: If it is not known.
-        """
-        pose = self._context.estimator.pose
-        if pose is None:
-            raise RefusedError("the estimate", "the platform's place is not known", "Home first: home(pose).")
-        return pose
-
-    @property
-    def moving(self) -> bool:
-        """True if set points change."""
-        return self.state in MOTION and not (self.state is State.HOMING and self._loop.active.course is None)
-
-    def cycle(self) -> None:
-        """Do one cycle: send and take, estimate, look for faults, and prepare the next command.
-
-        An exception within stops the winches: it becomes an event, a command to hold is sent, and it is raised again.
-        """
-        self._loop.cycle()
-
-    # connecting and homing
-
-    def claim(self) -> None:
-        """Begin to connect.
-
-        Raises:
-            RefusedError: If it is connected already, or reads only.
-        """
-        if self._context.shadow:
-            raise RefusedError("connecting", "this controller only reads", "Make one without shadow.")
-        check_transition(self.state, State.CONNECTING, "connecting")
-        self._loop.active = Connecting(self._context)
-
-    def connect(self) -> None:
-        """Connect, and wait until all groups agree.
-
-        Raises:
-            RefusedError: If they do not; with the reason.
-        """
-        self.claim()
-        connecting = self._loop.active
-        with interrupt_calls(self.stop):
-            while self.state is State.CONNECTING:
-                self.cycle()
-            self._wait_until_left()
-        if self.state is not State.READY:
-            step = "Check the machine and who else controls it, then try again."
-            refused = connecting.claim.refused if isinstance(connecting, Connecting) else None
-            raise (refused or Disagreement(self._context.run.reason, step)).refusal("connecting")
-
-    def begin_homing(self, pose: Pose) -> None:
-        """Name the pose in which the platform is held, and begin to compare tensions.
-
-        Args:
-            pose: A single pose.
-
-        Raises:
-            RefusedError: If the robot is not ready, or the pose has no tensions within the limits.
-        """
-        c, active = self._context, self._loop.active
-        if not isinstance(active, HomingState):
-            check_transition(self.state, State.HOMING, "homing")
-        elif active.course is not None:
-            raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
-        place = instance(pose, Pose, "pose")
-        homing = self._during_cycles(lambda: Homing(c.robot, place, c.model, c.method))
-        c.zero, c.homed = np.zeros(c.robot.cable_count), False
-        c.reset_tension_loop()
-        active = self._loop.active
-        if isinstance(active, HomingState):
-            active.homing = homing
-        else:
-            self._loop.active = HomingState(c, homing)
-
-    def home(self, pose: Pose) -> None:
-        """Name the pose in which the platform is held, and wait until the tensions agree.
-
-        Args:
-            pose: A single pose.
-
-        Raises:
-            RefusedError: If they do not: the state stays HOMING, and the message names a jog.
-        """
-        self.begin_homing(pose)
-        with interrupt_calls(self.stop):
-            for _ in range(round(SETTLING / self.period)):
-                self.cycle()
-                if self.state is not State.HOMING:
-                    break
-        if isinstance(self._loop.active, HomingState):
-            raise self._loop.active.homing.refusal()
-        if self.state is not State.IDLE:
-            reason = f"it ended in {self.state.name}: {self._context.run.reason}"
-            raise RefusedError("homing", reason, "Read the events.")
-
-    # moving
+            load_kernels(robot, self.period, self._context.model, self._context.method)
 
     def plan(self, path: Path) -> Motion:
         """Plan a path and check all of it; nothing is sent.
@@ -285,7 +102,7 @@ class Controller:
         """
         c, given = self._context, instance(path, Path, "path")
         arguments = c.robot, given, c.period, c.model, c.method, c.previous_plan
-        return self._during_cycles(lambda: motion_along(*arguments))
+        return self._result_of(lambda: motion_along(*arguments))
 
     def start(self, path: Path | Motion) -> None:
         """Begin to follow a path.
@@ -369,7 +186,7 @@ class Controller:
             RefusedError: As `start`.
         """
         check_transition(self.state, State.MOVING, "the way")
-        return self.execute(self._during_cycles(lambda: self.path_to(pose, speed, angular_speed)))
+        return self.execute(self._result_of(lambda: self.path_to(pose, speed, angular_speed)))
 
     def start_jog(self, winch: int, by: float) -> None:
         """Begin to jog one winch.
@@ -389,7 +206,7 @@ class Controller:
         check_transition(self.state, State.JOGGING, "the jog")
         c.check_agreement("the jog")
         here, length = self._here(), self._set_point("the jog").length
-        motion = self._during_cycles(lambda: winch_jog(c.robot, length, here, chosen, far, c.period, c.model))
+        motion = self._result_of(lambda: winch_jog(c.robot, length, here, chosen, far, c.period, c.model))
         check_transition(self.state, State.JOGGING, "the jog")
         course = Along(motion, c.period, np.zeros(len(length)))
         self._begin(State.JOGGING, course, motion, f"winch {chosen} by {1e3 * far:+g} mm")
@@ -405,7 +222,7 @@ class Controller:
             RefusedError: As `start_jog`.
         """
         self.start_jog(winch, by)
-        self._wait_until_rest()
+        self._run_while(lambda: self.moving)
 
     def start_jog_platform(self, by: ArrayLike) -> None:
         """Begin to jog the platform along a straight line, each pose solved when it is due.
@@ -420,7 +237,7 @@ class Controller:
         check_transition(self.state, State.JOGGING, "the jog")
         c.check_agreement("the jog")
         here, point = self._here(), self._set_point("the jog")
-        course = self._during_cycles(lambda: PlatformJog(c.robot, point, here, far, c.period, c.model, c.method))
+        course = self._result_of(lambda: PlatformJog(c.robot, point, here, far, c.period, c.model, c.method))
         check_transition(self.state, State.JOGGING, "the jog")
         self._begin(State.JOGGING, course, None, "the platform")
 
@@ -434,7 +251,7 @@ class Controller:
             RefusedError: As `start_jog_platform`.
         """
         self.start_jog_platform(by)
-        self._wait_until_rest()
+        self._run_while(lambda: self.moving)
 
     def wait(self) -> Execution:
         """Go on until nothing moves; Ctrl-C stops the robot, and interrupts then.
@@ -445,7 +262,7 @@ class Controller:
         Raises:
             RefusedError: If nothing has moved yet.
         """
-        self._wait_until_rest()
+        self._run_while(lambda: self.moving)
         done = self.execution
         if done is None:
             raise RefusedError("waiting", "nothing has moved yet", "Begin with start(path).")
@@ -481,47 +298,6 @@ class Controller:
         course.resume()
         self._follow(State.MOVING, course, f"goes on at {course.clock:.2f} s of the path")
 
-    def stop(self) -> None:
-        """Lead all rates to zero, from the next cycle on; where nothing moves, nothing happens."""
-        self._loop.stop_requested = True
-
-    def acknowledge(self) -> None:
-        """Confirm that a fault is repaired: from FAULT to READY, and to IDLE where the place is still known.
-
-        Where the robot is idle and degraded, the load cells are believed again.
-
-        Raises:
-            RefusedError: If the state is another one, or not all groups agree yet; with the reason.
-        """
-        c, what = self._context, "acknowledging"
-        if self.state is State.IDLE and self.degraded:
-            c.clear_faults()
-            c.say(EventKind.NOTE, "acknowledged", "the load cells are believed again")
-            return
-        if self.state is not State.FAULT:
-            raise RefusedError(what, f"the state is {self.state.name}", "There is nothing to acknowledge.")
-        sample = c.check_agreement(what)
-        begun = c.find_equilibrium(sample.length + c.zero - c.correction) if c.homed else None
-        found = None if begun is None else self._wait_for(begun)
-        c.check_agreement(what)  # after the cycles beside it
-        check_transition(self.state, State.READY, what)
-        c.clear_faults()
-        self._loop.active = Holding(c, State.READY, "the operator acknowledged")
-        if found is not None and c.homed:
-            self._loop.active = idle_at(c, found, "the place is still known") or self._loop.active
-
-    def off(self) -> None:
-        """Give all grants back, and wait until they are; the brakes fall.
-
-        Raises:
-            RefusedError: If something moves.
-        """
-        if self.state is not State.OFF:
-            check_transition(self.state, State.OFF, "switching off")
-            self._loop.active = Off(self._context, "the operator", self._loop.active.point)
-            self.cycle()
-        self._wait_until_left()
-
     # shared by the methods above
 
     def _begin(self, state: State, course: Course, motion: Motion | None, text: str) -> None:
@@ -546,28 +322,3 @@ class Controller:
         course = self._loop.active.course
         pose = course.pose if isinstance(course, Standing) else None
         return self.estimate if pose is None else pose
-
-    def _during_cycles(self, work: Callable[[], T]) -> T:
-        """Result of long work; in real time cycles go on meanwhile, or the PLCs would hold."""
-        if self.pace is None or self.state is State.OFF:
-            return work()
-        with interrupt_calls(self.stop):
-            return self._wait_for(in_background(work, threaded=True))
-
-    def _wait_for(self, begun: Future[T]) -> T:
-        while not begun.done():
-            self.cycle()
-        return begun.result()
-
-    def _wait_until_rest(self) -> None:
-        try:
-            with interrupt_calls(self.stop):
-                while self.moving:
-                    self.cycle()
-        finally:
-            self._context.garbage.go_on()
-
-    def _wait_until_left(self) -> None:
-        """Cycles until all grants are given back, in OFF."""
-        while self.state is State.OFF and self._context.sender.command is not None:
-            self.cycle()

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sagline.control.link import Sample
 from sagline.control.null_space import gains_along
 from sagline.control.recording import (
+    ASKED,
+    PLACE,
     REAL_OF_GROUPS,
     REAL_OF_WINCHES,
+    REAL_OWN,
     WHOLE_OF_GROUPS,
     WHOLE_OF_WINCHES,
     Event,
@@ -176,6 +178,9 @@ class Execution(Result, Saved):
         return Pose._adopt(self.position, self.quaternion)
 
 
+_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # of a tape, under the same names
+
+
 def execution_of(
     tape: Tape,
     robot: Robot,
@@ -187,13 +192,8 @@ def execution_of(
     events: tuple[Event, ...],
 ) -> Execution:
     """The execution that a tape holds; period [s], zero [m] (m,)."""
-
-    def column(name: str) -> Array:
-        return locked(tape.column(name))
-
-    def codes(name: str) -> Codes:
-        return locked(tape.column(name).astype(np.int8))
-
+    arrays: dict[str, Any] = {name: locked(tape.column(name)) for name in _COLUMNS}
+    arrays |= {name: locked(tape.column(name).astype(np.int8)) for name in ("state", "estimate", "mode")}
     return Execution(
         robot=robot,
         plan=plan,
@@ -204,30 +204,15 @@ def execution_of(
         events=events,
         answered=locked(tape.column("answered").astype(np.bool_)),
         samples=_samples(tape),
-        time=column("time"),
-        state=codes("state"),
-        late=column("late"),
-        clock=column("clock"),
-        position=column("position"),
-        quaternion=column("quaternion"),
-        estimate=codes("estimate"),
-        mode=codes("mode"),
-        set_length=column("set_length"),
-        set_rate=column("set_rate"),
-        set_tension=column("set_tension"),
-        planned_tension=column("planned_tension"),
-        correction=column("correction"),
+        **arrays,
     )
 
 
 def _samples(tape: Tape) -> Samples:
-    found: dict[str, NDArray[Any]] = {"time": locked(tape.column("time"))}
-    for kind, names in (
-        ("group", REAL_OF_GROUPS + WHOLE_OF_GROUPS),
-        ("winch", REAL_OF_WINCHES + WHOLE_OF_WINCHES),
-    ):
-        found |= {name: locked(tape.column(f"{kind}_{name}")) for name in names}
-    return Samples(**found)
+    columns = {f"group_{name}": name for name in REAL_OF_GROUPS + WHOLE_OF_GROUPS}
+    columns |= {f"winch_{name}": name for name in REAL_OF_WINCHES + WHOLE_OF_WINCHES}
+    arrays: dict[str, Any] = {name: locked(tape.column(column)) for column, name in columns.items()}
+    return Samples(time=locked(tape.column("time")), **arrays)
 
 
 def planned_position(execution: Execution) -> Array:

@@ -40,6 +40,10 @@ class Loop:
             self._break_off(error)
             raise
 
+    def request_stop(self) -> None:
+        """Begin to stop the motion in the next cycle."""
+        self.stop_requested = True
+
     def _cycle(self) -> None:
         c, point = self.context, self.active.point
         late = 0.0 if c.pace is None else c.pace.wait()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 from sagline.core.errors import MOST, SaglineError, shortened
 from sagline.core.status import Status
@@ -24,96 +24,63 @@ class State(Status):
     EMERGENCY = 10, "drums locked; the operator frees the machine by hand, then connects and homes again"
 
 
-class Exit(NamedTuple):
-    """One way out of a state.
+_OFF: Final = {State.OFF: "the operator"}
+_FAULT: Final = {State.STOPPING: "a fault"}
+_STOP: Final = {State.STOPPING: "stop, or a fault"}
+_EMERGENCY: Final = {State.EMERGENCY: "emergency stop, or a broken cable"}
 
-    Attributes:
-        to: The state it leads to.
-        by: Its condition.
-    """
-
-    to: State
-    by: str
-
-
-class Row(NamedTuple):
-    """One state of the table.
-
-    Attributes:
-        state: The state.
-        winches: Their action in it.
-        exits: All ways out of it.
-    """
-
-    state: State
-    winches: str
-    exits: tuple[Exit, ...]
-
-
-_STOP: Final = Exit(State.STOPPING, "stop, or a fault")
-_FAULT: Final = Exit(State.STOPPING, "a fault")
-_EMERGENCY: Final = Exit(State.EMERGENCY, "emergency stop, or a broken cable")
-_OFF: Final = Exit(State.OFF, "the operator")
-
-TABLE: Final = (
-    Row(State.OFF, "brakes", (Exit(State.CONNECTING, "the operator"),)),
-    Row(
-        State.CONNECTING,
+# by state: the action of the winches in it, and the condition of each transition by the state that it leads to
+TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
+    State.OFF: ("brakes", {State.CONNECTING: "the operator"}),
+    State.CONNECTING: (
         "brakes",
-        (Exit(State.READY, "layouts, counters and grants agree"), Exit(State.OFF, "they do not")),
+        {State.READY: "layouts, counters and grants agree", State.OFF: "they do not"},
     ),
-    Row(
-        State.READY,
+    State.READY: (
         "hold",
-        (
-            Exit(State.HOMING, "the operator names a pose"),
-            Exit(State.IDLE, "the place is still known after a fault"),
-            _OFF,
-            _FAULT,
-            _EMERGENCY,
-        ),
+        {
+            State.HOMING: "the operator names a pose",
+            State.IDLE: "the place is still known after a fault",
+            **_OFF,
+            **_FAULT,
+            **_EMERGENCY,
+        },
     ),
-    Row(
-        State.HOMING,
+    State.HOMING: (
         "jog, one at a time",
-        (Exit(State.IDLE, "every tension within 5 sigma of the plan at home"), _OFF, _STOP, _EMERGENCY),
+        {State.IDLE: "every tension within 5 sigma of the plan at home", **_OFF, **_STOP, **_EMERGENCY},
     ),
-    Row(
-        State.IDLE,
+    State.IDLE: (
         "hold, tension loop on",
-        (
-            Exit(State.MOVING, "a plan that is feasible and starts here, or resume"),
-            Exit(State.JOGGING, "the operator"),
-            _OFF,
-            _FAULT,
-            _EMERGENCY,
-        ),
+        {
+            State.MOVING: "a plan that is feasible and starts here, or resume",
+            State.JOGGING: "the operator",
+            **_OFF,
+            **_FAULT,
+            **_EMERGENCY,
+        },
     ),
-    Row(
-        State.MOVING,
+    State.MOVING: (
         "set points, tension loop on",
-        (Exit(State.IDLE, "the end of the plan"), Exit(State.PAUSING, "pause"), _STOP, _EMERGENCY),
+        {State.IDLE: "the end of the plan", State.PAUSING: "pause", **_STOP, **_EMERGENCY},
     ),
-    Row(State.JOGGING, "set points of the jog", (Exit(State.IDLE, "the end of the jog"), _STOP, _EMERGENCY)),
-    Row(
-        State.PAUSING,
+    State.JOGGING: ("set points of the jog", {State.IDLE: "the end of the jog", **_STOP, **_EMERGENCY}),
+    State.PAUSING: (
         "ramp on the path's clock, tension loop on",
-        (Exit(State.IDLE, "the clock stands"), _STOP, _EMERGENCY),
+        {State.IDLE: "the clock stands", **_STOP, **_EMERGENCY},
     ),
-    Row(
-        State.STOPPING,
+    State.STOPPING: (
         "coordinated ramp",
-        (
-            Exit(State.IDLE, "they stand, the operator stopped"),
-            Exit(State.READY, "they stand, the operator stopped homing"),
-            Exit(State.FAULT, "they stand, a fault stopped"),
-            _EMERGENCY,
-        ),
+        {
+            State.IDLE: "they stand, the operator stopped",
+            State.READY: "they stand, the operator stopped homing",
+            State.FAULT: "they stand, a fault stopped",
+            **_EMERGENCY,
+        },
     ),
-    Row(State.FAULT, "hold", (Exit(State.READY, "the operator acknowledges"), _OFF, _EMERGENCY)),
-    Row(State.EMERGENCY, "drums locked", (_OFF,)),
-)
-EXITS: Final = {row.state: tuple(exit.to for exit in row.exits) for row in TABLE}
+    State.FAULT: ("hold", {State.READY: "the operator acknowledges", **_OFF, **_EMERGENCY}),
+    State.EMERGENCY: ("drums locked", _OFF),
+}
 MOTION: Final = frozenset({State.HOMING, State.MOVING, State.JOGGING, State.PAUSING, State.STOPPING})
 HOLDS_GRANT: Final = frozenset(State) - {State.OFF, State.CONNECTING}
 
@@ -145,7 +112,8 @@ class RefusedError(SaglineError):
 
 def check_transition(state: State, to: State, what: str) -> None:
     """Refuse a transition that is not in the table."""
-    if to in EXITS[state]:
+    _, exits = TABLE[state]
+    if to in exits:
         return
-    ways = ", ".join(f"{exit.to.name} ({exit.by})" for row in TABLE if row.state is state for exit in row.exits)
+    ways = ", ".join(f"{after.name} ({condition})" for after, condition in exits.items())
     raise RefusedError(what, f"{state.name} does not lead to {to.name}", f"It leads to {ways}.")

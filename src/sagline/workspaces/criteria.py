@@ -44,7 +44,7 @@ class LeastMargin(Criterion):
     title = "margin"
     unit = "N"
     sense = "≥"
-    limit_range = NOT_NEGATIVE
+    _limit_range = NOT_NEGATIVE
     limit: float = 0.0
 
     @property
@@ -76,7 +76,7 @@ class MaximumSag(Criterion):
     title = "sag"
     unit = "m"
     sense = "≤"
-    limit_range = POSITIVE
+    _limit_range = POSITIVE
     needs_tensions = True
     limit: float
 
@@ -101,7 +101,7 @@ class PositionError(Criterion):
     title = "position error"
     unit = "m"
     sense = "≤"
-    limit_range = POSITIVE
+    _limit_range = POSITIVE
     needs_tensions = True
     model: CableModel
     limit: float
@@ -136,7 +136,7 @@ class LeastStiffness(Criterion):
     title = "stiffness"
     unit = "N/m"
     sense = "≥"
-    limit_range = POSITIVE
+    _limit_range = POSITIVE
     needs_tensions = True
     limit: float
 
@@ -159,7 +159,7 @@ class LeastFrequency(Criterion):
     title = "frequency"
     unit = "Hz"
     sense = "≥"
-    limit_range = POSITIVE
+    _limit_range = POSITIVE
     needs_tensions = True
     limit: float
 
@@ -184,7 +184,7 @@ class Clearance(Criterion):
     title = "clearance"
     unit = "m"
     sense = "≥"
-    limit_range = POSITIVE
+    _limit_range = POSITIVE
     needs_tensions = True
     limit: float
     obstacles: Obstacle | Sequence[Obstacle] = ()
@@ -218,7 +218,7 @@ class InFrame(Criterion):
     title = "frame"
     unit = "m"
     sense = "≥"
-    limit_range = NOT_NEGATIVE
+    _limit_range = NOT_NEGATIVE
     limit: float = 0.0
 
     def judge(self, given: Given) -> Judged:

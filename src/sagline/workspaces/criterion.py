@@ -114,23 +114,23 @@ class Criterion:
         unit: Unit of its values.
         needs_tensions: True if it depends on the tensions.
         sense: "≤" or "≥" of its limit; "" where it has none.
-        limit_range: Range of its field `limit`, as of `number`; empty where that is not checked.
+        _limit_range: Range of its field `limit`, as of `number`; empty where that is not checked.
     """
 
     title: ClassVar[str]
     unit: ClassVar[str]
     needs_tensions: ClassVar[bool] = False
     sense: ClassVar[str] = ""
-    limit_range: ClassVar[Mapping[str, float]] = MappingProxyType({})
+    _limit_range: ClassVar[Mapping[str, float]] = MappingProxyType({})
 
     def __post_init__(self) -> None:
         """Check the limit, and refuse the interface itself."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
             raise InvalidValueError("Criterion()", "the interface alone", "a criterion", step)
-        if self.limit_range:
+        if self._limit_range:
             value, item = getattr(self, "limit", None), f"{type(self).__name__}: limit"
-            object.__setattr__(self, "limit", number(value, item, self.unit, **self.limit_range))
+            object.__setattr__(self, "limit", number(value, item, self.unit, **self._limit_range))
 
     def judge(self, given: Given) -> Judged:
         """Distances of poses to the limit.

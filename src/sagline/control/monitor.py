@@ -1,0 +1,116 @@
+"""Read-only view of a controller: state, samples, events, estimate and execution."""
+
+from __future__ import annotations
+
+from sagline.control.context import Context
+from sagline.control.execution import Execution
+from sagline.control.link import Sample
+from sagline.control.loop import Loop
+from sagline.control.real_time import Pace
+from sagline.control.recording import Event
+from sagline.control.set_points import Along
+from sagline.control.states import MOTION, RefusedError, State
+from sagline.core.arguments import whole_number
+from sagline.core.arrays import Array
+from sagline.robot.pose import Pose
+from sagline.robot.robot import Robot
+
+
+class Monitor:
+    """State, samples, events, estimate and execution of a controller; base of `Controller`."""
+
+    def __init__(self, context: Context) -> None:
+        """Begin with a loop in OFF."""
+        self._context, self._loop = context, Loop(context)
+
+    @property
+    def state(self) -> State:
+        """State of the controller."""
+        return self._context.state
+
+    @property
+    def robot(self) -> Robot:
+        """The robot as it is planned for."""
+        return self._context.robot
+
+    @property
+    def period(self) -> float:
+        """Period of a cycle [s]."""
+        return self._context.period
+
+    @property
+    def sample(self) -> Sample | None:
+        """The newest sample of the machine; None before the first."""
+        return self._context.sample
+
+    @property
+    def zero(self) -> Array:
+        """Lengths that homing found are to be added to those that are read [m], shape (m,)."""
+        return self._context.zero
+
+    @property
+    def homed(self) -> bool:
+        """True if the pose of the platform is known."""
+        return self._context.homed
+
+    @property
+    def owner(self) -> int:
+        """The controller's id."""
+        return self._context.owner
+
+    @property
+    def degraded(self) -> bool:
+        """True if tensions are not to be believed: the tension loop keeps its correction, and learns nothing."""
+        return self._context.degraded
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """All events so far."""
+        return tuple(self._context.journal.events)
+
+    def events_from(self, first: int) -> list[Event]:
+        """The events from one of them on.
+
+        Args:
+            first: Number of events that are known already.
+
+        Raises:
+            InvalidValueError: If it is no whole number, or not between 0 and the number of events.
+        """
+        events = self._context.journal.events
+        return events[whole_number(first, "first", 0, len(events)) :]
+
+    @property
+    def pace(self) -> Pace | None:
+        """Real time; None on a lockstep clock."""
+        return self._context.pace
+
+    @property
+    def clock(self) -> tuple[float, float] | None:
+        """Time on the path, and its duration [s]; None where no path is followed."""
+        course = self._loop.active.course
+        if not isinstance(course, Along):
+            return None
+        return course.clock, self.period * (len(course.motion) - 1)
+
+    @property
+    def execution(self) -> Execution | None:
+        """The last motion, or its cycles so far; None before the first."""
+        return self._context.execution()
+
+    @property
+    def estimate(self) -> Pose:
+        """Pose of the platform by the encoders.
+
+        Raises:
+            RefusedError: If it is not known.
+        """
+        pose = self._context.estimator.pose
+        if pose is None:
+            raise RefusedError("the estimate", "the platform's place is not known", "Home first: home(pose).")
+        return pose
+
+    @property
+    def moving(self) -> bool:
+        """True if set points change."""
+        return self.state in MOTION and not (self.state is State.HOMING and self._loop.active.course is None)

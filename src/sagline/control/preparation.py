@@ -1,0 +1,169 @@
+"""Requests beside motions: connecting, homing, stopping, acknowledging faults, and switching off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Final, TypeVar
+
+import numpy as np
+
+from sagline.control.active_states import Connecting, Holding, HomingState, Off, idle_at
+from sagline.control.commands import Disagreement
+from sagline.control.homing import Homing
+from sagline.control.monitor import Monitor
+from sagline.control.real_time import in_background, interrupt_calls
+from sagline.control.recording import EventKind
+from sagline.control.states import RefusedError, State, check_transition
+from sagline.core.arguments import instance
+from sagline.robot.pose import Pose
+
+T = TypeVar("T")
+SETTLING: Final = 3.0  # s, at most, in which homing compares tensions
+
+
+class Preparation(Monitor):
+    """Connecting, homing, stopping, acknowledging and switching off; base of `Controller`."""
+
+    def cycle(self) -> None:
+        """Do one cycle: send and take, estimate, look for faults, and prepare the next command.
+
+        An exception within stops the winches: it becomes an event, a command to hold is sent, and it is raised again.
+        """
+        self._loop.cycle()
+
+    def claim(self) -> None:
+        """Begin to connect.
+
+        Raises:
+            RefusedError: If it is connected already, or reads only.
+        """
+        if self._context.shadow:
+            raise RefusedError("connecting", "this controller only reads", "Make one without shadow.")
+        check_transition(self.state, State.CONNECTING, "connecting")
+        self._loop.active = Connecting(self._context)
+
+    def connect(self) -> None:
+        """Connect, and wait until all groups agree.
+
+        Raises:
+            RefusedError: If they do not; with the reason.
+        """
+        self.claim()
+        connecting = self._loop.active
+        self._run_while(lambda: self.state is State.CONNECTING or self._leaving)
+        if self.state is not State.READY:
+            step = "Check the machine and who else controls it, then try again."
+            refused = connecting.claim.refused if isinstance(connecting, Connecting) else None
+            raise (refused or Disagreement(self._context.run.reason, step)).refusal("connecting")
+
+    def begin_homing(self, pose: Pose) -> None:
+        """Name the pose in which the platform is held, and begin to compare tensions.
+
+        Args:
+            pose: A single pose.
+
+        Raises:
+            RefusedError: If the robot is not ready, or the pose has no tensions within the limits.
+        """
+        c, active = self._context, self._loop.active
+        if not isinstance(active, HomingState):
+            check_transition(self.state, State.HOMING, "homing")
+        elif active.course is not None:
+            raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
+        place = instance(pose, Pose, "pose")
+        homing = self._result_of(lambda: Homing(c.robot, place, c.model, c.method))
+        c.zero, c.homed = np.zeros(c.robot.cable_count), False
+        c.reset_tension_loop()
+        active = self._loop.active
+        if isinstance(active, HomingState):
+            active.homing = homing
+        else:
+            self._loop.active = HomingState(c, homing)
+
+    def home(self, pose: Pose) -> None:
+        """Name the pose in which the platform is held, and wait until the tensions agree.
+
+        Args:
+            pose: A single pose.
+
+        Raises:
+            RefusedError: If they do not: the state stays HOMING, and the message names a jog.
+        """
+        self.begin_homing(pose)
+        last = self._context.number + round(SETTLING / self.period)
+        self._run_while(lambda: self.state is State.HOMING and self._context.number < last)
+        if isinstance(self._loop.active, HomingState):
+            raise self._loop.active.homing.refusal()
+        if self.state is not State.IDLE:
+            reason = f"it ended in {self.state.name}: {self._context.run.reason}"
+            raise RefusedError("homing", reason, "Read the events.")
+
+    def stop(self) -> None:
+        """Lead all rates to zero, from the next cycle on; where nothing moves, nothing happens."""
+        self._loop.request_stop()
+
+    def acknowledge(self) -> None:
+        """Confirm that a fault is repaired: from FAULT to READY, and to IDLE where the place is still known.
+
+        Where the robot is idle and degraded, the load cells are believed again.
+
+        Raises:
+            RefusedError: If the state is another one, or not all groups agree yet; with the reason.
+        """
+        c, what = self._context, "acknowledging"
+        if self.state is State.IDLE and self.degraded:
+            c.clear_faults()
+            c.say(EventKind.NOTE, "acknowledged", "the load cells are believed again")
+            return
+        if self.state is not State.FAULT:
+            raise RefusedError(what, f"the state is {self.state.name}", "There is nothing to acknowledge.")
+        sample = c.check_agreement(what)
+        begun = c.find_equilibrium(sample.length + c.zero - c.correction) if c.homed else None
+        found = None if begun is None else self._wait_for(begun)
+        c.check_agreement(what)  # after the cycles beside it
+        check_transition(self.state, State.READY, what)
+        c.clear_faults()
+        self._loop.active = Holding(c, State.READY, "the operator acknowledged")
+        if found is not None and c.homed:
+            self._loop.active = idle_at(c, found, "the place is still known") or self._loop.active
+
+    def off(self) -> None:
+        """Give all grants back, and wait until they are; the brakes fall.
+
+        Raises:
+            RefusedError: If something moves.
+        """
+        if self.state is not State.OFF:
+            check_transition(self.state, State.OFF, "switching off")
+            self._loop.active = Off(self._context, "the operator", self._loop.active.point)
+            self.cycle()
+        while self._leaving:
+            self.cycle()
+
+    @property
+    def _leaving(self) -> bool:
+        """True in OFF until all grants are given back."""
+        return self.state is State.OFF and self._context.sender.command is not None
+
+    def _run_while(self, condition: Callable[[], bool]) -> None:
+        """Do cycles while a condition holds; Ctrl-C stops the motion first."""
+        try:
+            with interrupt_calls(self.stop):
+                while condition():
+                    self.cycle()
+        finally:
+            self._context.garbage.go_on()
+
+    def _wait_for(self, begun: Future[T]) -> T:
+        """Do cycles until a result is there."""
+        while not begun.done():
+            self.cycle()
+        return begun.result()
+
+    def _result_of(self, work: Callable[[], T]) -> T:
+        """Result of long work; in real time cycles go on meanwhile, or the PLCs would hold."""
+        if self.pace is None or self.state is State.OFF:
+            return work()
+        with interrupt_calls(self.stop):
+            return self._wait_for(in_background(work, threaded=True))
