@@ -47,20 +47,21 @@ def _swap_columns(values: Array, i: int, j: int) -> Array:
 def swapped_encoders(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     i, j = _two(log, rng)
     changed = log.replace(**{_column(log): _swap_columns(log.readings, i, j)})
-    return Mistake(changed, (f"the encoders of cables {i} and {j} are swapped",))
+    return Mistake(changed, (f"the encoders of cables {i} and {j} seem to be swapped",))
 
 
 def swapped_cables(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     i, j = _two(log, rng)
     cells = _swap_columns(_cells(log), i, j)
     changed = log.replace(**{_column(log): _swap_columns(log.readings, i, j), "load_cells": cells})
-    return Mistake(changed, (f"the cables {i} and {j} are swapped",))
+    return Mistake(changed, (f"the cables {i} and {j} seem to be swapped",))
 
 
 def swapped_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     i, j = _two(log, rng)
     return Mistake(
-        log.replace(load_cells=_swap_columns(_cells(log), i, j)), (f"the load cells of cables {i} and {j} are swapped",)
+        log.replace(load_cells=_swap_columns(_cells(log), i, j)),
+        (f"the load cells of cables {i} and {j} seem to be swapped",),
     )
 
 
@@ -71,7 +72,7 @@ def flipped_encoder(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator)
     counts = robot.winches is not None and log.counts is not None
     about = robot.winches.count_zero[i] if counts and robot.winches is not None else max(read[:, i]) - 1.0
     read[:, i] = 2.0 * about - read[:, i]
-    return Mistake(log.replace(**{_column(log): read}), (f"the encoder of cable {i} counts backward",))
+    return Mistake(log.replace(**{_column(log): read}), (f"the encoder of cable {i} seems to count backward",))
 
 
 def late_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
@@ -79,7 +80,9 @@ def late_cells(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> M
     n = len(log)
     cells = np.arange(max(0, -by), min(n, n - by))  # what they read is written beside the lengths of so many rows later
     shifted = log.rows(cells + by).replace(load_cells=_cells(log)[cells])
-    words = f"load cells come {abs(by)} row{'s'[: abs(by) != 1]} {'after' if by > 0 else 'before'} the lengths"
+    words = (
+        f"load cells seem to come {abs(by)} row{'s'[: abs(by) != 1]} {'after' if by > 0 else 'before'} their lengths"
+    )
     return Mistake(shifted, (words,))
 
 
@@ -94,33 +97,33 @@ def far_zero(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mis
         length = sl.lengths_from_counts(robot, read).copy()
         length[:, i] += off
         read = counts_of(robot, length)
-    return Mistake(log.replace(**{_column(log): read}), ("lengths have a zero far off", f"on cable {i};"))
+    return Mistake(log.replace(**{_column(log): read}), ("the zeros of lengths are far off", f"on cable {i};"))
 
 
 def millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     assert log.unstrained_length is not None
-    return Mistake(log.replace(unstrained_length=1e3 * log.unstrained_length), ("lengths are in mm",))
+    return Mistake(log.replace(unstrained_length=1e3 * log.unstrained_length), ("lengths seem to be in mm",))
 
 
 def positions_in_millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     assert log.position is not None
-    return Mistake(log.replace(position=1e3 * log.position), ("positions are in mm",))
+    return Mistake(log.replace(position=1e3 * log.position), ("positions seem to be in mm",))
 
 
 def commanded_in_millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     assert log.commanded is not None
     commanded = sl.Pose(1e3 * log.commanded.position, log.commanded.matrix)
-    return Mistake(log.replace(commanded=commanded), ("commanded positions are in mm", "x_commanded [mm]"))
+    return Mistake(log.replace(commanded=commanded), ("commanded positions seem to be in mm", "x_commanded [mm]"))
 
 
 def deviations_in_millimeters(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
     name = str(rng.choice(["length_deviation", "position_deviation"]))
     sensors = log.sensors.replace(**{name: float(rng.uniform(5.0, 20.0))})
-    return Mistake(log.replace(sensors=sensors), (f"the {name} is", f"{name}: 0.5 mm"))
+    return Mistake(log.replace(sensors=sensors), (f"the {name} seems to be in mm", f"{name}: 0.5 mm"))
 
 
 def kilonewtons(log: sl.WinchLog, robot: sl.Robot, rng: np.random.Generator) -> Mistake:
-    return Mistake(log.replace(load_cells=1e-3 * _cells(log)), ("load cells are in kN",))
+    return Mistake(log.replace(load_cells=1e-3 * _cells(log)), ("load cells seem to be in kN",))
 
 
 Maker = Callable[[sl.WinchLog, sl.Robot, np.random.Generator], Mistake]

@@ -225,11 +225,11 @@ def test_too_few_readings_are_refused() -> None:
         ({}, "frame_anchor", ("unknown", "'frame_anchor'"), "frame_anchors?"),
         ({}, "load_cell_gain", ("unknown: load_cell_gain", "no number of cogiro"), "winches: {load_cell_gain: 1}"),
         ({}, "pulley_radius", ("unknown: pulley_radius", "no number of cogiro"), "winches: {pulley_radius: 0 m}"),
-        ({}, "drum_radius", ("unknown: drum_radius", "seen by no reading", "counts in the log"), "counts"),
+        ({}, "drum_radius", ("unknown: drum_radius", "observed by no reading", "counts in the log"), "counts"),
         (
             {"load_cells": None},
             "load_cell_gain",
-            ("unknown: load_cell_gain", "seen by no reading", "load cells in the log"),
+            ("unknown: load_cell_gain", "observed by no reading", "load cells in the log"),
             "load cells",
         ),
     ],

@@ -54,7 +54,7 @@ def test_cables_share_a_number_only_where_it_is_equal_and_as_well_known(name: st
 @pytest.mark.parametrize("name", ["load_cell_gain", "load_cell_bias"])
 def test_what_no_sensor_sees_is_refused_unless_somebody_knows_it(name: str) -> None:
     blind = sl.Sensors(position_deviation=1e-3)
-    with refused(f"unknown: {name}", "seen by no reading", "load cells in the log", kind=InvalidValueError):
+    with refused(f"unknown: {name}", "observed by no reading", "load cells in the log", kind=InvalidValueError):
         asked(COGIRO, name, sensors=blind)
     assert asked(COGIRO, sl.Unknown(name, deviation=0.2), sensors=blind).prior_deviation[0] == 0.2
     assert asked(COGIRO.replace(tolerances={name: 0.1}), name, sensors=blind).prior_deviation[0] == 0.1

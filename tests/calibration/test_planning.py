@@ -386,12 +386,14 @@ REFUSED = [
     Refused(
         {"unknowns": ("load_cell_gain",), "sensors": sl.Sensors(5e-4, None, 1e-3)},
         "unknown: load_cell_gain",
-        "seen by no reading",
+        "observed by no reading",
         "load cells",
     ),
-    Refused({"unknowns": ("measuring_frame",)}, "unknown: measuring_frame", "seen by no reading", "positions"),
+    Refused({"unknowns": ("measuring_frame",)}, "unknown: measuring_frame", "observed by no reading", "positions"),
     Refused(
-        {"unknowns": ("target",), "sensors": sl.Sensors(5e-4, 5.0, None, 1e-3)}, "unknown: target", "seen by no reading"
+        {"unknowns": ("target",), "sensors": sl.Sensors(5e-4, 5.0, None, 1e-3)},
+        "unknown: target",
+        "observed by no reading",
     ),
     Refused({"unknowns": ()}, "unknowns", "none"),
     Refused({"unknowns": ("color",)}, "unknown", "'color'", "frame_anchors"),

@@ -44,28 +44,27 @@ def calibrate(
 ) -> Calibration:
     """Actual anchors, zeros and cables of a robot, from its own readings, with their standard errors.
 
-    One least squares on exact cables finds all numbers at once, with the true lengths at every pose, which nobody
-    knows: what the encoders say of them counts as far as `log.sensors` trusts it. Numbers that the readings do not tell
-    stay where the robot has them, and are named.
+    One nonlinear least squares on exact cables estimates all parameters together with the unknown true lengths at every
+    pose. Reported lengths are weighted by the deviation in `log.sensors`. Parameters that the readings do not observe
+    keep the values of the robot, and are listed.
 
     Args:
-        robot: The robot as it is believed to be: its numbers are where the search begins, and priors. How far they may
-            be off is what its `tolerances` say, or `Unknown(name, deviation=...)`, or what is usual of the kind.
-        log: Readings at poses where it stood.
-        unknowns: What is looked for: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
+        robot: The robot before the calibration: its values are the initial ones, and priors. Their deviations are its
+            `tolerances`, those of `Unknown(name, deviation=...)`, or usual ones of the kind.
+        log: Readings at poses at rest.
+        unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
         model: Cable model, the exact one or the weightless one.
-        robust: Whether poses that do not fit the rest count less.
-        folds: Into how many parts the poses are divided to see how well those are predicted that were left out: no more
-            than there are poses, each of which is then left out by itself; 0 for none, which spares as many
-            calibrations.
-        progress: Told how many poses are done of a pass, of how many.
+        robust: True to give less weight to poses that do not fit the rest.
+        folds: Number of parts of the poses for the cross-validation, at most one a pose; each costs a calibration. 0
+            for none.
+        progress: Called with the number of poses that are done in a pass, and of all.
 
     Returns:
         Calibration; `robot` is the one to use.
 
     Raises:
-        InvalidValueError: If an unknown is none, or seen by no reading; if the log is not of this robot, has swapped
-            cables or wrong units, or tells less than there are unknowns; the message says which, and what to do.
+        InvalidValueError: If an unknown has another name, or neither readings nor a prior; if the log is not of this
+            robot, has swapped cables or wrong units, or has fewer readings than unknowns; the message says which.
 
     Examples:
         >>> import numpy as np
@@ -145,7 +144,7 @@ def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters:
 
 
 def _refuse(sentences: Iterable[str]) -> None:
-    """Refuse a log that no robot like this one can have written, by the first sentence that says why."""
+    """Refuse a log that no similar robot can have written, with the first of the reasons."""
     for sentence in sentences:
         what, _, step = sentence.partition("; " if "; " in sentence else ": ")
         step = f"{step[:1].upper()}{step[1:]}."

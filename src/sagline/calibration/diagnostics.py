@@ -20,12 +20,12 @@ from sagline.robot.robot import Robot
 _CATENARY = Catenary()
 UNIT: Final = 50.0  # times what is expected, between 1 and the 1000 of a wrong unit
 GOOD: Final = 5.0  # squares for each reading of a log that a robot fits: slips and rope make more than 1 of it
-POOR: Final = 50.0  # the same where it is a hundredth of what it was before
-NEAR: Final = 0.25  # departure: a robot with anchors a quarter of a meter off fits, with some luck, swapped cables too
-ROUGH: Final = 10.0  # times a deviation: from a tenth of the robot's size on, a length tells nothing
-FAR: Final = 0.25  # of a cable's length by which a zero is far off: no tape measure is so wrong
+POOR: Final = 50.0  # the same if it is a hundredth of the one before
+NEAR: Final = 0.25  # departure: a robot with anchors a quarter of a meter off may fit swapped cables by chance
+ROUGH: Final = 10.0  # times a deviation: beyond a tenth of the robot's size, a length is not informative
+FAR: Final = 0.25  # of a cable's length: a larger error of a zero is far off, more than that of any tape measure
 SHIFTS: Final = 5  # rows by which load cells may be early or late
-_FULLY: Final = 3  # changes of those that promise most which are tried to the end
+_FULLY: Final = 3  # most promising changes, which are tried to convergence
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
@@ -41,7 +41,7 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> 
     instance(log, WinchLog, "log")
     instance(model, CableModel, "model")
     if found := tuple(wrong_units(robot, log)):
-        return found  # what else there is shows when they are right
+        return found  # other mistakes show when the units are right
     _, rows, _ = screen(robot, log)
     if not len(rows) or (log.load_cells is None and log.position is None):
         return ()
@@ -55,25 +55,25 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
         typical = float(np.nanmedian(log.unstrained_length)) if not np.isnan(log.unstrained_length).all() else 0.0
         if typical > UNIT * size:
             yield (
-                f"lengths are in mm, it seems: about {typical:.4g} m, and the robot is {size:.3g} m across; divide "
+                f"lengths seem to be in mm: about {typical:.4g} m, and the robot is {size:.3g} m across; divide "
                 "them by 1000, or write their unit, length_0 [mm]"
             )
     if log.position is not None and (far := _spread(log.position)) > UNIT * size:
         yield (
-            f"positions are in mm, it seems: they differ by {far:.4g} m, and the robot is {size:.3g} m across; divide "
+            f"positions seem to be in mm: they differ by {far:.4g} m, and the robot is {size:.3g} m across; divide "
             "them by 1000, or write their unit, x [mm]"
         )
     if log.commanded is not None and (far := _spread(log.commanded.position)) > UNIT * size:
         yield (
-            f"commanded positions are in mm, it seems: they differ by {far:.4g} m, and the robot is {size:.3g} m "
+            f"commanded positions seem to be in mm: they differ by {far:.4g} m, and the robot is {size:.3g} m "
             "across; divide them by 1000, or write their unit, x_commanded [mm]"
         )
     for name in ("length_deviation", "position_deviation"):
         deviation = getattr(log.sensors, name)
         if deviation is not None and (worst := float(np.max(deviation))) * ROUGH > size:
             yield (
-                f"the {name} is {worst:.3g} m, and the robot is {size:.3g} m across: is it in mm? Write its unit, "
-                f"{name}: 0.5 mm"
+                f"the {name} seems to be in mm: it is {worst:.3g} m, and the robot is {size:.3g} m across; write its "
+                f"unit, {name}: 0.5 mm"
             )
     if log.load_cells is None or np.isnan(log.load_cells).all():
         return
@@ -82,12 +82,12 @@ def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
     share = robot.mass * robot.gravity / robot.cable_count
     if typical * UNIT < share:
         yield (
-            f"load cells are in kN, it seems: the largest of a row reads about {typical:.3g} N, and a cable's share of "
+            f"load cells seem to be in kN: the largest of a row reads about {typical:.3g} N, and a cable's share of "
             f"the weight is {share:.3g} N; multiply them by 1000, or write their unit, load_cell_0 [kN]"
         )
     elif typical > UNIT * max(share, float(np.median(robot.cables.axial_stiffness)) / UNIT):
         yield (
-            f"load cells read about {typical:.3g} N, which no cable of {robot.name} holds: are they in mN? Divide them "
+            f"load cells seem to be in mN: they read about {typical:.3g} N, too much for {robot.name}; divide them "
             "by 1000, or write their unit, load_cell_0 [mN]"
         )
 
@@ -111,7 +111,7 @@ def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> 
         return
     more = " and ".join(name for name in ("measuring_frame", "target") if name not in asked)
     yield (
-        f"{lost} of {count} measured poses are not where lengths put it: axes of their own, it seems; "
+        f"{lost} of {count} measured poses disagree with the lengths: they seem to have other axes; "
         f"{f'ask for {more} too' if more else 'correct them'}, or write '# frame: ...' above the columns"
     )
 
@@ -133,7 +133,7 @@ def _spread(position: Array) -> float:
 
 
 def _single_mistake(trial: Trial) -> Iterator[str]:
-    """The one mistake without which a robot fits the readings."""
+    """Sentence about the one mistake without which a robot fits the readings."""
     whole = trial.result(Hypothesis())
     far = _far(trial, whole.zeros)
     if whole.quality <= GOOD:
@@ -184,7 +184,7 @@ def _load_cell_changes(trial: Trial) -> Iterator[Hypothesis]:
 
 
 def _usual(trial: Trial) -> Array:
-    """Typical lengths of the cables [m], as nobody's zero has a say in: distances of the anchors."""
+    """Typical lengths of the cables [m], independent of zeros: distances of the anchors."""
     middle = trial.robot.frame_anchors.mean(axis=0) if trial.log.commanded is None else None
     if middle is None and trial.log.commanded is not None:
         middle = np.median(trial.log.commanded.position, axis=0)
@@ -202,7 +202,7 @@ def _zero_text(zeros: Array, far: Flags) -> str:
     listed = ", ".join(
         f"{abs(zeros[i]):.2f} m too {'short' if zeros[i] > 0.0 else 'long'} on cable {i}" for i in cables
     )
-    return f"lengths have a zero far off: {listed}; correct length_zero of the winches there, or home the robot again"
+    return f"the zeros of lengths are far off: {listed}; correct length_zero of these winches, or home the robot again"
 
 
 def _change_text(change: Hypothesis, log: WinchLog) -> str:
@@ -212,16 +212,16 @@ def _change_text(change: Hypothesis, log: WinchLog) -> str:
         what, columns = ("encoders of ", f"{kind}_{i} and {kind}_{j}")
         if change.cells is not None:
             what, columns = "", f"{columns}, load_cell_{i} and load_cell_{j}"
-        return f"the {what}cables {i} and {j} are swapped, it seems: exchange columns {columns}"
+        return f"the {what}cables {i} and {j} seem to be swapped: exchange columns {columns}"
     if change.cells is not None:
         i, j = change.cells
-        return f"the load cells of cables {i} and {j} are swapped, it seems: exchange columns load_cell_{i} and _{j}"
+        return f"the load cells of cables {i} and {j} seem to be swapped: exchange columns load_cell_{i} and _{j}"
     if change.flipped is not None:
         i = change.flipped
-        return f"the encoder of cable {i} counts backward, it seems: change the sign of gear[{i}], or of {kind}_{i}"
+        return f"the encoder of cable {i} seems to count backward: change the sign of gear[{i}], or of {kind}_{i}"
     rows = f"{abs(change.late)} row{'s'[: abs(change.late) != 1]}"
     way, where = ("after", "up") if change.late > 0 else ("before", "down")
-    return f"load cells come {rows} {way} the lengths they belong to, it seems: move their columns {where} by {rows}"
+    return f"load cells seem to come {rows} {way} their lengths: move their columns {where} by {rows}"
 
 
 def _misfit_text(quality: float) -> str:

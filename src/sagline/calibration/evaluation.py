@@ -28,7 +28,7 @@ DOUBTFUL: Final = 1e-4  # chi squared that would be so far from what is to be ex
 ODD: Final = 0.1  # share of the poses that may fit badly, or not at all, before the whole is in doubt
 ODD_WEIGHT: Final = 0.5  # and what counts so little is one
 TOLERATED: Final = 1.1  # of chi squared to what is to be expected: no model is better than that in a large log
-LITTLE: Final = 1e-6  # of a direction: a number that has so little of it is told all the same
+LITTLE: Final = 1e-6  # of a direction: a parameter with a smaller part of it is still observable
 
 
 def evaluate(
@@ -84,7 +84,7 @@ def evaluate(
 
 
 def _status(found: SearchResult, chi_squared: float, freedoms: int) -> CalibrationStatus:
-    """True if to believe a search, by the poses of full weight."""
+    """Status of a search, by the poses of full weight."""
     kept, weights = found.kept, found.fit.normal.weights
     if not found.fit.converged:
         return CalibrationStatus.NOT_CONVERGED

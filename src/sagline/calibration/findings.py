@@ -42,13 +42,13 @@ class Omission(Status):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Direction(Result):
-    """A combination of unknowns that the data do not tell, or hardly.
+    """A combination of unknowns that is unobservable or weakly identifiable.
 
     Attributes:
-        name: What it is: "the world shifted along x", or "pulley_radius with frame_anchors z".
+        name: "the world shifted along x", or "pulley_radius with frame_anchors z".
         vector: The combination, one for its standard deviation; in the units of the parameters, (P,).
-        known: Share of its prior standard deviation that is left: 1 where data say nothing.
-        step: What to do about it: "fix a frame anchor, or measure 3 points".
+        known: Share of its prior standard deviation that is left: 1 without information.
+        step: Recommended measurement: "fix a frame anchor, or measure 3 points".
     """
 
     name: str
@@ -65,7 +65,7 @@ class Outlier(Result):
         row: Row of the log.
         cable: Its number, or None for the whole pose.
         quantity: "length", "load cell", "position" or "rotation".
-        size: By how much it is off [m, N or rad].
+        size: Its error [m, N or rad].
         deviations: The same in standard deviations.
     """
 
@@ -81,12 +81,12 @@ class CrossValidation(Result):
     """Errors of predictions at poses that the calibration did not use.
 
     Attributes:
-        folds: Into how many parts the poses were divided.
-        tension: Root mean square of what load cells read less what was predicted [N]; NaN without load cells.
-        position: The same of the distances from measured positions [m]; NaN where none was measured along all three
-            axes.
-        tension_before: With the robot as it was [N].
-        position_before: With the robot as it was [m]; NaN where the measuring system or its target was looked for.
+        folds: Number of parts of the poses.
+        tension: Root mean square of the readings of load cells less the predictions [N]; NaN without load cells.
+        position: Root mean square of the distances from measured positions [m]; NaN without a position measured along
+            all three axes.
+        tension_before: With the robot before the calibration [N].
+        position_before: With the robot before the calibration [m]; NaN if the measuring system was unknown.
     """
 
     folds: int
@@ -98,7 +98,7 @@ class CrossValidation(Result):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Findings(Result):
-    """The fields of a `Calibration`, which says what they are."""
+    """Fields of a `Calibration`, documented there."""
 
     robot: Robot
     before: Robot
@@ -128,12 +128,12 @@ class Findings(Result):
 
     @property
     def standard_error(self) -> Array:
-        """Standard deviations of the values, in their units, (P,); infinite for what nothing tells."""
+        """Standard deviations of the values, in their units, (P,); infinite if unobserved and without a prior."""
         return locked(np.sqrt(np.diagonal(self.covariance)))
 
     @property
     def correlation(self) -> Array:
-        """Correlation of the values, (P, P); NaN beside the diagonal for what nothing tells."""
+        """Correlation of the values, (P, P); NaN off the diagonal for unobserved values without a prior."""
         error = self.standard_error
         known = np.isfinite(error) & (error > 0.0)
         size = np.where(known, error, np.nan)

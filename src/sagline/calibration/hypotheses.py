@@ -30,9 +30,9 @@ from sagline.robot.robot import Robot
 MOST_ROWS: Final = 24  # on which changes are tried: three readings of a load cell for each unknown
 STEPS: Final = 12  # of the least squares: where a robot fits, half of them are enough
 TOLERANCE: Final = 1.0  # of the sum of squares: how well a robot fits is wanted to some percent
-FEWEST_ROWS: Final = 8  # the same where nobody says at which poses
-# What is known of a robot beforehand, wider than it is: the question is whether any robot like it fits. Shares of the
-# values where logarithms are looked for.
+FEWEST_ROWS: Final = 8  # the same without commanded poses
+# Prior deviations, wider than usual: the question is whether any similar robot fits. Shares of the values where
+# logarithms are estimated.
 _WIDE: Final = {
     "frame_anchors": 0.3,
     "platform_anchors": 0.05,
@@ -67,11 +67,10 @@ class _TrialResult(NamedTuple):
     """Fit of the readings after a change.
 
     Attributes:
-        quality: Median over the rows of the sum of squares for each reading: 1 where a robot fits as well as the
-            deviations of the sensors say, infinite where none fits.
-        departure: Mean square of how far the robot that fits is from the one that is believed, in deviations that it
-            may have.
-        zeros: By how much the zeros of the lengths are off [m], (m,).
+        quality: Median over the rows of the sum of squares for each reading: 1 where a robot fits within the deviations
+            of the sensors, infinite where none fits.
+        departure: Mean square of the distance of the parameters from their priors, in prior deviations.
+        zeros: Errors of the zeros of the lengths [m], (m,).
     """
 
     quality: float
@@ -81,14 +80,14 @@ class _TrialResult(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """A log on which changes are tried.
+    """Trials of changes of a log.
 
     Attributes:
-        robot: The robot as it is believed to be.
+        robot: The robot before the calibration.
         model: Cable model.
-        log: All of it.
-        rows: Numbers of those that may be looked at.
-        found: Where lengths put the platform, by how they are taken: load cells have no say in it.
+        log: The whole log.
+        rows: Indices of the fit rows.
+        found: Poses by forward kinematics, by change of the lengths and number of rows.
     """
 
     robot: Robot
@@ -102,7 +101,7 @@ class Trial:
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
-        except (InvalidValueError, np.linalg.LinAlgError):  # with such readings it goes astray
+        except (InvalidValueError, np.linalg.LinAlgError):  # with such readings the search diverges
             return _TrialResult(np.inf, np.inf, moved)
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
@@ -157,7 +156,7 @@ class Trial:
         poses = self._poses(problem, change, most) if log.commanded is None else log.commanded[rows]
         moved = np.zeros(m)
         shifted = list(change.moved)
-        if change.flipped is not None and not counted:  # about which length it counts backward nobody says
+        if change.flipped is not None and not counted:  # the length about which it counts backward is unknown
             shifted.append(change.flipped)
         if shifted and poses is not None:
             moved[shifted] = -_offsets(problem, poses)[0][shifted]
@@ -175,7 +174,7 @@ class Trial:
         return self.found[key]
 
     def _has(self, name: str, counted: bool) -> bool:
-        """True if the robot has such a number that may be looked for."""
+        """True if the robot has such a parameter."""
         if name == "drum_radius":
             return counted
         return name != "linear_density" or bool((self.robot.cables.linear_density > 0.0).all())
@@ -189,7 +188,7 @@ class Trial:
 
 
 def _fitted(problem: FitProblem, state: SearchState) -> Evaluated:
-    """A few steps of the least squares: a robot that fits is found in half of them, of others only that it does not."""
+    """State after a few steps of the least squares; a robot that fits is found in half of them."""
     begun = evaluate_step(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
     fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, tolerance=TOLERANCE)
     return fit.state, fit.normal

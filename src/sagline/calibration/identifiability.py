@@ -17,8 +17,8 @@ from sagline.robot.robot import Robot
 
 OPEN: Final = 1e-12  # of the largest singular value: rounding of slopes that cancel
 _SPREAD: Final = 1e-9  # of the largest: no lower does a gap between observable and open directions begin
-_FIXED: Final = 5e-2  # of the usual deviation: a number that a user states so well is known
-_WIDE: Final = 1e3  # of what is usual of a number that nobody gives: to look for it further away is no use
+_FIXED: Final = 5e-2  # of the usual deviation: a parameter with a smaller stated deviation counts as known
+_WIDE: Final = 1e3  # of the usual deviation of an unknown value: limit of wider priors
 _SAME: Final = 1e-6  # sine of an angle between directions that are one
 _TINY: Final = 1e-300
 _NAMED: Final = 3  # numbers that a direction without a name shows
@@ -28,9 +28,9 @@ class PriorUnits(NamedTuple):
     """The unknowns in standard deviations of their priors.
 
     Attributes:
-        scale: One of them in the internal parameters, (P,).
-        units: The same in the units of the parameters, (P,).
-        free: Which are not known beforehand all but exactly, their indices.
+        scale: One standard deviation in the internal parameters, (P,).
+        units: One standard deviation in the units of the parameters, (P,).
+        free: Indices of those that are not known almost exactly.
     """
 
     scale: Array
@@ -64,7 +64,7 @@ def prior_units(parameters: Parameters) -> PriorUnits:
 
 
 def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
-    """Unit vectors, in standard deviations of the priors, that change nothing that is read: columns, (P, d)."""
+    """Unit vectors, in standard deviations of the priors, that change no reading: columns, (P, d)."""
     vectors = np.zeros((len(frame.scale), 0))
     if not frame.free.size:
         return vectors
@@ -114,7 +114,7 @@ def gauge_of(
 
 
 def _rotation_of_frame(parameters: Parameters, values: Array) -> Array:
-    """Rotation vector of the measuring system, by which it is looked for [rad], (3,); zero where it is known."""
+    """Rotation vector of the measuring system that is estimated [rad], (3,); zero where it is known."""
     where = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     return np.where(where >= 0, values[where], 0.0)
 
@@ -128,7 +128,7 @@ def _direction(name: str, vector: Array, step: str, frame: PriorUnits) -> Direct
 def _symmetric_part(
     left: Array, frame: PriorUnits, where: Indices, known: Symmetries
 ) -> tuple[Array, list[tuple[str, str]]]:
-    """Of the open directions those that symmetries are, (P, d), with names and steps."""
+    """Symmetries among the unobservable directions, (P, d), with names and steps."""
     vectors, shares = _admissible_symmetries(frame, where, known)
     if not vectors.shape[1] or not left.shape[1]:
         return np.zeros((len(frame.scale), 0)), []
@@ -163,14 +163,14 @@ def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries)
 
 
 def _null(matrix: Array) -> Array:
-    """Orthonormal columns that a matrix takes to zero."""
+    """Orthonormal basis of the null space of a matrix, in columns."""
     _, values, rows = np.linalg.svd(matrix, full_matrices=True)
     rank = int(np.sum(values > 1e-9 * max(values.max(initial=0.0), _TINY)))
     return np.asarray(rows[rank:].T)
 
 
 def _echelon(rows: Array) -> Array:
-    """Rows of the same span with as few numbers as elimination gives them, each led by a one."""
+    """Reduced row echelon form."""
     rows = rows.copy()
     lead = 0
     for column in range(rows.shape[1]):
@@ -188,7 +188,7 @@ def _echelon(rows: Array) -> Array:
 
 
 def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
-    """The first symmetry of a combination names it; a shift beside a turn says about which point it is, no more."""
+    """Name and step of a combination of symmetries: those of the first, and names of others that are no shifts."""
     size = np.abs(shares)
     taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
     first = taken[0]
@@ -197,12 +197,12 @@ def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
 
 
 def _sparse(basis: Array) -> Array:
-    """Columns of the same span, each with a number of its own."""
+    """Sparse columns of the same span."""
     return _echelon(basis.T).T if basis.size else basis
 
 
 def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:
-    """Name a direction by the numbers that it changes most."""
+    """Name, vector and step of a direction, by the parameters that it changes most."""
     size = np.abs(vector)
     order = np.argsort(-size, kind="stable")
     moved = [int(index) for index in order if size[index] > 1e-3 * size.max()]

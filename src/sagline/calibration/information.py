@@ -16,10 +16,10 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
-FEW: Final = 8  # readings a number: with more, exchanges lower no error by a hundredth
-OPEN: Final = 1e-12  # of the largest singular value: of a direction with less nothing is known
-ROUNDING: Final = 1e-6  # of a direction's square: a number with less of it does not take part in it
-CONDITION: Final = 1e-13  # of all that candidates tell: with less beside it, sums are rounding
+FEW: Final = 8  # readings for each parameter: with more, exchanges lower no error by a hundredth
+OPEN: Final = 1e-12  # of the largest singular value: a direction with less is unobservable
+ROUNDING: Final = 1e-6  # of a direction's square: a parameter with less of it is not part of it
+CONDITION: Final = 1e-13  # of the information of all candidates: a smaller prior is lost in rounding
 _WORTH: Final = 1e-9  # of a log det: an exchange that gains less is rounding
 
 
@@ -28,7 +28,7 @@ class Information:
 
     Attributes:
         rows: Slopes of the readings by the numbers, shape (N, k, P).
-        covariance: Of the numbers, by what is known and what was taken, shape (P, P).
+        covariance: Of the parameters, by the prior and the chosen candidates, shape (P, P).
         chosen: CandidatePoses that were taken, in this order.
     """
 
@@ -47,13 +47,13 @@ class Information:
         return gains
 
     def best(self) -> tuple[int, float]:
-        """The candidate that tells most beside what was taken, and by how much it raises the log det."""
+        """The most informative candidate beside those chosen, and the increase of the log det."""
         gains = self.gains()
         best = int(np.argmax(gains))
         return best, float(gains[best])
 
     def take(self, candidate: int) -> None:
-        """One more: C - C J^T (1 + J C J^T)^-1 J C, and with it what is heard of all others."""
+        """Add a candidate: C - C J^T (1 + J C J^T)^-1 J C, and the information of all others."""
         rows = self.rows[candidate]
         across = self.covariance @ rows.T
         by = across @ np.linalg.inv(np.linalg.cholesky(self._unit + rows @ across)).T
@@ -63,12 +63,12 @@ class Information:
         self.chosen.append(candidate)
 
     def leave(self, candidate: int) -> None:
-        """One less; all is summed anew, because what alone told of a number leaves little but rounding behind."""
+        """Remove a candidate; all is summed again, because a difference would be rounding."""
         self.chosen.remove(candidate)
         self.covariance, self._heard = self._recompute()
 
     def _recompute(self) -> tuple[Array, Array]:
-        """Covariance, and J C J^T of each candidate, from nothing."""
+        """Covariance, and J C J^T of each candidate, from the chosen ones."""
         root = np.linalg.inv(np.linalg.cholesky(self._known + information_of(self.rows[self.chosen])))
         shares = self.rows @ root.T
         return root.T @ root, shares @ shares.transpose(0, 2, 1)
@@ -80,12 +80,12 @@ def prior_information(rows: Array) -> Array:
 
 
 class Choice(NamedTuple):
-    """The candidates that tell most together, in the order in which a greedy choice among them takes them.
+    """The most informative candidates, in the order of a greedy choice among them.
 
     Attributes:
         order: Their indices, shape (count,).
-        gain: By how much the first k of them raise the log det of what is known, shape (count,).
-        deviation: Standard deviations of the numbers by what is known and the first k, shape (count, P).
+        gain: Increase of the log det of the information by the first k of them, shape (count,).
+        deviation: Standard deviations of the parameters by prior and the first k, shape (count, P).
     """
 
     order: Indices
@@ -115,7 +115,7 @@ def choose_informative(rows: Array, known: Array, count: int) -> Choice:
 
 
 def _exchange(found: Information) -> None:
-    """Each candidate once for the best one beside the others."""
+    """Replace each candidate once by the best one beside the others."""
     for candidate in tuple(found.chosen):
         found.leave(candidate)
         gains = found.gains()
@@ -143,7 +143,7 @@ def information_of(rows: Array) -> Array:
 TOTAL_STATION: Final = 1e-3  # m, of each coordinate
 CELL_SHARE: Final = 0.01  # of the tension in the middle: a usual load cell
 NEARLY: Final = 0.9  # of the most that the logarithms of the errors fall by: what costs less will do
-WORTH: Final = 0.99  # of the errors: what leaves more is not worth the while
+WORTH: Final = 0.99  # of the errors: a measurement that leaves more is not recommended
 
 
 # by kind: the measurement, its standard deviation in the unit of the kind, and True if that is a share of the value

@@ -17,7 +17,7 @@ from sagline.core.results import Result, Saved
 from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
 
-LENGTH_DEVIATION = 5e-4  # m, of a length off a drum that nobody measured: rope on a grooved drum
+LENGTH_DEVIATION = 5e-4  # m, of an unmeasured length off a drum: rope on a grooved drum
 
 
 def _world_if_none(frame: Pose | None) -> Pose:
@@ -82,7 +82,7 @@ class Sensors(Result):
             changes: Fields and their new values.
 
         Raises:
-            InvalidValueError: If there is no such field, or a value is none the constructor accepts.
+            InvalidValueError: If there is no such field, or the constructor refuses a value.
         """
         for name in changes:
             choice(name, "field", self.__slots__)
@@ -113,27 +113,26 @@ _UNIT = 1e-6  # by how much the length of a quaternion may be off: one printed w
 
 @frozen(eq=False, repr=False, weakref_slot=False)
 class WinchLog(Result, Saved):
-    """Readings of a robot that stood still at N poses. NaN stands where a reading is missing.
+    """Readings of a robot at rest at N poses; NaN where a reading is missing.
 
     Attributes:
         counts: Of the encoders, shape (N, m), or None; either these or lengths are there. A row without a count of
             every cable is left out of a calibration.
-        unstrained_length: Lengths off the drums as the machine believes them [m], shape (N, m), or None.
-        load_cells: What the load cells at the frame ends read [N], which may be negative, shape (N, m), NaN for none;
-            or None.
-        position: Position of the target in the measuring system's axes [m], shape (N, 3), each coordinate NaN where
-            nobody measured it; or None.
-        rotation: Of the platform in those axes as unit quaternions, scalar last, shape (N, 4), rows of NaN where nobody
-            measured it; or None.
+        unstrained_length: Reported lengths off the drums [m], shape (N, m), or None.
+        load_cells: Readings of the load cells at the frame ends [N], may be negative, shape (N, m), NaN for none; or
+            None.
+        position: Position of the target in the measuring system's axes [m], shape (N, 3), NaN for a coordinate that was
+            not measured; or None.
+        rotation: Of the platform in those axes as unit quaternions, scalar last, shape (N, 4), rows of NaN if not
+            measured; or None.
         time: [s], shape (N,), in any order; or None.
-        commanded: Poses that were commanded, roughly where the platform stood, N of them; or None.
-        sensors: How far the readings are to be trusted, with a deviation of all that is read; None is given for
-            `Sensors()`, of lengths alone.
-        source: Where they were read.
+        commanded: Commanded poses, near those of the platform, N of them; or None.
+        sensors: Standard deviations of all readings; None for `Sensors()`, of lengths alone.
+        source: Origin of the readings.
 
     Raises:
-        InvalidValueError: If both or none of counts and lengths are given, a field is of the wrong kind or shape or has
-            numbers that no sensor reads, or the sensors do not say how far a reading is to be trusted.
+        InvalidValueError: If both or none of counts and lengths are given, a field is of the wrong kind, shape or
+            range, or the sensors have no deviation of a reading.
 
     Examples:
         >>> import numpy as np
@@ -214,7 +213,7 @@ class WinchLog(Result, Saved):
             changes: Fields and their new values.
 
         Raises:
-            InvalidValueError: If there is no such field, or a value is none the constructor accepts.
+            InvalidValueError: If there is no such field, or the constructor refuses a value.
         """
         for name in changes:
             choice(name, "field", self.__slots__)
@@ -291,7 +290,7 @@ def _check_poses(pose: Pose | None, rows: int) -> None:
 
 
 def _check_sensors(log: WinchLog, cables: int) -> None:
-    """Refuse readings that nobody says how far to trust, and deviations of other cables."""
+    """Refuse readings without a standard deviation, and deviations of other cables."""
     pairs = (
         ("length_deviation", log.readings, cables),
         ("tension_deviation", log.load_cells, cables),

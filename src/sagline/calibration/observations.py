@@ -25,7 +25,7 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 
 STEP: Final = 1e-4  # of a drum radius or a zero, for differences: lengths are nearly linear in both
 SLOPES: Final = 3  # by length_zero, drum_radius and axial_stiffness, in the order of `kernels.calibration.observe`
-BLOCK: Final = 1 << 9  # poses at once: what is said of them takes some 10 MB
+BLOCK: Final = 1 << 9  # poses at once: some 10 MB
 NO_LOAD: Final = locked(np.zeros((1, 6)))  # nothing pulls at the platform but its cables and its weight
 
 
@@ -84,11 +84,11 @@ class WhitenedRows(NamedTuple):
     R is m + 6, or m where no system measures positions or rotations.
 
     Attributes:
-        matrix: Slopes of what the readings say by the internal parameters (logarithms where `logarithmic`), with the
-            lengths following, (N, R, P); rows without a reading are zero.
+        matrix: Slopes by the internal parameters (logarithms where `logarithmic`), with the lengths following,
+            (N, R, P); rows without a reading are zero.
         misfit: Readings less predictions, (N, R).
         residual: As they are [N, m, rad], at the lengths given, (N, m + 6); NaN for none.
-        back: What a misfit changes of the true lengths [m], (N, m, R).
+        back: Change of the true lengths [m] by a misfit, (N, m, R).
         motion: Of the platform about its center of mass [m, rad], world axes: by each true length, the last row by the
             step along a direction, lengths following, (N, m + 1, 6); of no rows without a direction.
     """
@@ -128,15 +128,15 @@ class MachineTerms(NamedTuple):
     """A robot with some numbers and its sensors, as the kernel takes them.
 
     Attributes:
-        robot: The robot, whose values those of the parameters are.
-        sensors: What reads.
-        offset: What is to be added to lengths that the machine believes [m], (m,).
+        robot: The robot with the parameter values.
+        sensors: The sensors.
+        offset: Offset of reported lengths [m], (m,).
         drums: Its drums, where counts are read; else None.
-        terms: Cable model, as kernels know it.
+        terms: Cable model of the kernel.
         body: body_table.
         cables: cable_table.
-        sensing: The sensors, as the kernel knows them.
-        slopes: How its values change with what is looked for, (P,).
+        sensing: Sensors of the kernel.
+        slopes: Slopes of the values by the internal parameters, (P,).
     """
 
     robot: Robot

@@ -20,8 +20,8 @@ from sagline.kinematics.forward_rows import solve_forward_rows
 
 CHANCE: Final = 0.01  # of one outlier among all poses of a log that has none
 EXAMINED: Final = 100  # poses, the worst of them: where there are more, the calibration is wrong and not the poses
-_MOST: Final = 3  # things that went wrong at one pose; more is the pose as a whole
-_CLEAR: Final = 3.0  # of the logarithm of the probability: explanations nearer to each other are not told apart
+_MOST: Final = 3  # errors at one pose; with more the pose as a whole is the outlier
+_CLEAR: Final = 3.0  # of the logarithm of the probability: closer explanations are not distinguished
 _REST: Final = 0.1  # of the squares that one thing explains: what the rest of the calibration may be wrong by
 _WORTH: Final = 20.0  # of the same, to first order: how much worse an explanation may be to be looked at closely
 _NONLINEAR: Final = 0.6  # of the same: of what is off by far, the slopes need explain no more to be looked at closely

@@ -69,16 +69,16 @@ KINDS: Final[dict[str, _Kind]] = {
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """One kind of unknown, and what is known of it beforehand.
+    """One kind of unknown parameter, and its prior.
 
-    Pulley radii and dead cable end at zero where less than nothing would fit best.
+    Pulley radii and dead cable have zero as a lower bound.
 
     Attributes:
         name: Of `KINDS`.
-        shared: Whether the cables share one number; None for what is usual of the kind.
-        deviation: Standard deviation of what the robot has, in the unit of the kind (a share of the value for drum
-            radius, linear density, axial stiffness and mass); infinite where nothing is known; None for that of the
-            robot's tolerances, or what is usual.
+        shared: True if the cables share one value; None for the default of the kind.
+        deviation: Standard deviation of the robot's value, in the unit of the kind (a share of the value for drum
+            radius, linear density, axial stiffness and mass); infinite without a prior; None for that of the robot's
+            tolerances, or the usual one.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Unknown:
     deviation: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse names that are none.
+        """Check name and deviation.
 
         Raises:
             InvalidValueError: If there is no such kind, or the deviation is not positive.
@@ -100,20 +100,19 @@ class Unknown:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parameters(Result):
-    """The P numbers that a calibration looks for.
+    """The P parameters of a calibration.
 
     Attributes:
         names: Kind of each, (P,).
-        labels: What each is called: "frame_anchors[3].x", "axial_stiffness", "measuring_frame.about z".
+        labels: Name of each: "frame_anchors[3].x", "axial_stiffness", "measuring_frame.about z".
         units: Of each.
         cables: Cable of each, or -1 for those of all cables or of the platform.
-        where: Index of the number of each row of `kernels.calibration.kinds` and cable, (KIND_ROWS, m), -1 for none.
-        prior: What is known beforehand, in the units, (P,).
-        prior_deviation: Its standard deviation in the units, (P,); infinite where nothing is.
-        stated: Whether the robot's tolerances or the caller said so, (P,).
-        logarithmic: Whether the logarithm is looked for, (P,).
-        counted: Whether encoders count turns of drums; otherwise lengths are read, and length_zero is what is to be
-            added to them, no number of the robot.
+        where: Index of the parameter of each row of `kernels.calibration.kinds` and cable, (KIND_ROWS, m), -1 for none.
+        prior: Prior values, in their units, (P,).
+        prior_deviation: Their standard deviations in their units, (P,); infinite without a prior.
+        stated: True where the robot's tolerances or the caller give the prior, (P,).
+        logarithmic: True where the logarithm is estimated, (P,).
+        counted: True if encoders count turns of drums; otherwise lengths are reported, and length_zero is their offset.
     """
 
     names: tuple[str, ...]
@@ -219,10 +218,10 @@ def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: _
         return
     add = {
         "counts": "Add counts to the log, or leave it out.",
-        "load cells": "Add load cells to the log, or say what is known: Unknown(name, deviation=...); or leave it out.",
+        "load cells": "Add load cells to the log, or give a prior: Unknown(name, deviation=...); or leave it out.",
         "positions": "Add measured positions to the log, or leave it out.",
     }[kind.needs]
-    raise InvalidValueError(f"unknown: {unknown.name}", "seen by no reading", f"{kind.needs} in the log", add)
+    raise InvalidValueError(f"unknown: {unknown.name}", "observed by no reading", f"{kind.needs} in the log", add)
 
 
 def _is_shared(unknown: Unknown, kind: _Kind, own: Array, width: Array) -> bool:

@@ -1,4 +1,4 @@
-"""Poses to calibrate a robot by, and how a person reads them."""
+"""Calibration poses, and their text."""
 
 from __future__ import annotations
 
@@ -51,18 +51,18 @@ class CalibrationPoses(Result, Saved):
 
     Attributes:
         robot: The robot.
-        sensors: What will measure it.
-        parameters: What is to be found.
-        poses: Where to stand, N of them.
-        frame_end_tension: With which tensions [N], (N, m).
-        unstrained_length: All cable off the drums there [m], (N, m).
-        expected_error: Standard error of each number to be found, in its unit, (P,).
-        random_error: The same of random poses of the same number, their median, (P,).
-        share_of_random: What part of the errors of random poses is left, in the directions that readings tell of:
-            geometric mean. Single numbers hide it where the readings leave, say, the place of the world open.
-        gain: log det of what the first k poses chosen tell, in the order of choosing, (N,).
-        enough: From how many poses on another one changes no error by more than a hundredth; N if none.
-        most_helpful: Which further measurement would help most, in words.
+        sensors: Its sensors.
+        parameters: The unknowns.
+        poses: Poses, N of them.
+        frame_end_tension: Tensions at the frame ends [N], (N, m).
+        unstrained_length: All cable off the drums [m], (N, m).
+        expected_error: Standard error of each parameter, in its unit, (P,).
+        random_error: Median of the same of as many random poses, (P,).
+        share_of_random: Ratio of the errors to those of random poses in the observable directions, geometric mean.
+            Single parameters hide it where the readings leave, say, the place of the world open.
+        gain: log det of the information of the first k poses, in the order of choosing, (N,).
+        enough: Number of poses from which on another one changes no error by more than a hundredth; N if none.
+        most_helpful: Recommended measurement, in words.
     """
 
     robot: Robot
@@ -172,8 +172,8 @@ def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
 def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
     share, times = plan.share_of_random, plan.share_of_random**-2
     yield from wrap(
-        f"In the directions that readings tell of, the errors are {n(share, '.2f')} of those of random poses, of which "
-        f"it would take {n(times, '.2g')} times as many.",
+        f"In the directions that readings observe, the errors are {n(share, '.2f')} of those of random poses; "
+        f"{n(times, '.2g')} times as many random poses have the same errors.",
         width,
     )
     if plan.enough < len(plan):
@@ -184,12 +184,12 @@ def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
     yield from wrap(plan.most_helpful, width)
 
 
-MOST: Final = 1_000  # poses; nobody stands at more
+MOST: Final = 1_000  # poses: more take days to measure
 MOST_CANDIDATES: Final = 20_000
-DRAWS: Final = 21  # of random poses, whose middle is told
-ENOUGH: Final = 0.01  # of an error: by less nobody sees it fall
-SEEN: Final = 3.0  # of what is known beforehand: readings that tell so much lower an error by half
-LOOSE: Final = 10.0  # usual deviations of what a drawing does not give: the unit of what nothing is known of
+DRAWS: Final = 21  # of random poses, for a median
+ENOUGH: Final = 0.01  # of an error: a smaller improvement does not matter
+SEEN: Final = 3.0  # of the prior information: so much more lowers an error by half
+LOOSE: Final = 10.0  # usual deviations of an unknown value: the unit of a parameter without a prior
 _CATENARY: Final = Catenary()
 
 
@@ -204,28 +204,28 @@ def calibration_poses(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> CalibrationPoses:
-    """The poses and tension sets that tell most of what is unknown, before anybody measures.
+    """The poses and tension sets that are most informative of the unknowns, before any measurement.
 
-    Of feasible poses of a box, each with several sets of tensions, those are chosen that lower the volume of what
-    remains possible most: D-optimal, greedily. Sets of tensions at one pose follow each other.
+    D-optimal choice among feasible poses of a box, each with several sets of tensions: greedy, with exchanges. Sets of
+    tensions at one pose follow each other.
 
     Args:
-        robot: The robot as it is believed to be.
-        count: How many sets of readings are to be taken, 1 to 1,000.
-        unknowns: What is to be found, as of `calibrate`.
-        sensors: What will read, at every pose; None for load cells of 1 % of the tension in the middle (or the
-            load_cell_deviation of the winches) and lengths good to 0.5 mm.
-        box: Where the platform may stand; None for the robot's test_box.
-        candidates: Among how many poses and sets of tensions is chosen, `count` to 20,000.
+        robot: The robot before the calibration.
+        count: Number of sets of readings, 1 to 1,000.
+        unknowns: Parameters to estimate, as of `calibrate`.
+        sensors: Sensors that read at every pose; None for load cells of 1 % of the median tension (or the
+            load_cell_deviation of the winches) and lengths with 0.5 mm.
+        box: Box of poses; None for the robot's test_box.
+        candidates: Number of poses and sets of tensions to choose from, `count` to 20,000.
         seed: Of the candidates, and of the random poses to compare with.
-        progress: Called after every few candidates: how many poses are tried, of how many.
+        progress: Called after every few candidates with the number of poses that are done, and of all.
 
     Returns:
         The poses, their tensions and lengths, and the errors to expect.
 
     Raises:
-        InvalidValueError: If there is no box, not enough of it is feasible, sensors read nothing that tells of the
-            unknowns, or an argument is of the wrong kind or out of range; the message says what to give.
+        InvalidValueError: If there is no box, not enough of it is feasible, no reading observes the unknowns, or an
+            argument is of the wrong kind or out of range.
 
     Examples:
         >>> import sagline as sl
@@ -264,20 +264,20 @@ def calibration_poses(
     known, unit = prior_information(rows), scale * np.abs(slopes)
     choice = choose_informative(rows, known, size)
     order = choice.order[_driving_order(standing.part(choice.order))]
-    chosen, told, random = standing.part(order), rows[order], _random(rows, standing.usual, size, drawn)
+    poses, own, random = standing.part(order), rows[order], _random(rows, standing.usual, size, drawn)
     return CalibrationPoses(
         robot=robot,
         sensors=read,
         parameters=parameters,
-        poses=Pose.from_quaternion(chosen.poses[:, :3], chosen.poses[:, 3:]),
-        frame_end_tension=chosen.tensions,
-        unstrained_length=chosen.lengths,
-        expected_error=locked(deviations_of(told, held) * unit),
+        poses=Pose.from_quaternion(poses.poses[:, :3], poses.poses[:, 3:]),
+        frame_end_tension=poses.tensions,
+        unstrained_length=poses.lengths,
+        expected_error=locked(deviations_of(own, held) * unit),
         random_error=locked(np.median([deviations_of(other, held) for other in random], axis=0) * unit),
-        share_of_random=_share(known, told, random),
+        share_of_random=_share(known, own, random),
         gain=locked(choice.gain),
         enough=_sufficient_count(choice),
-        most_helpful=most_helpful(Situation(robot, _CATENARY, parameters, read, scale, slopes, known, chosen, told)),
+        most_helpful=most_helpful(Situation(robot, _CATENARY, parameters, read, scale, slopes, known, poses, own)),
     )
 
 
@@ -302,7 +302,7 @@ def _default_sensors(robot: Robot, tensions: Array) -> Sensors:
 
 
 def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
-    """A unit of each internal parameter, and the inverse of its deviation beforehand in it: 1, or less, or 0."""
+    """Unit of each internal parameter, and the inverse of its prior deviation in it: 1, or less, or 0."""
     deviation = parameters.prior_deviation / np.abs(slopes)
     loose = np.array([LOOSE * KINDS[name].assumed for name in parameters.names])
     scale = np.fmin(deviation, loose)
@@ -310,27 +310,27 @@ def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
 
 
 def _read(rows: Array) -> Array:
-    """Rows of sensors that are there; where they tell of nothing, one of zeros."""
+    """Rows of the sensors; where they observe nothing, one of zeros."""
     there = rows.any(axis=(0, 2))
     return np.ascontiguousarray(rows[:, there] if there.any() else rows[:, :1])
 
 
 def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: Array) -> None:
-    """Refuse to choose among too few poses, or for unknowns that none of them tells of."""
+    """Refuse too few poses, and unknowns without observations and prior."""
     if len(rows) < count:
         value = f"{count}, with {len(rows)} of {tried} candidates feasible and stable"
         step = "Ask for fewer, raise candidates, or give a box of which more is feasible."
         raise InvalidValueError("count", value, f"1 to {len(rows)}", step)
-    names, told = np.array(parameters.names), np.abs(rows).max(axis=(0, 1)) > 0.0
+    names, observed = np.array(parameters.names), np.abs(rows).max(axis=(0, 1)) > 0.0
     for name in dict.fromkeys(parameters.names):
         mine = names == name
-        if not told[mine].any() and not parameters.stated[mine].any():
-            step = f"Leave it out, add sensors, or say what is known: Unknown('{name}', deviation=...)."
-            raise InvalidValueError(f"unknown: {name}", "seen by no reading", "what readings tell of", step)
+        if not observed[mine].any() and not parameters.stated[mine].any():
+            step = f"Leave it out, add sensors, or give a prior: Unknown('{name}', deviation=...)."
+            raise InvalidValueError(f"unknown: {name}", "observed by no reading", "observed, or with a prior", step)
 
 
 def _driving_order(chosen: CandidatePoses) -> Indices:
-    """An order that is short to drive: through the positions, at each from the least sum of tensions to the largest."""
+    """Order of a short tour of the positions, at each from the least sum of tensions to the largest."""
     _, first, place = np.unique(chosen.place, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
     rank[shortest_tour(chosen.poses[first, :3])] = np.arange(len(first))
@@ -338,15 +338,15 @@ def _driving_order(chosen: CandidatePoses) -> Indices:
 
 
 def _random(rows: Array, usual: Flags, count: int, seed: int) -> list[Array]:
-    """Slopes at poses that nobody chose, some draws of (count, k, P)."""
+    """Whitened rows at random poses, some draws of (count, k, P)."""
     rng = np.random.default_rng((seed, 1))
     pool = np.flatnonzero(usual) if usual.sum() >= count else np.arange(len(rows))
     return [rows[rng.choice(pool, count, replace=False)] for _ in range(DRAWS)]
 
 
-def _share(known: Array, told: Array, random: list[Array]) -> float:
-    """Errors by what is told, as a share of those of random poses, in directions that these lower by half or more."""
-    own, *others = (information_of(each) for each in (told, *random))
+def _share(known: Array, rows: Array, random: list[Array]) -> float:
+    """Ratio of errors to those of random poses, in directions whose errors these lower by half or more."""
+    own, *others = (information_of(each) for each in (rows, *random))
     size, vectors = np.linalg.eigh(np.mean(others, axis=0))
     seen = vectors[:, size > SEEN]
     if not seen.size:
@@ -356,7 +356,7 @@ def _share(known: Array, told: Array, random: list[Array]) -> float:
 
 
 def _sufficient_count(choice: Choice) -> int:
-    """From how many poses on another one lowers no error by more than a hundredth."""
+    """Number of poses from which on another one lowers no error by more than a hundredth."""
     lowered = (1.0 - choice.deviation[1:] / choice.deviation[:-1]).max(axis=1)
     still = np.flatnonzero(lowered > ENOUGH)
     return int(still[-1]) + 2 if still.size else 1

@@ -30,7 +30,7 @@ class ReadingsTable(NamedTuple):
 
     Attributes:
         counts: Of the encoders, (N, m), or None.
-        lengths: That the machine believes [m], (N, m), or None; one of the two is there.
+        lengths: Reported lengths [m], (N, m), or None; either these or counts are there.
         cells: Of the load cells [N], (N, m).
         positions: [m], (N, 3).
         rotations: Unit quaternions, (N, 4).
@@ -55,11 +55,11 @@ class FitProblem(NamedTuple):
     """The estimation problem.
 
     Attributes:
-        robot: As it is believed to be.
+        robot: The robot before the calibration.
         model: Cable model.
-        sensors: What reads.
-        parameters: What is looked for.
-        log: What was read.
+        sensors: The sensors.
+        parameters: The unknowns.
+        log: The readings.
     """
 
     robot: Robot
@@ -80,7 +80,7 @@ class FitProblem(NamedTuple):
         return np.asarray(known / np.where(self.parameters.logarithmic, prior, 1.0))
 
     def missed(self, numbers: Array) -> Array:
-        """Distance of internal parameters from their prior, in its standard deviations, (P,)."""
+        """Internal parameters less their prior, in its standard deviations, (P,)."""
         return np.asarray((numbers - self.prior) / self.prior_deviation)
 
     @property
@@ -102,8 +102,8 @@ class SearchState(NamedTuple):
     """A state of the search.
 
     Attributes:
-        numbers: What is looked for, internally, (P,).
-        machine: The robot with these numbers.
+        numbers: Internal parameters, (P,).
+        machine: The robot with these parameters.
         lengths: True lengths [m], (N, m).
         poses: Pose rows, (N, POSE_COLUMNS).
     """
@@ -220,7 +220,7 @@ def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commande
         found = search(machine.robot, problem.model, locked(reported.view()), NO_LOAD, None)
         poses = found.poses.copy()
     if np.any(problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0):
-        return poses  # nobody knows yet where the measured points are
+        return poses  # the place of the measured points is not known yet
     sensors, log = machine.sensors, problem.log
     turned = ~np.isnan(log.rotations).any(axis=1)
     placed = ~np.isnan(log.positions).any(axis=1)

@@ -29,15 +29,15 @@ from sagline.statics.tables import pose_rows
 class PoseError(Result):
     """Expected errors of poses, single or with a leading axis N.
 
-    They are those of the platform where a calibrated robot's lengths for a commanded pose are paid out: of all numbers
-    that were found, and of lengths that are off by the winches' own deviation.
+    Errors of the platform with the calibrated robot's lengths for a commanded pose, by the covariance of all parameters
+    and the deviation of the winches' lengths.
 
     Attributes:
         pose: The commanded poses.
         covariance: Of the displacement of the platform frame's origin and its rotation vector, world axes, shape
             (..., 6, 6) [m^2, m rad, rad^2].
-        own_covariance: The same but for a shift of the world and a turn about the vertical that the poses of the log
-            have in common: what a robot that need not agree with anything outside itself is off.
+        own_covariance: The same without the shift of the world and the rotation about the vertical that the poses of
+            the log have in common: errors relative to the robot itself.
     """
 
     pose: Pose
@@ -45,7 +45,7 @@ class PoseError(Result):
     own_covariance: Array
 
     def __str__(self) -> str:
-        """Errors in a line, root mean squares over the poses that the robot can hold."""
+        """Errors in a line, root mean squares over the feasible poses."""
         held = ~np.isnan(self.position)
         world, own, turn = (
             n(float(np.sqrt(np.mean(one[held] ** 2))), ".3g", unit) if held.any() else "–"
@@ -110,45 +110,45 @@ def _transformed_covariance(slopes: Array, covariance: Array, negligible: Array 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Calibration(Findings, Saved):
-    """Result of `calibrate`: P numbers found from the readings at N poses.
+    """Result of `calibrate`: P parameters from the readings at N poses.
 
     Attributes:
-        robot: The robot with what was found.
-        before: The robot as it was.
-        sensors: The sensors with what was found of the measuring system.
-        length_offset: To be added to lengths that the machine believes [m], shape (m,); zero where counts were read.
-        status: How it ended.
-        parameters: What the numbers are, and their priors.
-        values: What was found, in the units of the parameters, (P,).
-        covariance: Of the values, (P, P); of what no datum and no prior tells it is infinite along the diagonal.
+        robot: The calibrated robot.
+        before: The robot before the calibration.
+        sensors: The sensors with the calibrated measuring system.
+        length_offset: Offset of reported lengths [m], shape (m,); zero where counts were read.
+        status: Status of the calibration.
+        parameters: The parameters and their priors.
+        values: Their values, in their units, (P,).
+        covariance: Of the values, (P, P); infinite on the diagonal without observations and a prior.
         chi_squared: Sum of squares of all residuals in standard deviations, priors included.
-        degrees_of_freedom: Readings and lengths less what they determine: what chi_squared is to be compared with.
+        degrees_of_freedom: Expected value of chi_squared: readings and lengths less the estimated parameters.
         rows: Rows of the log that were used, (N,).
-        left_out: Why, and which rows of the log were not.
-        poses: Where the platform stood, N of them.
-        unstrained_length: The true lengths of the cables there [m], (N, m).
+        left_out: Other rows of the log, by reason.
+        poses: Poses of the platform, N of them.
+        unstrained_length: True lengths of the cables [m], (N, m).
         residuals: Readings less predictions: lengths [m], load cells [N], position [m], rotation [rad], shape
             (N, 2 m + 6); NaN where nothing was read.
-        chi_squared_of_pose: (N,).
+        chi_squared_of_pose: Of each pose, (N,).
         weights: Of the poses: less than 1 for one that does not fit the rest, (N,).
-        outliers: Which do not fit, and by how much.
-        gauge: Directions that the data leave open, where the priors have them.
-        cannot_tell_apart: Directions that they hardly tell.
-        cross_validation: Error at poses left out; None where it was not asked for.
+        outliers: Readings that do not fit.
+        gauge: Unobservable directions; the priors decide along them.
+        cannot_tell_apart: Weakly identifiable directions.
+        cross_validation: Errors at poses left out; None without cross-validation.
         iterations: Of the least squares.
         model: Cable model.
-        log: Where the readings come from.
-        date: When it was done, ISO 8601.
+        log: Origin of the readings.
+        date: Date of the calibration, ISO 8601.
     """
 
     def value_of(self, label: str) -> tuple[float, float]:
-        """A number that was found and its standard error, both in the unit of its parameter.
+        """Value and standard error of a parameter, in its unit.
 
         Args:
-            label: As `parameters.labels` has it: "frame_anchors[3].x", "mass".
+            label: One of `parameters.labels`: "frame_anchors[3].x", "mass".
 
         Raises:
-            InvalidValueError: If nothing is called so.
+            InvalidValueError: If there is no such label.
         """
         k = self.parameters.labels.index(choice(label, "label", self.parameters.labels))
         return float(self.values[k]), float(self.standard_error[k])
@@ -160,17 +160,17 @@ class Calibration(Findings, Saved):
     def pose_error(self, pose: Pose) -> PoseError:
         """Expected error of the platform at a commanded pose, with this calibration.
 
-        The lengths that `inverse` gives the calibrated robot are paid out by the true one: what the calibration does
-        not know moves the platform, and what the winches' lengths are off, `sensors.length_deviation`.
+        The true robot pays out the lengths that `inverse` gives the calibrated one. Errors of the calibration and of
+        the winches' lengths, `sensors.length_deviation`, move the platform.
 
         Args:
-            pose: One, or N.
+            pose: A single pose or N.
 
         Returns:
-            PoseError; NaN where the robot cannot hold the pose, infinite where it follows what nothing tells.
+            PoseError; NaN where the pose is not feasible, infinite where it depends on an unobserved parameter.
 
         Raises:
-            InvalidValueError: If it is no pose, or one outside the motions of the robot's pattern.
+            InvalidValueError: If it is no pose, or outside the motion pattern of the robot.
         """
         rows, shape = pose_rows(instance(pose, Pose, "pose")), pose.shape
         lengths = np.atleast_2d(inverse(self.robot, pose, model=self.model).unstrained_length)
@@ -190,7 +190,7 @@ class Calibration(Findings, Saved):
             start: As of `forward`.
 
         Returns:
-            ForwardSolution of the calibrated robot; `covariance` is that of what the calibration does not know and of
+            ForwardSolution of the calibrated robot; `covariance` is that of the parameters and of
             `sensors.length_deviation` together, NaN where there is no solution.
 
         Raises:
@@ -231,5 +231,5 @@ class Calibration(Findings, Saved):
         return np.asarray(np.linalg.lstsq(motions, right, rcond=None)[0])
 
     def table(self) -> str:
-        """Every number with its standard error, what was there before, and how far it has moved, one a line."""
+        """Every value with its standard error, its prior and its change, one a line."""
         return summary.table(self)

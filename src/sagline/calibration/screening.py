@@ -18,9 +18,9 @@ from sagline.robot.robot import Robot
 
 SPEED_LIMIT: Final = 0.005  # m/s
 SOONEST: Final = 0.1 * (1.0 - 1e-9)  # s: over a shorter time a step of an encoder is as fast as a platform that moves
-LATEST: Final = 1.0  # s: over a longer time the difference of two rows is no speed, the platform may have stopped
-PULLING: Final = 3.0  # standard deviations above nothing that a load cell must read
-OTHERWISE: Final = 0.5  # share of the rows in which a cable's load cell is read where it is missed in the others
+LATEST: Final = 1.0  # s: over a longer time the platform may have stopped between two rows
+PULLING: Final = 3.0  # standard deviations above zero that a load cell must read
+OTHERWISE: Final = 0.5  # share of the rows from which on a reading of a load cell is missed in the others
 
 
 def screen(

@@ -31,18 +31,18 @@ from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 
-STRANGE: Final = 1e-9  # probability of a sum of squares that no noise reaches
-FEW: Final = 0.1  # of the poses: where more are elsewhere, it is not that a cable slipped
-FAR: Final = 0.03  # m from where the lengths that were read put it: another equilibrium
+STRANGE: Final = 1e-9  # probability of a sum of squares that noise does not reach
+FEW: Final = 0.1  # of the poses: with more at another equilibrium, slipped cables are not the cause
+FAR: Final = 0.03  # m from the pose by the reported lengths: another equilibrium
 
 
 class SearchResult(NamedTuple):
     """Result of the search for all parameters.
 
     Attributes:
-        fit: The last of them.
-        kept: Which poses count, (N,).
-        left_out: Why, and which do not.
+        fit: The last one.
+        kept: Poses that count, (N,).
+        left_out: The others, by reason.
     """
 
     fit: Fit
@@ -98,7 +98,7 @@ def _improbable(fit: Fit, kept: Flags) -> Flags:
 
 
 def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchState:
-    """A state in which some poses begin anew, where the lengths that the winches say put the platform."""
+    """State with some poses restarted by forward kinematics of the reported lengths."""
     machine = state.machine
     reported = reported_lengths(problem, machine, slice(None))
     found = search(machine.robot, problem.model, locked(reported[which].copy()), NO_LOAD, None)
@@ -152,7 +152,7 @@ def cross_validate(
     tension, position = _root_mean_squares(now)
     tension_before, position_before = _root_mean_squares(before)
     if (problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0).any():
-        position_before = np.nan  # the place of the measuring system was not known then
+        position_before = np.nan  # the measuring system was not known before
     return CrossValidation(folds, tension, position, tension_before, position_before)
 
 

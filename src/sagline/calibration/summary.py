@@ -1,4 +1,4 @@
-"""A calibration as a person reads it, in lines of 80 columns."""
+"""Text of a calibration, in lines of 80 columns."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def in_words(found: Findings, width: int = WIDTH) -> str:
         _verdict(found, width),
         _rows(found, width),
         _values(found, width),
-        _open(found.gauge, "What the readings leave open; it stays where the robot had it:", width),
-        _open(found.cannot_tell_apart, "What they hardly tell apart:", width),
+        _directions(found.gauge, "Unobservable, kept as the robot had it:", width),
+        _directions(found.cannot_tell_apart, "Weakly identifiable:", width),
         _outliers(found, width),
         _cross_validation(found, width),
     )
@@ -76,7 +76,7 @@ def chi_squared_text(found: Findings) -> str:
     """Chi squared beside its expected value."""
     freedom = found.degrees_of_freedom
     if freedom <= 0:
-        return f"chi squared {n(found.chi_squared, '.4g')}, of no degree of freedom: nothing proves the numbers"
+        return f"chi squared {n(found.chi_squared, '.4g')} without degrees of freedom: nothing confirms the values"
     expected = f"{freedom:,}{SPACE}±{SPACE}{n((2.0 * freedom) ** 0.5, '.2g')}"
     return f"chi squared {n(found.chi_squared, ',.0f')}, expected {expected}"
 
@@ -190,7 +190,7 @@ def _in_columns(cells: list[str], columns: int) -> Iterator[str]:
         yield ("    " + "".join(cell.ljust(width) for cell in cells[start : start + each])).rstrip()
 
 
-def _open(directions: Sequence[Direction], head: str, width: int) -> Iterator[str]:
+def _directions(directions: Sequence[Direction], head: str, width: int) -> Iterator[str]:
     """Directions, those with one step together, with the share of their priors that is left."""
     if not directions:
         return
@@ -218,7 +218,7 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
         yield "Outliers: none"
         return
     place = {int(row): k for k, row in enumerate(found.rows)}
-    less = (found.weights < 1.0).any()  # but for a calibration that was told not to
+    less = (found.weights < 1.0).any()  # not of a calibration with robust=False
     yield f"Outliers, {len(found.outliers)}{'; their poses count less' if less else ''}:"
     for outlier in found.outliers[:MOST_OUTLIERS]:
         at = ""
@@ -231,7 +231,7 @@ def _outliers(found: Findings, width: int) -> Iterator[str]:
 
 
 def _cross_validation(found: Findings, width: int) -> Iterator[str]:
-    """The error at poses that the calibration did not see."""
+    """Errors at poses that the calibration did not use."""
     check = found.cross_validation
     if check is None:
         return

@@ -1,7 +1,7 @@
-"""Changes of a robot that no reading can tell: its symmetries, as directions in the numbers that may be unknown.
+"""Symmetries of a robot: changes that no reading observes, as directions of the parameters.
 
-Where the world, the platform's frame, the meter or the newton begin is a matter of words: moving one of them changes
-every number that counts from it, and nothing that is read. docs/model.md, section 14.
+The origins of the world and of the platform's frame, the meter and the newton are conventions: another choice changes
+every parameter that depends on it, and no reading. docs/model.md, section 14.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
 class Generator(NamedTuple):
-    """A change of all numbers that no reading can tell where all of them may change.
+    """A change of all parameters that no reading observes if all may change.
 
     Attributes:
         name: What it is.
-        step: What takes it away.
+        step: Measurement that removes it.
         change: Of every number of `kernels.calibration.kinds`, (KIND_ROWS, m), logarithms where these are looked for.
-        lengths: By what share the lengths off the drums change.
+        lengths: Relative change of the lengths off the drums.
     """
 
     name: str
@@ -50,10 +50,10 @@ class Symmetries(NamedTuple):
     """Symmetries of a robot, g of them with the freedoms of its drums.
 
     Attributes:
-        each: Those with a name, at the front of the others.
-        table: Change of every number of `kinds`, (KIND_ROWS, m, g).
-        lengths: What the drums pay out beyond what is asked for, which must vanish, (2 m, g).
-        matters: Which numbers must not move where they are known, (KIND_ROWS, m).
+        each: Those with a name, before the others.
+        table: Change of every row of `kinds`, (KIND_ROWS, m, g).
+        lengths: Lengths that the drums pay out too much, which must vanish, (2 m, g).
+        matters: Parameters that must not change where they are known, (KIND_ROWS, m).
     """
 
     each: tuple[Generator, ...]
