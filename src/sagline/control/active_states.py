@@ -22,7 +22,7 @@ from sagline.kinematics.status import ForwardStatus
 
 LEAVING: Final = 0.3  # s, at most, until all grants are given back
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
-POSE_LOST: Final = "it is not known where the platform is; home again"
+POSE_LOST: Final = "the pose of the platform is not known; home again"
 
 
 class ActiveState(ABC):
@@ -213,7 +213,7 @@ class HomingState(ActiveState):
         if sample is None:
             pass
         elif self.course is not None:
-            line = self._ends_jog(sample)
+            line = self._reason_to_end(sample)
             if line:
                 c.say(EventKind.NOTE, "jog", f"the jog ended: {line}")
             elif self.point is None or not self.point.done:
@@ -232,15 +232,15 @@ class HomingState(ActiveState):
         self.rest(Mode.HOLD, enabled=True)
         return self
 
-    def _ends_jog(self, sample: Sample) -> str:
+    def _reason_to_end(self, sample: Sample) -> str:
         """Reason to end a jog, "" to go on."""
         c = self.context
         stale = ~(sample.age <= FRESH * c.period)
         if stale.any():
             g = int(np.argmax(stale))
-            return f"group {g} is silent for {sample.age[g]:.2g} s. Check its PLC and the network"
+            return f"group {g} has been silent for {sample.age[g]:.2g} s. Check its PLC and the network"
         if c.degraded:
-            return "a load cell is not to be believed. Check the cells, then home again"
+            return "a load cell is not reliable. Check the cells, then home again"
         limit = self._largest_tension
         if (sample.tension <= limit).all():
             return ""
@@ -349,6 +349,6 @@ def idle_at(context: Context, found: Standing | ForwardStatus, reason: str) -> F
     context.previous_plan = None
     if isinstance(found, Standing):
         return Following(context, State.IDLE, reason, found.step(), found)
-    context.say(EventKind.NOTE, "estimate", f"no place for these lengths: {found.text}")
+    context.say(EventKind.NOTE, "estimate", f"no equilibrium at these lengths: {found.text}")
     context.homed = False
     return None

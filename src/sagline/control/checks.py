@@ -21,11 +21,11 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-START: Final = 2e-3  # m: so far may a path begin from where the platform is
-ON_TICK: Final = 1e-6  # of a period: so far may a sample be from it
+START: Final = 2e-3  # m: largest distance of the first pose of a path from the platform
+ON_TICK: Final = 1e-6  # of a period: largest distance of a sample from a tick
 LARGEST_LEAD: Final = 5e-3  # m: no more than the tension loop may change
-ROUNDING: Final = 5e-6  # m: so well a plan's lengths fit its rates, but for accelerations
-LARGEST_STEP: Final = 1e-3  # m: what the rules for faults take for an encoder's jump
+ROUNDING: Final = 5e-6  # m: difference of a plan's lengths and rates, without accelerations
+LARGEST_STEP: Final = 1e-3  # m: from here on the fault rules see a jump of an encoder
 AT_REST: Final = 1e-3  # m/s and rad/s: a path that begins or ends faster would strike the winches
 
 
@@ -112,10 +112,9 @@ def check_lead(what: str, lead: Array) -> None:
     """Refuse lengths at rest that differ too much from the first ones of a plan; lead: their difference [m], (m,)."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
-        reason = (
-            f"winch {i} has {1e3 * lead[i]:+.3g} mm more cable off than its plan; allowed: {1e3 * LARGEST_LEAD:g} mm"
-        )
-        raise RefusedError(what, reason, "Jog the winches back that were jogged, or home again.")
+        away, allowed = f"{1e3 * lead[i]:+.3g} mm", f"{1e3 * LARGEST_LEAD:g} mm"
+        reason = f"the length of winch {i} differs by {away} from the plan; allowed: {allowed}"
+        raise RefusedError(what, reason, "Jog the winches back, or home again.")
 
 
 def check_start(robot: Robot, here: Pose, start: Pose) -> None:
@@ -124,7 +123,7 @@ def check_start(robot: Robot, here: Pose, start: Pose) -> None:
     jump = float(np.linalg.norm(start.transform(points) - here.transform(points), axis=1).max())
     if not jump <= START:
         place = ", ".join(f"{x:.4f}" for x in here.position)
-        away = f"it begins {1e3 * jump:.3g} mm from where the platform is; allowed: {1e3 * START:g} mm"
+        away = f"it begins {1e3 * jump:.3g} mm from the pose of the platform; allowed: {1e3 * START:g} mm"
         raise RefusedError("the path", away, f"Go to its first pose, or begin it at ({place}) m.")
 
 
@@ -137,7 +136,7 @@ def _at_ticks(path: Path, period: float) -> Path:
     missing = np.abs(time[chosen] - ticks) > ON_TICK * period
     if missing.any():
         at = float(ticks[np.argmax(missing)])
-        reason = f"it has no sample at {at:g} s; a cycle takes {1e3 * period:g} ms, and asks for one at each"
+        reason = f"it has no sample at {at:g} s; every cycle of {1e3 * period:g} ms needs one"
         raise RefusedError("the path", reason, f"Make it with rate={1.0 / period:g}, or a multiple of it.")
     if time[-1] - ticks[-1] > ON_TICK * period:
         chosen, ticks = np.append(chosen, len(time) - 1), np.append(ticks, [period * count])
@@ -174,7 +173,7 @@ def _check_feasible(plan: Plan, path: Path) -> None:
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
     """Refuse speeds and torques beyond the known limits of the winches."""
     winches = robot.winches
-    lever = drum_lever(robot, length)  # what is missing is told here
+    lever = drum_lever(robot, length)  # refuses missing data
     if winches is None:
         return
     ratio = np.abs(winches.gear) / lever  # radians of the motor for a meter of cable

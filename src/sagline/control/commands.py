@@ -22,7 +22,7 @@ from sagline.control.link import (
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array, Flags
 
-VALID_FOR: Final = HEARTBEAT  # s: so long a PLC may go on with a command
+VALID_FOR: Final = HEARTBEAT  # s: time for which a PLC may use a command
 MOST_OWNER: Final = 2**31
 
 
@@ -66,8 +66,8 @@ class Sender:
 
     def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags, claims: bool) -> None:
         self.counter = self.counter % COUNTERS + 1
-        pulls = np.maximum(tension, 0.0)  # of a reading below zero; a PLC refuses to push
-        self.command = Command(self.counter, self.owner, mode, VALID_FOR, length, rate, pulls, enable, claims)
+        positive = np.maximum(tension, 0.0)  # of a reading below zero; a PLC refuses to push
+        self.command = Command(self.counter, self.owner, mode, VALID_FOR, length, rate, positive, enable, claims)
 
 
 CLAIMING: Final = OWNER_TIMEOUT + 0.7  # s, at most, until all grants are there
@@ -75,12 +75,12 @@ SILENT: Final = 7.0  # s, at most, until every group has answered once
 GIVING_BACK: Final = 0.05  # s, for grants of some groups only
 LONGEST_WAIT: Final = 0.6  # s, at random, before the next claim
 TRIES: Final = 4
-FRESH: Final = 3  # cycles: so old may a sample be
+FRESH: Final = 3  # cycles: largest age of a sample
 AGREEING: Final = 5  # cycles in a row
-SURE: Final = 20  # cycles, until what lasts is no more what was there before
-BEHIND: Final = 10  # commands: so far may an echo be
+SURE: Final = 20  # cycles: a cause that lasts longer is not a state before the claim
+BEHIND: Final = 10  # commands: largest distance of an echo
 _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
-_AGAIN: Final = "Try again; if it stays so, check the PLC's program."
+_AGAIN: Final = "Try again; if it continues, check the program of the PLC."
 
 
 class Disagreement(NamedTuple):
@@ -115,16 +115,21 @@ def disagreement(
     age, stranger = float(sample.age.max()), (other != owner) & (other != 0)
     foreign = int(other[stranger][0]) if stranger.any() else 0
     codes = sorted({int(code) for code in sample.fault} - {0})
-    stops = f"it stopped by itself: {'; '.join(map(fault_text, codes))}"
+    stops = f"its PLC has stopped it: {'; '.join(map(fault_text, codes))}"
     causes: tuple[tuple[Flags, str, str, bool], ...] = (
         (~(sample.age <= FRESH * period), f"silent for {age:.2g} s", "Check its PLC and the network.", False),
-        ((status & _PRESSED) != 0, "the emergency stop is pressed", "Make the machine safe and release it.", True),
-        ((status & _LOCKED) != 0, "the drums are locked", "Let the drums go at the machine, then connect again.", True),
+        (
+            (status & _PRESSED) != 0,
+            "the emergency stop is pressed",
+            "Make the machine safe and release the stop.",
+            True,
+        ),
+        ((status & _LOCKED) != 0, "the drums are locked", "Unlock the drums at the machine, then connect again.", True),
         (stranger, f"belongs to another controller, {foreign}", "Stop that one, then connect again.", False),
-        (other != owner, "nobody has the grant", "Connect again.", False),
-        (tripped, "a drive has tripped", "Mend and reset it at the machine.", False),
-        ((status & _READY) == 0, "a drive is not ready", "Mend and reset it at the machine.", False),
-        (sample.fault != 0, stops, "Mend the cause, and wait 0.3 s for the PLC.", False),
+        (other != owner, "no controller has the grant", "Connect again.", False),
+        (tripped, "a drive has tripped", "Repair and reset it at the machine.", False),
+        ((status & _READY) == 0, "a drive is not ready", "Repair and reset it at the machine.", False),
+        (sample.fault != 0, stops, "Remove the cause, and wait 0.3 s for the PLC.", False),
         ((counter - sample.echo) % COUNTERS > BEHIND, "does not take commands", _AGAIN, False),
     )
     for there, reason, step, lasting in causes:

@@ -199,7 +199,7 @@ class Context:
         lost = self.estimator.locate(length, wrench)
         if lost is None:
             return ""
-        line = f"the platform's place is lost: {lost.text}. Look where it is, acknowledge, and home again."
+        line = f"the pose of the platform is lost: {lost.text}. Check where it is, acknowledge, and home again."
         self.say(EventKind.FAULT, "estimate", line)
         return line
 
@@ -289,7 +289,7 @@ class Context:
 
 
 def _check_link(link: object) -> None:
-    """Refuse an object that is no link."""
+    """Refuse an object that is not a link."""
     has = all(hasattr(link, name) for name in ("groups", "period")) and callable(getattr(link, "exchange", None))
     if isinstance(link, type) or not has:
         step = "Take that of a machine, machine.link(), or make one: sl.plc.S7Link(addresses, robot)."
@@ -297,7 +297,7 @@ def _check_link(link: object) -> None:
 
 
 def _check_period(link: Link, period: float) -> None:
-    """Refuse PLCs that would reach each set point sooner or later than it is meant."""
+    """Refuse PLCs with another period than the controller."""
     own = number(link.period, "link.period", "s", above=0.0)
     if abs(own - period) > SAME * period:
         step = f"Give the machine period={period:g}, or the controller pace=Pace({own:g})."

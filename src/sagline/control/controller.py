@@ -153,7 +153,7 @@ class Controller(Preparation):
             angular_speed: Largest of the platform [rad/s], > 0.
 
         Raises:
-            RefusedError: If the platform's place is not known, or it is there already.
+            RefusedError: If the pose of the platform is not known, or it is there already.
         """
         limits = number(speed, "speed", "m/s", above=0.0), number(angular_speed, "angular_speed", "rad/s", above=0.0)
         here = self._here()

@@ -48,12 +48,12 @@ class Cycle(NamedTuple):
         return command is not None and command.mode == Mode.FOLLOW and bool(abs(command.rate).max() > MOVING)
 
 
-SLACK_SHARE: Final = 0.3  # of the lower limit: a cable that pulls less is slack
-PLANNED_SHARE: Final = 0.9  # of the lower limit: from there on a plan wants the cable taut
-PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a cable that pulls
-STEADY_TIME: Final = 0.5  # s, of the filter that learns what the tensions are off the plan all the time
-QUICK_TIME: Final = 0.1  # s, of the one that is held against the balance of the platform
-MOST_CHANGE: Final = 6.0  # N a cycle, of the latter: a few readings far out do not stay in it
+SLACK_SHARE: Final = 0.3  # of the lower limit: a cable with less is slack
+PLANNED_SHARE: Final = 0.9  # of the lower limit: a planned tension from which on the cable is taut
+PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a taut cable
+STEADY_TIME: Final = 0.5  # s, of the filter for the constant part of the tension errors
+QUICK_TIME: Final = 0.1  # s, of the filter that is compared with the balance of the platform
+MOST_CHANGE: Final = 6.0  # N a cycle, of the latter: single outliers do not stay in it
 _TRIPPED: Final = int(WinchState.FAULT)
 
 
@@ -236,7 +236,7 @@ class Evidence:
 class Reaction(IntEnum):
     """Reaction to a fault; of several at a time the largest counts."""
 
-    EVENT = 0  # it is told and recorded, and nothing else
+    EVENT = 0  # it is reported and recorded
     DEGRADED = 1  # the tension loop keeps what it has added; the motion goes on
     STOPPING = 2  # the ramp, then FAULT
     EMERGENCY = 3  # drums locked, no motion offered
@@ -273,7 +273,7 @@ class Fault(ABC):
         """
         self.seen, self.present = seen, False
         self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples, of rules that count them
-        self._since_report, self._suppressed = 10**9, 0  # cycles since it was told, and how often it began meanwhile
+        self._since_report, self._suppressed = 10**9, 0  # cycles since the report, and repeats since
 
     def look(self, cycle: Cycle) -> str | None:
         """Look at a cycle; every cycle once, in order.
@@ -283,11 +283,11 @@ class Fault(ABC):
 
         Returns:
             Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
-            while it lasts, and as long as another one stops the motion: what is left of it is told when that stands.
+            while it lasts, and while another fault stops the motion: it is reported when the winches stand.
         """
         if cycle is not self.seen.cycle:  # what the first rule lets be worked out serves them all
             self.seen.at(cycle)
-        # what comes after a stop is mostly its consequence; what puts a length in doubt is told for all that
+        # a fault after a stop is mostly its consequence; one that makes a length unreliable is reported all the same
         stops, waits = self.reaction >= Reaction.STOPPING, False
         if self.seen.stopped and self.reaction is Reaction.STOPPING and not self.homing:
             if self.lasting:  # it has each of its items once
@@ -314,7 +314,7 @@ class Fault(ABC):
         if self._since_report * self.seen.period <= self.quiet:
             self._suppressed += 1
             return None
-        more = f" It was so {self._suppressed} times more since this was told last." if self._suppressed else ""
+        more = f" It was repeated {self._suppressed} times since the last report." if self._suppressed else ""
         self._since_report, self._suppressed = 0, 0
         return line + more
 

@@ -33,13 +33,13 @@ from sagline.robot.robot import Robot
 class ExecutionStatus(Status):
     """End of the execution of a plan."""
 
-    DONE = 0, "the plan was gone through to its end"
-    PAUSED = 1, "the platform stands on its way; resume() goes on"
-    STOPPED = 2, "the operator stopped it; plan anew from where the platform stands"
-    FAULT = 3, "a fault stopped it: read the events, mend it, acknowledge"
-    EMERGENCY = 4, "the drums are locked: read the events, free the machine by hand, connect and home again"
-    UNKNOWN = 5, "the record breaks off before the end; look at the machine"
-    RUNNING = 6, "it is on its way"
+    DONE = 0, "the plan was executed to its end"
+    PAUSED = 1, "the platform stands on the path; resume() continues"
+    STOPPED = 2, "the operator stopped it; plan again from the pose of the platform"
+    FAULT = 3, "a fault stopped it: read the events, repair it, acknowledge"
+    EMERGENCY = 4, "the drums are locked: read the events, unlock them at the machine, connect and home again"
+    UNKNOWN = 5, "the record ends before the motion; check the machine"
+    RUNNING = 6, "the motion is running"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -74,10 +74,10 @@ class FaultRow(NamedTuple):
 _ELSEWHERE: Final = (
     FaultRow(
         "controller dead",
-        "its command counter stands for 100 ms",
+        "its command counter does not change for 100 ms",
         "ramp of 0.2 s, hold",
         "300 ms",
-        "each PLC by itself",
+        "each PLC",
     ),
     FaultRow(
         "foreign block", "magic, version, group or size differ while connecting", "OFF", "1 cycle", "the connection"
@@ -128,7 +128,7 @@ def faults_of(
         _check_groups(groups, checked_robot.cable_count)
     known = [float(errors.max()) for errors in cell_errors(checked_robot)]
     given = (cell_deviation, cell_bias)
-    deviation, bias = (own if told is None else told for told, own in zip(given, known, strict=True))
+    deviation, bias = (own if value is None else value for value, own in zip(given, known, strict=True))
     seen = Evidence(
         checked_robot,
         number(period, "period", "s", above=0.0),

@@ -45,8 +45,8 @@ class OverTension(Fault):
         cables = np.flatnonzero(over)
         cable = int(cables[np.argmax(tension[cables] / seen.limit[cables])])
         return (
-            f"cable {cable} pulls {tension[cable]:.4g} N; allowed: up to {self._near[cable]:.0f} N, "
-            f"{seen.limit[cable]:.0f} N for an instant. See what it hangs on, then jog it out."
+            f"cable {cable} has {tension[cable]:.4g} N; allowed: up to {self._near[cable]:.0f} N, "
+            f"{seen.limit[cable]:.0f} N for an instant. Check what blocks it, then jog it out."
         )
 
 
@@ -81,7 +81,7 @@ class CableBroken(Fault):
         cable = int(np.argmax(new))
         return (
             f"cable {cable} is broken: {cycle.sample.tension[cable]:.4g} N after {seen.before_low[cable]:.4g} N, "
-            f"others have changed by up to {furthest:.4g} N. Drums are locked: prop the platform up before it moves."
+            f"others have changed by up to {furthest:.4g} N. Drums are locked: support the platform before it moves."
         )
 
 
@@ -107,15 +107,15 @@ class Slack(Fault):
             return None
         cable = int(np.argmax(slack))
         return (
-            f"cable {cable} is slack: it pulls {cycle.sample.tension[cable]:.4g} N where the plan has "
-            f"{cycle.tension[cable]:.4g} N. See whether it has left its pulley or drum, then acknowledge."
+            f"cable {cable} is slack: it has {cycle.sample.tension[cable]:.4g} N; planned: "
+            f"{cycle.tension[cable]:.4g} N. Check that it is on its pulley and drum, then acknowledge."
         )
 
 
 STUCK_SAMPLES: Final = 50
-ODD_TIME: Final = 0.35  # s: for so long a cell must be at odds; the ramps and swings of the platform take less
-DISPROVED: Final = 0.5  # of full scale: what the motor holds less of is not there
-_STEP: Final = "The tension loop rests. Check cell, plug and amplifier when the platform stands, then acknowledge."
+ODD_TIME: Final = 0.35  # s for which a cell must contradict the balance; ramps and swings of the platform are shorter
+DISPROVED: Final = 0.5  # of full scale: a motor that holds less disproves the reading
+_STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform stands, then acknowledge."
 
 
 class CellDead(Fault):
@@ -188,7 +188,7 @@ class CellOff(Fault):
     """Load cell that contradicts the force balance of the platform."""
 
     name = "cell wrong"
-    rule = f"parity of the cells > {SIGMAS:g} sigma names it for {ODD_TIME:g} s, whatever the load weighs"
+    rule = f"parity of the cells > {SIGMAS:g} sigma names it for {ODD_TIME:g} s, for any weight of the load"
     reaction = Reaction.DEGRADED
     within = "0.5 s"
     lasting = True
@@ -216,10 +216,10 @@ class CellOff(Fault):
         if self._for[cell] < self._samples:
             return None
         seen.ignore_cells(np.arange(error.size) == cell)
-        seen_of_it = float(cycle.gains.parity[cell, cell]) if cycle.gains is not None else 1.0
+        visible = float(cycle.gains.parity[cell, cell]) if cycle.gains is not None else 1.0
         return (
-            f"cell {cell} is off by about {error[cell] / seen_of_it:.0f} N by the platform's balance; "
-            f"allowed: {limit / seen_of_it:.0f} N. "
+            f"cell {cell} differs by about {error[cell] / visible:.0f} N from the balance of the platform; "
+            f"allowed: {limit / visible:.0f} N. "
             f"It reads {cycle.sample.tension[cell]:.4g} N, planned: {cycle.tension[cell]:.4g} N. {_STEP}"
         )
 

@@ -18,7 +18,7 @@ OFF_BEAT: Final = 1.5  # cycles that a PLC's clock and the commands it took may 
 CATCHING_UP: Final = 10  # cycles, after they differed by more
 FOLLOWING: Final = 5e-3  # m
 SATURATED: Final = 0.2  # s
-IDLE: Final = 3  # samples: so long may a group take to begin to follow
+IDLE: Final = 3  # samples in which a group has to begin to follow
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
 _FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
 REMEMBERED: Final = 32  # commands: more than may be on their way
@@ -56,7 +56,7 @@ class EncoderJump(Fault):
             wrong = ~(np.isfinite(sample.length) & np.isfinite(sample.rate))
             self.seen.jumped |= wrong
             winch = int(np.argmax(wrong))
-            return f"encoder {winch} reads no number. Check its drive, acknowledge, and home again."
+            return f"encoder {winch} has no finite reading. Check its drive, acknowledge, and home again."
         return self._jump(cycle, sample, before) if known and before is not None else None
 
     def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
@@ -69,10 +69,10 @@ class EncoderJump(Fault):
         jump = np.abs(jump)
         if cycle.command is not None:
             jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
-        # a drum that is locked stops at once, and one whose drive gives all it can goes where the cable pulls it
+        # a locked drum stops at once, and one whose drive is at its limit moves with the cable
         free = (sample.state == _ENABLED) & (before.state == _ENABLED)
         free &= (passed >= 0.0) & (passed < LONGEST)
-        # a drive that was told nothing for some cycles goes where it is told then as fast as it can
+        # a drive without commands for some cycles goes to the next one at its largest speed
         free &= (self._regular >= CATCHING_UP)[self.seen.group_of]
         allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # over a gap rates may have changed more
         jumped = free & ~(jump <= allowed)
@@ -111,13 +111,13 @@ class FollowingError(Fault):
         if largest(command.length - length) <= FOLLOWING:
             return None
         away = self._away(cycle)
-        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # that has been told
+        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # jumps are reported already
         if not far.any():
             return None
         winch = int(np.argmax(np.where(far, away, 0.0)))
         return (
             f"winch {winch} is {1e3 * away[winch]:.4g} mm from its set point; allowed: {1e3 * FOLLOWING:g} mm. "
-            "See what holds it, acknowledge, and home again."
+            "Check what blocks it, acknowledge, and home again."
         )
 
     def _away(self, cycle: Cycle) -> Array:
@@ -136,7 +136,7 @@ class FollowingError(Fault):
             last, first = self._sent[k], self._sent[k - 1]
             low, high = np.minimum(first.length, last.length), np.maximum(first.length, last.length)
             out = np.maximum(np.maximum(low - length, length - high), 0.0)
-            # a length that is no number is nowhere
+            # a length that is not finite is infinitely far
             away[mine & last.enable] = np.where(np.isfinite(out), out, np.inf)[mine & last.enable]
         return away
 
@@ -173,7 +173,7 @@ class NotFollowing(Fault):
             return None
         asked = {int(group) for group in self.seen.group_of[command.enable]}
         for g in sorted(asked):
-            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # but for those of which it cannot tell
+            missed = behind[g] - round(float(sample.age[g]) / self.seen.period)  # without those after its last sample
             if missed > BEHIND:
                 return (
                     f"group {g} has taken no command for {missed} cycles; allowed: {BEHIND}. "
@@ -181,8 +181,8 @@ class NotFollowing(Fault):
                 )
             if self._idles(cycle, g) > IDLE:
                 return (
-                    f"group {g} does not follow its set points, and does not say why; allowed: in {IDLE} samples. "
-                    "See what its PLC does, then acknowledge."
+                    f"group {g} does not follow its set points and reports no reason; allowed: in {IDLE} samples. "
+                    "Check its PLC, then acknowledge."
                 )
         return None
 
@@ -218,7 +218,7 @@ class ServoSaturated(Fault):
             return None
         return (
             f"drive {winch} has been at its limit of force for {self._for[winch] * self.seen.period:.1f} s at "
-            f"{cycle.sample.torque[winch]:.3g} N m; allowed: {SATURATED:g} s. See what holds it, then acknowledge."
+            f"{cycle.sample.torque[winch]:.3g} N m; allowed: {SATURATED:g} s. Check what blocks it, then acknowledge."
         )
 
 
@@ -238,5 +238,5 @@ class CorrectionAtLimit(Fault):
         winch = int(np.argmax(np.abs(cycle.correction)))
         return (
             f"the tension loop has changed length {winch} by {1e3 * cycle.correction[winch]:+.1f} mm; allowed: "
-            f"{1e3 * self.seen.largest:g} mm. A length is in doubt: acknowledge, and home again."
+            f"{1e3 * self.seen.largest:g} mm. A length is not reliable: acknowledge, and home again."
         )

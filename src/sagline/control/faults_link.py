@@ -41,15 +41,15 @@ class _Old(Fault):
 
 
 class GroupStale(_Old):
-    """Late group; the tension loop rests until it is back."""
+    """Late group; the tension loop is off until it is back."""
 
     name = "group stale"
-    rule = f"newest sample of a group {STALE} cycles old: it is silent, or what it sends is repeated, late, bad"
+    rule = f"newest sample of a group {STALE} cycles old: it is silent, or its blocks are repeated, late or invalid"
     reaction = Reaction.DEGRADED
     within = "30 ms"
     quiet = 1.0
     cycles = STALE
-    step = "The tension loop rests until it is back."
+    step = "The tension loop is off until it is back."
 
 
 class GroupSilent(_Old):
@@ -91,7 +91,7 @@ class BlockDiscarded(Fault):
 
 
 class OwnerLost(Fault):
-    """Grant lost to another controller, or to nobody."""
+    """Grant lost."""
 
     name = "owner lost"
     rule = "grant of a group differs, once the connection had all of them"
@@ -107,15 +107,15 @@ class OwnerLost(Fault):
         if owners.count(command.owner) == len(owners):
             return None
         group, owner = next((g, owner) for g, owner in enumerate(owners) if owner != command.owner)
-        who = f"controller {owner} has its grant" if owner else "nobody has its grant"
-        return f"group {group}: {who}, not this one, {command.owner}. Stop the other controller, then connect again."
+        who = f"controller {owner} has its grant" if owner else "no controller has its grant"
+        return f"group {group}: {who}; expected: {command.owner}. Stop the other controller, then connect again."
 
 
 class GroupActs(Fault):
-    """PLC or drive that has stopped by itself."""
+    """Group that its PLC or drive has stopped."""
 
     name = "group acts by itself"
-    rule = "a PLC reports a fault or locked drums, or a drive a fault; the connection ends with none"
+    rule = "a PLC reports a fault or locked drums, or a drive reports a fault"
     reaction = Reaction.STOPPING
     within = "1 cycle"
     lasting = True
@@ -123,7 +123,7 @@ class GroupActs(Fault):
     def __init__(self, seen: Evidence) -> None:
         """Begin without reported groups."""
         super().__init__(seen)
-        self._told: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
+        self._reported: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
         """The groups that are new, and the reason of the first."""
@@ -135,17 +135,15 @@ class GroupActs(Fault):
         tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
         acting = (sample.fault != 0) | ((sample.status & _LOCKED) != 0)
         acting[seen.group_of[tripped]] = True
-        acting &= (sample.status & _EMERGENCY) == 0  # locked as it must be
+        acting &= (sample.status & _EMERGENCY) == 0  # locked as required
         acting &= sample.fault != _PRESSED
-        new = acting & ~self._told
+        new = acting & ~self._reported
         if not new.any():
             return None
-        self._told |= new
+        self._reported |= new
         groups = np.flatnonzero(new)
         names = ", ".join(str(g) for g in groups)
-        return (
-            f"group {names} stopped by itself: {self._why(cycle, int(groups[0]), tripped)}. Mend it, then acknowledge."
-        )
+        return f"group {names} has stopped: {self._why(cycle, int(groups[0]), tripped)}. Repair it, then acknowledge."
 
     def _why(self, cycle: Cycle, group: int, tripped: Flags) -> str:
         mine = np.flatnonzero(tripped & (self.seen.group_of == group))
@@ -224,8 +222,8 @@ class CycleLost(Fault):
         if cycle.late <= LOST:
             return None
         return (
-            f"a cycle began {1e3 * cycle.late:.0f} ms late, more than {1e3 * LOST:g} ms: the PLCs have stopped the "
-            f"winches by themselves. {_FREE} Then acknowledge."
+            f"a cycle began {1e3 * cycle.late:.0f} ms late; allowed: {1e3 * LOST:g} ms. The PLCs have stopped the "
+            f"winches. {_FREE} Then acknowledge."
         )
 
 
@@ -233,7 +231,7 @@ class RecordingStopped(Fault):
     """Recording stopped; the motion goes on."""
 
     name = "recording stopped"
-    rule = "a write fails, as where the disk is full, or the queue to the writer is full"
+    rule = "a write fails, for instance because the disk is full, or the queue to the writer is full"
     reaction = Reaction.EVENT
     within = "1 s"
 
@@ -243,5 +241,5 @@ class RecordingStopped(Fault):
             return None
         why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."
         return (
-            f"recording has stopped: {why}. The motion goes on; what was written stands. Free space for the next one."
+            f"recording has stopped: {why}. The motion continues; written data are kept. Free space for the next one."
         )

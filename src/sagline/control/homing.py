@@ -83,7 +83,7 @@ class Homing:
         winch, by = self._jog(off)
         step = f"jog {winch} {1e3 * by:+.1f}mm, one winch at a time, or place the platform; then home again."
         return RefusedError(
-            "homing", f"tensions are off the plan, of cables {named}; allowed: {allowed}", f"Try {step}"
+            "homing", f"tensions differ from the plan: cables {named}; allowed: {allowed}", f"Try {step}"
         )
 
     def _jog(self, off: Array) -> tuple[int, float]:

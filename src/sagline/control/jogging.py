@@ -56,8 +56,8 @@ def winch_jog(
     what, step = f"a jog of winch {winch} by {1e3 * by:+g} mm", "Jog it by less, or another one."
     if not found.solved.all():
         k = int(np.argmin(found.solved))
-        raise RefusedError(what, f"{1e3 * abs(lengths[k, winch] - lengths[0, winch]):.2g} mm on its way the platform "
-                           f"has no place: {ForwardStatus(found.status[k]).name}", step)  # fmt: skip
+        reason = f"after {1e3 * abs(lengths[k, winch] - lengths[0, winch]):.2g} mm the platform has no equilibrium"
+        raise RefusedError(what, f"{reason}: {ForwardStatus(found.status[k]).name}", step)
     tension = found.state.limited_tension
     for name, limit, wrong in (
         ("tension_min", robot.tension_min, tension < robot.tension_min),
@@ -105,7 +105,7 @@ class PlatformJog:
         self.failed, self.stops_hard = "", False
         end = self._solver.step(*self._at(1.0))
         if end.status is not PoseStatus.SOLVED:
-            reason = f"where it ends the status is {end.status.name}"
+            reason = f"the pose at its end is {end.status.name}"
             raise RefusedError("the jog", reason, "Jog by less, or elsewhere.")
         self._solver.reset()
         first = self._solver.step(*self._at(0.0))
@@ -119,7 +119,7 @@ class PlatformJog:
         share = self._cycle / self._count
         found = self._solver.step(*self._at(smooth(share)))
         if found.status is not PoseStatus.SOLVED:
-            self.failed = f"the jog ended {1e2 * share:.0f} % on its way: the pose there is {found.status.name}"
+            self.failed = f"the jog ended after {1e2 * share:.0f} %: the next pose is {found.status.name}"
             self._point, self.stops_hard = self._point._replace(done=True), bool(self._point.rate.any())
             return self._point
         left = self._fade.step()

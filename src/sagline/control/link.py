@@ -16,8 +16,8 @@ Whole: TypeAlias = NDArray[np.int64]
 PERIOD: Final = 0.01  # s, of the controller's cycle: the article's 100 samples a second
 GROUP_SIZE: Final = 2  # winches behind one PLC
 COUNTERS: Final = 2**31 - 1  # of commands and blocks go from 1 to here, and begin again
-HEARTBEAT: Final = 0.1  # s: so long may a command counter stand before a PLC ramps its winches down and holds
-OWNER_TIMEOUT: Final = 0.5  # s: so long may it stand before another controller may have the grant
+HEARTBEAT: Final = 0.1  # s without a change of the command counter, after which a PLC ramps its winches down and holds
+OWNER_TIMEOUT: Final = 0.5  # s without a change of it, after which another controller may have the grant
 RAMP: Final = 0.2  # s, in which rates go to zero, here and in a PLC
 
 
@@ -43,20 +43,23 @@ class GroupStatus(IntFlag):
 
 
 class GroupFault(Status):
-    """Reason why a PLC acts by itself, in words `text`."""
+    """Reason why a PLC has stopped its winches, in words `text`."""
 
     NONE = 0, "no fault"
     HEARTBEAT = 1, "no command came for 100 ms"  # the counter stood, or a command was valid no longer
-    OVER_TENSION = 2, "a cable pulled too hard, or its cell read no number, while it was wound in"  # pays out only
+    OVER_TENSION = (
+        2,
+        "a tension was too large, or its cell had no finite reading, while a cable was wound in",
+    )  # pays out only
     FOLLOWING_ERROR = 3, "a drive lagged too far behind its set points"
-    SET_POINT = 4, "a set point, or a tension to be held, was out of its range"
+    SET_POINT = 4, "a set point or a tension of a command was out of its range"
     EMERGENCY_STOP = 5, "the emergency stop is pressed"
     DRIVE = 6, "a drive tripped"
 
 
 def fault_text(code: int) -> str:
     """Meaning of a PLC's fault code; also of unknown codes."""
-    return GroupFault(code).text if code in set(GroupFault) else f"code {code}, which no table here has"
+    return GroupFault(code).text if code in set(GroupFault) else f"unknown code {code}"
 
 
 class WinchState(IntEnum):

@@ -117,7 +117,7 @@ class Loop:
         return found[0] if found else ""
 
     def _break_off(self, error: BaseException) -> None:
-        """Make the PLCs lead the rates to zero: nobody may call the next cycle."""
+        """Make the PLCs lead the rates to zero, because the next cycle may never be called."""
         c = self.context
         c.garbage.go_on()
         line = f"a cycle ended with {type(error).__name__}: {' '.join(str(error).split())[:160]}. The drives hold."

@@ -45,7 +45,7 @@ class Monitor:
 
     @property
     def zero(self) -> Array:
-        """Lengths that homing found are to be added to those that are read [m], shape (m,)."""
+        """Offsets of the measured lengths, from homing [m], shape (m,)."""
         return self._context.zero
 
     @property
@@ -60,7 +60,7 @@ class Monitor:
 
     @property
     def degraded(self) -> bool:
-        """True if tensions are not to be believed: the tension loop keeps its correction, and learns nothing."""
+        """True if tensions are not reliable: the tension loop keeps its correction."""
         return self._context.degraded
 
     @property
@@ -107,7 +107,7 @@ class Monitor:
         """
         pose = self._context.estimator.pose
         if pose is None:
-            raise RefusedError("the estimate", "the platform's place is not known", "Home first: home(pose).")
+            raise RefusedError("the estimate", "the pose of the platform is not known", "Home first: home(pose).")
         return pose
 
     @property

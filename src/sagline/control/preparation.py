@@ -106,7 +106,7 @@ class Preparation(Monitor):
     def acknowledge(self) -> None:
         """Confirm that a fault is repaired: from FAULT to READY, and to IDLE where the place is still known.
 
-        Where the robot is idle and degraded, the load cells are believed again.
+        If the robot is idle and degraded, the load cells are used again.
 
         Raises:
             RefusedError: If the state is another one, or not all groups agree yet; with the reason.
@@ -114,7 +114,7 @@ class Preparation(Monitor):
         c, what = self._context, "acknowledging"
         if self.state is State.IDLE and self.degraded:
             c.clear_faults()
-            c.say(EventKind.NOTE, "acknowledged", "the load cells are believed again")
+            c.say(EventKind.NOTE, "acknowledged", "the load cells are used again")
             return
         if self.state is not State.FAULT:
             raise RefusedError(what, f"the state is {self.state.name}", "There is nothing to acknowledge.")
@@ -126,7 +126,7 @@ class Preparation(Monitor):
         c.clear_faults()
         self._loop.active = Holding(c, State.READY, "the operator acknowledged")
         if found is not None and c.homed:
-            self._loop.active = idle_at(c, found, "the place is still known") or self._loop.active
+            self._loop.active = idle_at(c, found, "the pose is still known") or self._loop.active
 
     def off(self) -> None:
         """Give all grants back, and wait until they are; the brakes fall.

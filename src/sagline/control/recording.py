@@ -228,5 +228,5 @@ class Journal:
         except Exception as error:
             self._record = None
             why = f"{type(error).__name__}: {' '.join(str(error).split())[:160]}"
-            return f"recording has stopped, as the recorder raised {why}. The motion goes on without it."
+            return f"recording has stopped, because the recorder raised {why}. The motion continues without it."
         return ""

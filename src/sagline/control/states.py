@@ -12,16 +12,16 @@ class State(Status):
     """State of the controller."""
 
     OFF = 0, "brakes on, no grant held; connect() begins"
-    CONNECTING = 1, "claims the groups and waits until all of them agree; brakes on"
-    READY = 2, "the drives hold; home(pose) tells where the platform is"
+    CONNECTING = 1, "the controller claims the groups and waits until all of them agree; brakes on"
+    READY = 2, "the drives hold; home(pose) sets the pose of the platform"
     HOMING = 3, "one winch at a time is jogged until every tension is that of the plan at home"
-    IDLE = 4, "the platform stands, its place is known; a path, a pose or a jog may begin"
+    IDLE = 4, "the platform stands and its pose is known; a path, a pose or a jog may begin"
     MOVING = 5, "set points follow the plan"
     JOGGING = 6, "set points follow the operator"
     PAUSING = 7, "the path's clock slows down; resume() goes on from there"
     STOPPING = 8, "all rates go to zero together"
-    FAULT = 9, "the drives hold; the operator reads why, mends it and acknowledges"
-    EMERGENCY = 10, "drums locked; the operator frees the machine by hand, then connects and homes again"
+    FAULT = 9, "the drives hold; the operator reads the reason, repairs it and acknowledges"
+    EMERGENCY = 10, "drums locked; the operator unlocks them at the machine, then connects and homes again"
 
 
 _OFF: Final = {State.OFF: "the operator"}
@@ -40,7 +40,7 @@ TABLE: Final[dict[State, tuple[str, dict[State, str]]]] = {
         "hold",
         {
             State.HOMING: "the operator names a pose",
-            State.IDLE: "the place is still known after a fault",
+            State.IDLE: "the pose is still known after a fault",
             **_OFF,
             **_FAULT,
             **_EMERGENCY,

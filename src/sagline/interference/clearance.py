@@ -139,7 +139,7 @@ def _alike(one: Array | None, other: Array | None) -> bool:
     return one is other is None or (one is not None and other is not None and np.array_equal(one, other))
 
 
-NO_TENSIONS = "no tensions are known, so nothing hangs: take a feasible pose"
+NO_TENSIONS = "no tensions are known, so the cables have no shape: take a feasible pose"
 NOTHING = "nothing is measured"
 _SHOWN = 8  # pairs of a pose that are printed, and lines of what is left out
 _TOO_LARGE = 100.0  # times the robot: a mesh in millimeters
@@ -148,7 +148,7 @@ _NUMBERS = 9  # kept of a pair and pose: distance, bound and two points
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Clearances(Result):
-    """Least distances at one pose or N, between cables as they hang, the platform and what stands around.
+    """Least distances at one pose or N, between cables with their sag, the platform and obstacles.
 
     Attributes:
         pairs: P pairs of names of measured bodies.
@@ -231,9 +231,9 @@ def clearance(
     platform: Box | Mesh | None = None,
     from_anchor: float | None = None,
 ) -> Clearances:
-    """Least distances between cables as they hang, the platform and what stands around.
+    """Least distances between cables with their sag, the platform and obstacles.
 
-    Cables are measured as their model draws them: catenaries as they hang, over pulleys from where they leave these.
+    Cables have the shape of their model, such as a catenary, and begin at the exit point of their pulley.
     Distances are those of the nearest points, found to about 1e-12 m (with meshes 1e-7 m); and it is proved that no
     other points are nearer by more than the precision.
 

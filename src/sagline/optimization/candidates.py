@@ -19,7 +19,7 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
 MOST_SAMPLES = 1000
-TWINS = 1e-9  # m: two cables whose ends are nearer than this are one
+COINCIDENT = 1e-9  # m: two cables with closer ends are one
 
 
 class Candidates:
@@ -76,7 +76,7 @@ class Candidates:
             if isinstance(one, FreeCable):
                 missing = [entry.name for entry in one.catalogue if entry.cost is None]
                 if missing:
-                    step = "The goal cable_cost asks for it: give the cost of a meter."
+                    step = "The goal cable_cost needs it: give the cost of a meter."
                     raise InvalidValueError(f"free[{k}]: {missing[0]}", "without cost", "a number >= 0", step)
                 which = values[:, self._column(k)].astype(np.int64)
                 return np.array([entry.cost for entry in one.catalogue], dtype=np.float64)[which]
@@ -133,7 +133,7 @@ def impossible(cables: Array) -> Flags:
     first, second = np.triu_indices(cables.shape[1], 1)
     apart = np.abs(ends[:, first] - ends[:, second]).max(axis=-1, initial=0.0)
     crossed = cables[..., tables.TENSION_MIN] > cables[..., tables.TENSION_MAX]
-    return np.asarray((apart < TWINS).any(axis=-1) | crossed.any(axis=-1))
+    return np.asarray((apart < COINCIDENT).any(axis=-1) | crossed.any(axis=-1))
 
 
 class Solid:

@@ -1,8 +1,8 @@
 """Folder of a design search: rated candidates, from which the search continues, and the resulting robots.
 
-`design.json` says which search it is, by a digest of all that was asked but for how many evaluations. `evaluations.csv`
-has a line a candidate, appended generation by generation, each with a checksum: a line that a crash or a full disk cut
-off is known as such, cut off for good, and worked out again. `front.csv` and the robot files are written at the end.
+`design.json` identifies the search by a digest of the request without the number of evaluations. `evaluations.csv` has
+a line for each candidate with a checksum, appended generation by generation: a line that a crash or a full disk cut off
+is recognized, removed and computed again. `front.csv` and the robot files are written at the end.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class DesignFolder:
                 data = data[os.write(self._handle, data) :]
             os.fsync(self._handle)
         except OSError as error:
-            step = "Free some space and begin again: it goes on from here."
+            step = "Free some space and start again: the search continues from here."
             raise FileError(self._file, f"cannot be written ({error.strerror})", step) from None
 
 
@@ -112,13 +112,13 @@ def _check_request(place: Path, digest: str, request: Request) -> None:
     file = place / REQUEST
     if not exists(file):
         if exists(place / EVALUATIONS):
-            raise FileError(place / EVALUATIONS, f"stands without its {REQUEST}: nobody knows of what", ANOTHER)
+            raise FileError(place / EVALUATIONS, f"has no {REQUEST} beside it, so its search is not known", ANOTHER)
         return
     try:
         stored = json.loads(read_text(file, 1.0))
         own = str(stored["request"])
     except (ValueError, TypeError, KeyError, RecursionError):
-        raise FileError(file, "is no request of a search", ANOTHER) from None
+        raise FileError(file, "is not a request of a search", ANOTHER) from None
     if own != digest:
         asked = f"{request.robot.name} with {request.optimizer} and seed {request.seed}"
         reason = f"holds another search, {own[:8]}, than is asked for, {digest[:8]}: {asked}"
@@ -141,7 +141,7 @@ def _read(file: Path, heads: list[str]) -> tuple[Array, int]:
         if not right:
             if k == len(lines) - 1:
                 break  # torn
-            raise FileError(file, f"line {k + 1} is not as it was written", ANOTHER, item=f"line {k + 1}")
+            raise FileError(file, f"line {k + 1} is damaged", ANOTHER, item=f"line {k + 1}")
         whole += len(line.encode())
         if k:
             rows.append([float(x) for x in numbers if x is not None])

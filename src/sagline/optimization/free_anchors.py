@@ -143,7 +143,7 @@ class FreeAnchors(Free):
             step = "Shifts count from where the robot has its anchors: give low <= 0 <= high."
             raise InvalidValueError(f"low[{k}] to high[{k}]", f"{lower[k]:g} to {upper[k]:g} m", "0 m inside", step)
         if not (upper > lower).any():
-            raise InvalidValueError("high", "the same as low", "> low in a direction", "Give the anchors some room.")
+            raise InvalidValueError("high", "the same as low", "> low in a direction", "Widen the bounds.")
         free = upper > lower
         set_fields(
             self,

@@ -71,7 +71,7 @@ class Front(Result):
         """Summary in a sentence."""
         count, name = len(self.evaluated), self.start.name
         if not self.better:
-            return f"None of {count:,} robots is better than {name}: widen what is free, or allow more evaluations."
+            return f"None of {count:,} robots is better than {name}: widen the bounds, or allow more evaluations."
         goals = "; ".join(
             f"{goal.kind} {was:.4g} -> {now:.4g} {goal.unit}".rstrip()
             for goal, was, now in zip(self.goals, self.start_values, self.values[0], strict=True)
@@ -121,7 +121,7 @@ def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
     return np.asarray(np.where(np.isnan(values), PENALTY * 2.0, np.clip(costs, -PENALTY, PENALTY)))
 
 
-PENALTY = 1e9  # what a goal counts at most, many times more than any is worth
+PENALTY = 1e9  # largest cost of a goal, many times more than any value
 
 
 def scale_of(goal: Goal, start: float) -> float:
@@ -150,14 +150,14 @@ def _beaten(one: Array, others: Array) -> bool:
     return bool(((others <= one).all(axis=1) & (others < one).any(axis=1)).any())
 
 
-LONGEST: Final = 80  # letters of a robot's name that are kept before what is added
+LONGEST: Final = 80  # letters of a robot's name that are kept before a suffix
 
 
 class Ledger:
     """Rates candidates for an optimizer.
 
-    An optimizer with a seed asks for the same candidates again: what a record knows of them is not worked out anew, and
-    so a search that goes on from its record ends as if it had never been interrupted.
+    An optimizer with a seed asks for the same candidates again. Those of the record are not rated again, so that a
+    continued search ends as if it had never been interrupted.
     """
 
     def __init__(
@@ -248,7 +248,7 @@ class Ledger:
         known = self.record.known[first : first + len(values)]
         if not np.array_equal(known[:, : self._width], values[: len(known)]):
             wrong = int(np.argmax((known[:, : self._width] != values[: len(known)]).any(axis=1)))
-            allowed = "what this search asks for: packages or machine are others than when it began"
+            allowed = "the robot of this search: packages or machine have changed since it began"
             raise InvalidValueError(
                 f"row {first + wrong + 1} of the folder", "another robot", allowed, "Name another folder."
             )

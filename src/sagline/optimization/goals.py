@@ -20,7 +20,7 @@ class Measured(NamedTuple):
 
     Attributes:
         margin: Of the wrench set [N], shape (N, S, G); -inf where a pose is singular or a cable has no length.
-        tension: Largest of the cables [N], shape (N, S, G), with NaN where there are no tensions; None if nobody asks.
+        tension: Largest of the cables [N], shape (N, S, G), NaN where there are no tensions; None if not needed.
         sag: Largest of the cables [m], of the same shape, or None.
         stiffness: Against the force that meets the least [N/m], of the same shape, or None.
         cost: Of the cables, shape (N, S), or None.
@@ -91,8 +91,8 @@ class Goal:
     """A quantity to be made larger or smaller.
 
     Tensions, sag and stiffness are those of the platform's weight and the middle of the wrench set, shared by
-    `MinimumNorm`; they are taken over the poses that the robot one begins with holds, and a robot that does not hold
-    all of these is no candidate.
+    `MinimumNorm`; they are taken over the feasible poses of the initial robot, and a robot for which one of these is
+    not feasible is no candidate.
 
     Attributes:
         kind: "workspace_share" (of the poses, those whose margin is not negative), "mean_margin" or "least_margin"

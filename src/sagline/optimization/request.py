@@ -72,7 +72,7 @@ def _grid(box: PoseBox, counts: tuple[int, ...]) -> Pose:
 
 
 MOST_EVALUATIONS: Final = 10_000_000
-LOOKED_AT: Final = 256  # candidates whose anchors are looked at before the search begins
+LOOKED_AT: Final = 256  # candidates whose anchors are checked before the search begins
 _SEED: Final = 2**31 - 1  # the largest that all optimizers take
 
 
@@ -129,14 +129,14 @@ def checked_request(
         whole_number(seed, "seed", 0, _SEED),
     )
     if not request.free:
-        step = "Give what may change; to see what moving anchors are good for, call moving_anchors."
+        step = "Give design variables; for moving anchors alone, call moving_anchors."
         raise InvalidValueError("free", "empty", "FreeAnchors, FreeCable or FreeLimit", step)
     for k, one in enumerate(request.inner):
         if not isinstance(one, FreeAnchors):
             raise InvalidValueError(f"inner[{k}]", brief(one), "FreeAnchors", "Only anchors move from pose to pose.")
     if request.inner and not any(goal.needs == "margin" for goal in request.goals):
         step = "Add Goal('mean_margin'): anchors move to where the margin is largest."
-        raise InvalidValueError("inner", "given without a goal of margins", "with one", step)
+        raise InvalidValueError("inner", "given without a goal of margins", "a goal of margins beside it", step)
     if request.optimizer == "nsga2":
         _refuse_weights(request.goals)
     _check_platform(request)

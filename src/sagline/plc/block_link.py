@@ -96,7 +96,7 @@ class Group(Thread):
     def silence(self, waited: float) -> Refusal:
         """Message about a PLC that has not answered for a time [s]."""
         if self._wire.reached():
-            return Refusal(f"something listens there, but has answered nothing for {waited:g} s", "Check the port")
+            return Refusal(f"the port is open, but there was no answer for {waited:g} s", "Check the port")
         return Refusal(
             f"no answer for {waited:g} s", "Check address and cables, and that the PLC is on and in this network"
         )
@@ -107,7 +107,7 @@ class Group(Thread):
             try:
                 self._wire.open()
                 self._serve()
-            except Exception as error:  # whatever it is: nobody but this thread would connect anew
+            except Exception as error:  # of any kind: only this thread connects again
                 self.trouble = error.refusal if isinstance(error, WireError) else _unexpected(error)
                 self.settled.set()
             finally:
@@ -120,7 +120,7 @@ class Group(Thread):
             asked = self._clock()
             if self._outgoing:
                 outgoing = self._outgoing.popleft()
-                if asked - outgoing.since < HEARTBEAT:  # what waited longer, for a connection, is history
+                if asked - outgoing.since < HEARTBEAT:  # an older command, from before a connection, is obsolete
                     asked = outgoing.since
                     self._wire.write(outgoing.block, outgoing.data)
             if self._ending.is_set():
@@ -141,9 +141,9 @@ class Group(Thread):
 
     def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
         """Reason why a valid block is not of the expected PLC; None where it is."""
-        told = values["group"] - 1  # in a block it is one more
-        if told != self.number:
-            who = f"is group {told}" if told >= 0 else "was not told which group it is"
+        group = values["group"] - 1  # in a block it is one more
+        if group != self.number:
+            who = f"is group {group}" if group >= 0 else "has no group number"
             step = "Give the addresses in the groups' order, and each PLC its number"
             return Refusal(f"the PLC there {who}, not {self.number}", step)
         if values["winches"] != self._winches:
@@ -159,8 +159,8 @@ class Group(Thread):
         if newest is None:
             return True
         known = newest.values["counter"]
-        anew = newest.arrived < connected or arrived - newest.arrived > OWNER_TIMEOUT
-        return newer(counter, known) or (anew and counter != known)
+        restarted = newest.arrived < connected or arrived - newest.arrived > OWNER_TIMEOUT
+        return newer(counter, known) or (restarted and counter != known)
 
 
 def _unexpected(error: Exception) -> Refusal:
@@ -240,7 +240,7 @@ class BlockLink:
         """Write the last command, and disconnect."""
         for group in self._exchanges:
             group.finish()
-        for patience in (0.5, 0.2):  # s: for what they write, and for what they waited for
+        for patience in (0.5, 0.2):  # s: for writing, and for the end of waiting
             until = perf_counter() + patience
             for group in self._exchanges:
                 group.join(max(0.0, until - perf_counter()))

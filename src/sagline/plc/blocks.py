@@ -32,7 +32,7 @@ class Field(NamedTuple):
         name: As packing and SCL have it.
         type: One of `TYPES`; or the rows of a structure that is there once a winch, in an array from 1.
         offset: From the beginning of the block, or of the structure [bytes].
-        meaning: Unit and sense, for people.
+        meaning: Meaning and unit.
     """
 
     name: str
@@ -112,13 +112,13 @@ class Block:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
         values = dict(zip(self.names, self.packer.unpack(data), strict=True))
         if values["magic"] != self.magic:
-            begins = f"16#{values['magic']:08X} where sagline's has 16#{self.magic:08X}"
-            return Refusal(f"{block} is of another program: it has {begins}", f"Check the address. {LOAD}")
+            begins = f"16#{values['magic']:08X} instead of 16#{self.magic:08X}"
+            return Refusal(f"{block} is of another program: it begins with {begins}", f"Check the address. {LOAD}")
         if values.get("version", LAYOUT) != LAYOUT:
             return Refusal(f"{block} has layout {values['version']}; this sagline knows layout {LAYOUT}", LOAD)
         if values.get(AGAIN) != values.get("counter"):
             counters = f"its counter is {values['counter']} at the beginning and {values[AGAIN]} at the end"
-            return Refusal(f"{block} is torn: {counters}", "If it stays so, the PLC writes it in more than one scan")
+            return Refusal(f"{block} is torn: {counters}", "If it continues, the PLC writes it in more than one scan")
         return values
 
 
@@ -145,13 +145,13 @@ FROM_PLC: Final = Block(
         Field("counter", "UDInt", 0, "of this block, one more each scan, 1 to 2147483647"),
         Field("magic", "DWord", 4, "SAGF"),
         Field("version", "UInt", 8, "of this layout"),
-        Field("group", "UInt", 10, "which group this PLC is, plus 1: 0 where it was not told"),
+        Field("group", "UInt", 10, "number of the group of this PLC plus 1, 0 if not set"),
         Field("time", "LReal", 12, "of the PLC [us]"),
-        Field("owner", "UDInt", 20, "who has the grant, 0 for nobody"),
+        Field("owner", "UDInt", 20, "owner of the grant, 0 for none"),
         Field("echo", "UDInt", 24, "counter of the last command taken"),
         Field("status", "DWord", 28, "bits: ready, braked, following, ramping, holding, locked, emergency"),
-        Field("fault", "UInt", 32, "why the PLC acts by itself"),
-        Field("winches", "UInt", 34, "how many this PLC drives"),
+        Field("fault", "UInt", 32, "reason why the PLC has stopped its winches"),
+        Field("winches", "UInt", 34, "number of winches of this PLC"),
         Field(
             "winch",
             (
@@ -182,8 +182,8 @@ TO_PLC: Final = Block(
         Field("magic", "DWord", 4, "SAGT"),
         Field("version", "UInt", 8, "of this layout"),
         Field("mode", "UInt", 10, "0 leave, 1 hold, 2 follow, 3 lock"),
-        Field("owner", "UDInt", 12, "who commands"),
-        Field("valid_for", "Time", 16, "how long the PLC may go on with it [ms]"),
+        Field("owner", "UDInt", 12, "id of the controller"),
+        Field("valid_for", "Time", 16, "time for which the PLC may use it [ms]"),
         Field(
             "winch",
             (
@@ -207,7 +207,7 @@ CLAIM: Final = Block(
     size=8,
     fields=(
         Field("magic", "DWord", 0, "SAGC"),
-        Field("owner", "UDInt", 4, "who asks for the grant; the PLC puts 0 here once it has looked"),
+        Field("owner", "UDInt", 4, "id of the controller that claims the grant; the PLC resets it to 0"),
     ),
 )
 

@@ -1,4 +1,4 @@
-"""Link to PLCs of any make: the same blocks in Modbus holding registers; the only file that knows pymodbus."""
+"""Link to PLCs by the same blocks in Modbus holding registers; the only file that uses pymodbus."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ class ModbusLink(BlockLink):
 
         Args:
             addresses: "host" or "host:port" of each group's PLC, in their order; or one text with commas between.
-            robot: Whose winches they drive; or how many there are.
+            robot: The robot, or its number of winches.
             device: Id of the device behind each address.
-            timeout: How long they may take to answer first [s].
+            timeout: Longest time to the first answers [s].
 
         Raises:
             InvalidValueError: If the addresses are not as many as groups, none at all, or two are the same.
-            LinkError: If a PLC does not answer, or not as sagline's blocks would.
+            LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If pymodbus is not installed.
         """
         unit = whole_number(device, "device", 0, MOST_DEVICE)
@@ -73,11 +73,11 @@ class ModbusWire:
         except Exception as error:
             raise WireError(refusal_of(error, "Modbus")) from error
         if not connected:
-            try:  # the library keeps to itself why not
+            try:  # the library does not report the reason
                 socket.create_connection(self._place, timeout=ANSWER).close()
             except OSError as error:
                 raise WireError(refusal_of(error, "Modbus")) from error
-            raise WireError(Refusal("the connection was closed", "Check that nobody else is connected to it"))
+            raise WireError(Refusal("the connection was closed", "Check that no other client is connected to it"))
 
     def read(self, block: Block) -> bytes:
         """The bytes of a block."""
@@ -86,7 +86,7 @@ class ModbusWire:
             answer = self._client.read_holding_registers(block.register, count=count, device_id=self._device)
             registers = _good(answer, block).registers
             return struct.pack(f">{len(registers)}H", *registers)
-        except Exception as error:  # of a stranger's answer the library may make anything
+        except Exception as error:  # the library may raise anything on a foreign answer
             raise _failed(error) from error
 
     def write(self, block: Block, data: bytes) -> None:
@@ -99,7 +99,7 @@ class ModbusWire:
 
     def close(self) -> None:
         """Disconnect."""
-        with suppress(Exception):  # of a connection that is given up nothing matters
+        with suppress(Exception):  # errors do not matter any more
             self._client.close()  # type: ignore[no-untyped-call]
 
     def abort(self) -> None:

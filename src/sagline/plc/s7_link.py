@@ -1,4 +1,4 @@
-"""Link to Siemens PLCs: data blocks by PUT and GET of the S7 protocol; the only file of the links that knows snap7."""
+"""Link to Siemens PLCs: data blocks by PUT and GET of the S7 protocol; the only file that uses snap7."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from snap7 import Client
 
 PORT: Final = 102
-PDU: Final = 240  # bytes, what an S7-1200 has: the blocks fit, one request each
+PDU: Final = 240  # bytes, of an S7-1200: each block fits in one request
 RACK: Final = 0
-FORBIDDEN: Final = 0x8104  # what a CPU says to PUT or GET that its settings do not permit
+FORBIDDEN: Final = 0x8104  # answer of a CPU to PUT or GET that its settings do not permit
 _CLOSED: Final = Refusal("the connection was closed", "Connect again")
 SLOT: Final = 1  # of every S7-1200 and S7-1500
 
@@ -39,12 +39,12 @@ class S7Link(BlockLink):
 
         Args:
             addresses: "host" or "host:port" of each group's PLC, in their order; or one text with commas between.
-            robot: Whose winches they drive; or how many there are.
-            timeout: How long they may take to answer first [s].
+            robot: The robot, or its number of winches.
+            timeout: Longest time to the first answers [s].
 
         Raises:
             InvalidValueError: If the addresses are not as many as groups, none at all, or two are the same.
-            LinkError: If a PLC does not answer, or not as sagline's blocks would.
+            LinkError: If a PLC does not answer with sagline's blocks.
             FileError: If python-snap7 is not installed.
         """
         places = addresses_of(addresses, PORT)
@@ -70,7 +70,7 @@ class S7Wire:
             client.set_param(self._library.type.Parameter.PDURequest, PDU)
             client.connect(self._host, RACK, SLOT, tcp_port=self._port)
             _socket(client).settimeout(ANSWER)
-        except Exception as error:  # of a stranger's answer the library may make anything
+        except Exception as error:  # the library may raise anything on a foreign answer
             raise WireError(refusal_of(error, "S7")) from error
 
     def read(self, block: Block) -> bytes:
@@ -90,7 +90,7 @@ class S7Wire:
     def close(self) -> None:
         """Disconnect."""
         client, self._client = self._client, None
-        with suppress(Exception):  # of a connection that is given up nothing matters
+        with suppress(Exception):  # errors do not matter any more
             if client is not None:
                 client.disconnect()
 
@@ -133,5 +133,5 @@ def _no_access(error: Exception, block: Block) -> Refusal:
     if "(0x0a)" in text or "(0x05)" in text:
         return Refusal(f"it has no DB{block.number} of {block.size} bytes", f"{LOAD}, without optimized access")
     if "(0x03)" in text or "(0x01)" in text or getattr(error, "error_code", None) == FORBIDDEN:
-        return Refusal(f"it lets nobody at DB{block.number}", "Permit PUT/GET in its protection settings")
+        return Refusal(f"access to DB{block.number} is not permitted", "Permit PUT/GET in its protection settings")
     return refusal_of(error, "S7")

@@ -82,7 +82,7 @@ def _address(index: int, text: object, port: int) -> Address:
     return Address(host, int(number) if colon else port)
 
 
-ANSWER: Final = 0.5  # s: a PLC that has not answered for so long is connected anew
+ANSWER: Final = 0.5  # s without an answer, after which the connection is opened again
 
 
 class LinkError(SaglineError):
@@ -151,7 +151,7 @@ def plc_packages() -> Iterator[None]:
         raise FileError.not_installed(str(error.name).partition(".")[0], "PLCs need it", "plc") from None
 
 
-def refusal_of(error: BaseException | None, speaks: str) -> Refusal:
+def refusal_of(error: BaseException | None, protocol: str) -> Refusal:
     """Reason why a connection failed."""
     text = " ".join(str(error).split()) or type(error).__name__
     cause = error
@@ -160,11 +160,11 @@ def refusal_of(error: BaseException | None, speaks: str) -> Refusal:
     if isinstance(cause, ConnectionRefusedError):
         return Refusal("nothing listens there", "Check address and port, and that the PLC or the twin runs")
     if isinstance(cause, socket.gaierror):
-        return Refusal("there is no such host", "Check the address")
+        return Refusal("the host is not known", "Check the address")
     if isinstance(cause, ConnectionResetError | BrokenPipeError) or "closed" in text:
-        return Refusal("whoever is there hangs up", "Check the port, and that not too many others are connected to it")
+        return Refusal("the connection is closed at once", "Check the port, and the number of its other clients")
     if isinstance(cause, TimeoutError) or "timeout" in text.lower() or "No response" in text:
         return Refusal("it does not answer", "Check address and port, and that the PLC is on and in this network")
     if isinstance(cause, OSError):
         return Refusal(f"no connection ({cause.strerror or cause})", "Check the network")
-    return Refusal(f"whoever is there speaks no {speaks} ({text})", "Check the port")
+    return Refusal(f"the answer is not {protocol} ({text})", "Check the port")

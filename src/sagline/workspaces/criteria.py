@@ -33,7 +33,7 @@ _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastMargin(Criterion):
-    """The cables hold every wrench of the set, and so much more in any direction.
+    """The cables balance every wrench of the set with a reserve in any direction.
 
     Every workspace has it with no reserve: `workspace` puts it first.
 
@@ -67,7 +67,7 @@ class LeastMargin(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaximumSag(Criterion):
-    """No cable hangs further below its chord than this, under the middle load of the set.
+    """The sag of every cable below its chord stays within a limit, under the middle load of the set.
 
     Attributes:
         limit: Largest sag [m], > 0.
@@ -88,7 +88,7 @@ class MaximumSag(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionError(Criterion):
-    """A simpler cable model is good enough: the platform is no further from its place than this.
+    """The position error of a simpler cable model stays within a limit.
 
     The lengths are those of the model, with its tensions, under the middle load of the set; the platform then rests
     where exact cables of these lengths balance it, as by `confirm`.
@@ -124,7 +124,7 @@ class PositionError(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastStiffness(Criterion):
-    """A force on the center of mass moves it by no more than force over this, whatever its direction.
+    """The stiffness against a force on the center of mass stays above a limit in any direction.
 
     The stiffness of the softest direction, with lengths held and the platform free to turn as it gives way; 0 where
     the platform is in no stable equilibrium. Under the middle load of the set.
@@ -148,7 +148,7 @@ class LeastStiffness(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastFrequency(Criterion):
-    """The platform swings no slower than this on cables whose own mass does not swing, as by `modes`.
+    """The lowest natural frequency of the platform on massless cables, as by `modes`, stays above a limit.
 
     Under the middle load of the set; 0 Hz where it is in no stable equilibrium.
 
@@ -172,9 +172,9 @@ class LeastFrequency(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearance(Criterion):
-    """Nothing comes nearer than this: no two cables, no cable and platform, none of them and an obstacle.
+    """The distances between cables, platform and obstacles stay above a limit.
 
-    Cables as they hang, under the middle load of the set; what is measured against what: see `clearance`.
+    Cables with their sag, under the middle load of the set; the measured pairs are those of `clearance`.
 
     Attributes:
         limit: Least distance [m], > 0.
@@ -207,7 +207,7 @@ class Clearance(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InFrame(Criterion):
-    """The platform's box and anchors stay within the frame's, this far from its faces.
+    """The platform's box and anchors keep a distance from the faces of the frame.
 
     The frame is the robot's frame_size, or what its anchors span down to the floor. Of a planar robot its plane counts.
 

@@ -33,17 +33,17 @@ class MarginStatus(Status):
     FEASIBLE = codes.MARGIN_FEASIBLE, "the cables balance every load of the set within their limits, sag included"
     INFEASIBLE = (
         codes.MARGIN_INFEASIBLE,
-        "a load of the set is beyond what the cables can balance within their limits, whatever their sag; move the "
+        "the cables cannot balance a load of the set within their limits, whatever their sag; move the "
         "platform, widen the limits of the limiting cable, or ask for less load",
     )
     OPEN = (
         codes.MARGIN_OPEN,
-        "within the bracket that the cables' sag leaves: neither proved; ask inverse at single loads, or move the "
+        "within the bracket that the cables' sag leaves: neither is proved; call inverse at single loads, or move the "
         "platform by a millimeter",
     )
     SINGULAR = (
         codes.MARGIN_SINGULAR,
-        "the structure matrix has lost rank: some motion no cable resists; move the platform",
+        "the structure matrix has lost rank: no cable resists some motion; move the platform",
     )
     NO_CHORD = (
         codes.MARGIN_NO_CHORD,
@@ -52,7 +52,7 @@ class MarginStatus(Status):
     )
     TOO_SLACK = (
         codes.MARGIN_TOO_SLACK,
-        "a cable may carry less than a thousandth of its weight at most; raise tension_max",
+        "the largest allowed tension of a cable is less than a thousandth of its weight; raise tension_max",
     )
 
 

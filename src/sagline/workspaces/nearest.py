@@ -116,7 +116,7 @@ def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ..
     place = ", ".join(n(x, ".3f") for x in pose.position)
     at = f"at ({place}) m"
     if details.level[0] >= 0.0:
-        return (), f"it can work {at}, in a region smaller than a cell of the grid: look there in a smaller box"
+        return (), f"{at} a region smaller than a cell of the grid is feasible: search there in a smaller box"
     index, cable, margin = int(details.criterion[0]), int(details.cable[0]), float(details.margin[0])
     own = (cable,) if cable >= 0 else ()
     criterion = levels.criteria[index]
@@ -127,7 +127,7 @@ def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ..
         short = -float(details.level[0]) * criterion.scale(levels.robot)
         return own, f"{at} the {criterion.title} fails by {n(short, '.3g', criterion.unit)}{_of(own)}"
     if np.isinf(margin):
-        return own, f"{at}, as all over the box, the platform is singular, or a cable has no length"
+        return own, f"{at}, as in the whole box, the platform is singular, or a cable has no length"
     if criterion.title != "margin":
         return own, f"{at} the {criterion.title} fails, and the margin is {n(margin, '.3g', 'N')}"
     plan = inverse(levels.robot, pose, levels.model, wrench=levels.middle)
@@ -139,7 +139,7 @@ def _reason(levels: Levels, pose: Pose, details: Details) -> tuple[tuple[int, ..
     share = 100.0 * float(_share(bare, details.margin)[0])
     text = f"{at} the cables bear {n(share, '.2g')} % of the loads, {n(-margin, '.3g', 'N')} are missing{_of(cables)}"
     if levels.margins_of(_moments_of(levels.wrenches), here, details.rotation)[0] < 0.0:
-        text += "; their moments cannot be borne there even without their forces"
+        text += "; their moments alone are too much there"
     return cables, text
 
 

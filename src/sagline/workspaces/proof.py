@@ -31,7 +31,7 @@ from sagline.workspaces.wrench_sets import WrenchSet, load_of
 class ProofVerdict(Status):
     """Verdict on a box of poses, or on a part of one."""
 
-    OPEN = OPEN, "neither is proved of all of the box: see the shares; a longer budget decides more"
+    OPEN = OPEN, "neither is proved for the whole box: see the shares; a longer budget decides more"
     PROVED_INSIDE = INSIDE, "at every pose every load is balanced by tensions within the limits"
     PROVED_OUTSIDE = OUTSIDE, "at no position is every load balanced by tensions within the limits"
 
@@ -346,5 +346,5 @@ def _check_robot(robot: Robot) -> None:
     if robot.winches is not None and (robot.winches.pulley_radius > 0.0).any():
         cable = int(np.argmax(robot.winches.pulley_radius > 0.0))
         radius = f"{robot.winches.pulley_radius[cable]:g} m"
-        step = "Prove it of the robot without: robot.replace(winches=None)."
-        raise InvalidValueError(f"{robot.name}: pulley_radius[{cable}]", radius, "0 m: proofs know no pulleys", step)
+        step = "Prove it for the robot without them: robot.replace(winches=None)."
+        raise InvalidValueError(f"{robot.name}: pulley_radius[{cable}]", radius, "0 m: proofs have no pulleys", step)

@@ -196,7 +196,7 @@ def facts_of(space: Workspace) -> list[tuple[str, str]]:
         facts.append(("parts", ", ".join(sizes) + ", …" * (space.components.count > _MOST_PARTS)))
     if space.open_faces:
         faces = ", ".join(space.open_faces)
-        facts.append(("open", f"it reaches the box at {faces}: this is what there is in this box"))
+        facts.append(("open", f"it reaches the box at {faces}: only its part in this box is known"))
     if space.nearest is not None:
         facts.append(("nearest", space.nearest.reason))
     return facts
