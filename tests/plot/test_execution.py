@@ -49,7 +49,7 @@ def test_the_band_has_each_state_for_as_long_as_it_lasted() -> None:
 
 def test_long_courses_keep_their_peaks(monkeypatch: pytest.MonkeyPatch) -> None:
     done = execution()
-    monkeypatch.setattr(sys.modules["sagline.plot.execution"], "MOST_POINTS", 20)
+    monkeypatch.setattr(sys.modules["sagline.plot.sheet"], "MOST_POINTS", 20)
     line = sl.plot.measured_tensions(done).lines[2]
     values = np.asarray(line.get_ydata(), dtype=float)
     assert values.size < 50

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
 
-class Format(StrEnum):
+class _Format(StrEnum):
     """Formats of the converted robot."""
 
     ROBOT = "robot"
@@ -30,7 +30,7 @@ class Format(StrEnum):
 
 
 LEAST = 1e-6  # m: smallest distance that is printed
-ENDINGS = {Format.ROBOT: (".yaml", ".yml"), Format.MJCF: (".xml", ".mjcf")}
+ENDINGS = {_Format.ROBOT: (".yaml", ".yml"), _Format.MJCF: (".xml", ".mjcf")}
 
 
 def convert(
@@ -42,8 +42,8 @@ def convert(
     ],
     out: FileOption = None,
     form: Annotated[
-        Format, option("FORMAT", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--format")
-    ] = Format.ROBOT,
+        _Format, option("FORMAT", "robot: a robot file in YAML; mjcf: a MuJoCo model with straight cables.", "--format")
+    ] = _Format.ROBOT,
     linear_density: Annotated[
         float | None, quantity_option("QUANTITY", "Linear density of all cables, for instance '65 g/m'.", "kg/m")
     ] = None,
@@ -73,15 +73,15 @@ def convert(
     if out is not None and Path(source).exists() and out.resolve() == Path(source).resolve():
         raise FileError(out, "is the file to convert", "Name another file with --out.")
     if out is not None and out.suffix.lower() not in ENDINGS[form]:
-        kind = "a robot file" if form is Format.ROBOT else "a MuJoCo model"
+        kind = "a robot file" if form is _Format.ROBOT else "a MuJoCo model"
         raise FileError(out, f"is no name for {kind}", f"Let it end in {ENDINGS[form][0]}, or choose another --format.")
-    if at is not None and form is Format.ROBOT:
+    if at is not None and form is _Format.ROBOT:
         raise InvalidValueError(
             "--at", "given for a robot file", "--format mjcf", "A robot file has no pose: leave it out."
         )
     place = None if at is None else decimal_numbers(at, "--at", "m", FARTHEST)
     imported = _read(source, _material(linear_density, axial_stiffness), cable_set)
-    if form is Format.ROBOT:
+    if form is _Format.ROBOT:
         text = dump_robot(imported.robot)
     else:
         text, straightness = _mjcf(imported.robot, place)

@@ -31,7 +31,7 @@ def exit_code_of(command: Callable[[], object], *, debug: bool = False, last: bo
         The exit code: BAD_INPUT for an error of sagline or the system, UNEXPECTED for a mistake in the program,
         INTERRUPTED for Ctrl-C, even where Python lost it, CUT_OFF if the output has no reader any more.
     """
-    interrupts = Interrupts()
+    interrupts = _Interrupts()
     code = UNEXPECTED
     try:
         try:
@@ -150,7 +150,7 @@ def _give_up_unwritable() -> None:
             os.close(null)
 
 
-class Interrupts:
+class _Interrupts:
     """Handler of Ctrl-C in the main thread, unless the process was started with SIGINT ignored."""
 
     def __init__(self) -> None:

@@ -100,7 +100,7 @@ def serve(
             note("Note: ", "everyone who can reach this machine can see the page and drag the platform.", style="bold")
         readings = Readings()
         viewer = Page(server, FEATURES, robot, ready=readings.ready, **page)
-        if address.browser and has_display():
+        if address.browser and _has_display():
             webbrowser.open(url)
         with working("") if readings.missing else nullcontext(), readings.compiled_for(viewer), meanwhile(viewer):
             viewer.serve()
@@ -111,7 +111,7 @@ def serve(
     return 0
 
 
-def has_display() -> bool:
+def _has_display() -> bool:
     """True if there is a display for a browser; over SSH it would open in the terminal."""
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 

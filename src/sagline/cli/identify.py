@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sagline.files.measurements import Measurements
 
 
-class TensionPlace(StrEnum):
+class _TensionPlace(StrEnum):
     """Points of a cable at which its tension is measured."""
 
     FRAME_END = "frame-end"
@@ -40,8 +40,8 @@ def identify(
         float, quantity_option("FORCE", "Standard error of a tension, 5 or '5 N'.", "N", above=0.0)
     ] = 1,
     tension_at: Annotated[
-        TensionPlace, choice_option("PLACE", "Place of the tension measurement", TensionPlace)
-    ] = TensionPlace.FRAME_END,
+        _TensionPlace, choice_option("PLACE", "Place of the tension measurement", _TensionPlace)
+    ] = _TensionPlace.FRAME_END,
     offset: Annotated[
         bool, flag("Estimate the zero of the lengths as another unknown.", "--offset/--no-offset")
     ] = False,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
 
 
-class Winding(StrEnum):
+class _Winding(StrEnum):
     """Models of the cable on the drums."""
 
     CONSTANT = "constant"
@@ -51,13 +51,13 @@ def lengths(
 def encoder(
     file: RunArgument,
     winding: Annotated[
-        Winding,
+        _Winding,
         option(
             "WINDING",
             "Cable on the drums: constant, wound at the winches' winding_tension; remembered, wound along the run at "
             "its tension there.",
         ),
-    ] = Winding.CONSTANT,
+    ] = _Winding.CONSTANT,
     out: FileOption = None,
 ) -> int:
     """Write the encoder counts of a run as CSV: one row a sample, for the drives.

@@ -56,7 +56,7 @@ Start here:
 """
 
 
-class Command(TyperCommand):
+class _Command(TyperCommand):
     """A subcommand that rejects empty texts; its help names arguments without braces."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -80,10 +80,10 @@ class Command(TyperCommand):
         return f"{re.sub(r'[{}]', '', usage)}\n\n{rest}"
 
 
-class Commands(Mapping[str, Command]):
+class _Commands(Mapping[str, _Command]):
     """The subcommands by name; the module of each is imported on demand."""
 
-    def __getitem__(self, name: str) -> Command:
+    def __getitem__(self, name: str) -> _Command:
         """A subcommand."""
         if name not in NAMES:
             raise KeyError(name)
@@ -98,13 +98,13 @@ class Commands(Mapping[str, Command]):
         return len(NAMES)
 
 
-class Group(TyperGroup):
+class _Group(TyperGroup):
     """The subcommands; each error in one of them ends in one line and an exit code."""
 
     def __init__(self, **attributes: Any) -> None:
         """Take the attributes of typer."""
         super().__init__(**attributes)
-        self.commands: Any = Commands()
+        self.commands: Any = _Commands()
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
         """Run one of them; `--debug` may stand anywhere."""
@@ -117,7 +117,7 @@ class Group(TyperGroup):
 
             with notices(), finished_files() as finished:
                 try:
-                    return super(Group, self).main(
+                    return super(_Group, self).main(
                         [word for word in words if word != DEBUG], *more, **{**extra, "standalone_mode": False}
                     )
                 except Exception as error:
@@ -129,7 +129,7 @@ class Group(TyperGroup):
 
 
 app = typer.Typer(
-    cls=Group,
+    cls=_Group,
     no_args_is_help=True,
     rich_markup_mode=None,  # plain help: the same words at every width, nothing folded, and no slabs of color
     pretty_exceptions_enable=False,
@@ -138,13 +138,13 @@ app = typer.Typer(
 
 
 @cache
-def _load_command(name: str) -> Command:
+def _load_command(name: str) -> _Command:
     """Import a subcommand and read its options from its signature."""
     function = getattr(import_module(f"sagline.cli.{MODULES.get(name, name)}"), name.replace("-", "_"))
     text = _help(function.__doc__)
-    info = CommandInfo(name=name, cls=Command, callback=function, help=text, short_help=text.partition("\n\n")[0])
+    info = CommandInfo(name=name, cls=_Command, callback=function, help=text, short_help=text.partition("\n\n")[0])
     made: Any = get_command_from_info(info, pretty_exceptions_short=False, rich_markup_mode=None)
-    return cast(Command, made)
+    return cast(_Command, made)
 
 
 def _before(finished: Sequence[Path]) -> str:

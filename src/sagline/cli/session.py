@@ -94,7 +94,7 @@ class StatusLine:
         sys.stdout.flush()
 
 
-class Line(NamedTuple):
+class _Line(NamedTuple):
     """A line that was read: its text, None at the end of the input, and its action, which raises what is wrong."""
 
     text: str | None
@@ -116,7 +116,7 @@ class Session:
         self._event_count = 0
         self._ended = self._is_interrupted = False
         self._wait = 0  # cycles
-        self._lines: SimpleQueue[Line] = SimpleQueue()
+        self._lines: SimpleQueue[_Line] = SimpleQueue()
         self._line = StatusLine(shown=not alone)
         # how the rest of a line is understood, and its action, by the first word
         self._words: dict[str, tuple[Callable[[str], Any], Callable[[Any], object]]] = {
@@ -170,22 +170,22 @@ class Session:
         for line in sys.stdin:
             for part in line.split(";"):
                 self._lines.put(self._parse(part.strip()))
-        self._lines.put(Line(None, self._end))
+        self._lines.put(_Line(None, self._end))
 
-    def _parse(self, text: str) -> Line:
+    def _parse(self, text: str) -> _Line:
         """Parse a line; an error is raised by its action."""
         word, _, rest = text.partition(" ")
         if not word or word.startswith("#"):
-            return Line("", lambda: None)
+            return _Line("", lambda: None)
         try:
             if word not in self._words:
                 near = nearest(word, self._words)
                 step = f"Did you mean {near}?" if near else "help lists them."
                 raise InvalidValueError("the line", repr(text), "one that begins with a word that is known", step)
             parse, act = self._words[word]
-            return Line(text, partial(act, parse(rest.strip())))
+            return _Line(text, partial(act, parse(rest.strip())))
         except SaglineError as error:
-            return Line(text, partial(_refuse, error))
+            return _Line(text, partial(_refuse, error))
 
     def _interrupt(self) -> None:
         self._is_interrupted = True
@@ -214,7 +214,7 @@ class Session:
         self._show_events()
         self._line.update(self._status)
 
-    def _next_line(self) -> Line | None:
+    def _next_line(self) -> _Line | None:
         """The next line: at once if an operator types, from a pipe when the platform is at rest."""
         if self._wait or (self._alone and self.control.moving):
             return None
@@ -226,7 +226,7 @@ class Session:
         except Empty:
             return None
 
-    def _carry_out(self, line: Line) -> None:
+    def _carry_out(self, line: _Line) -> None:
         """Carry out a line; an error is printed, or ends the session of a pipe."""
         if self._alone and line.text:
             show(f"{PROMPT}{line.text}", whole=True)

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from sagline.tension.method import TensionMethod
 
 
-class ShaperKind(StrEnum):
+class _ShaperKind(StrEnum):
     """Input shapers of a path against vibration."""
 
     NONE = "none"
@@ -50,7 +50,7 @@ class ShaperKind(StrEnum):
     EI = "ei"
 
 
-class CableMass(StrEnum):
+class _CableMass(StrEnum):
     """Models of the cable mass in motion."""
 
     NONE = "none"
@@ -70,8 +70,8 @@ def simulate(
             "PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box."
         ),
     ] = None,
-    shaper: Annotated[ShaperKind, choice_option("SHAPER", "Input shaper of the path", ShaperKind)] = ShaperKind.NONE,
-    cable_mass: Annotated[CableMass, choice_option("KIND", "Model of the cable mass", CableMass)] = CableMass.NONE,
+    shaper: Annotated[_ShaperKind, choice_option("SHAPER", "Input shaper of the path", _ShaperKind)] = _ShaperKind.NONE,
+    cable_mass: Annotated[_CableMass, choice_option("KIND", "Model of the cable mass", _CableMass)] = _CableMass.NONE,
     breaks: Annotated[
         list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. The option can be repeated.", "--break")
     ] = None,
@@ -117,14 +117,14 @@ def simulate(
         raise FileError(file, "does not end in .nc", "Name a NetCDF file: --out sim.nc.")
     drawing = f"{file.stem}-energy"
     output = Output(file.parent, [file.name], [drawing] * figures)
-    if path is None and shaper is not ShaperKind.NONE:
+    if path is None and shaper is not _ShaperKind.NONE:
         advice = "Give a path, or leave --shaper out."
         raise InvalidValueError("--shaper", f"{shaper.value} without a path", "none without a path", advice)
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
     massless = SIMULATION_OVER_PULLEYS if has_routing(robot) else SIMULATION
-    moving = {CableMass.NONE: (massless,), CableMass.LUMPED: (CHAINS,)}.get(cable_mass, ())
+    moving = {_CableMass.NONE: (massless,), _CableMass.LUMPED: (CHAINS,)}.get(cable_mass, ())
     method = tension.build(Variable.CHORD)
     needed = (*needed_for(method), VIBRATION, *moving)
     with working(f"{robot.name}: simulating", *needed) as line:
@@ -166,8 +166,8 @@ def _start(
     robot: Robot,
     way: MotionPath | None,
     method: TensionMethod,
-    shaper: ShaperKind,
-    cable_mass: CableMass,
+    shaper: _ShaperKind,
+    cable_mass: _CableMass,
     load: Array | None,
     line: ProgressLine,
 ) -> Plan | Equilibrium:
@@ -185,15 +185,15 @@ def _start(
                 "robot", "infeasible in the middle of its test box", "a feasible pose", "Give a path."
             )
         return plan.state
-    if shaper is not ShaperKind.NONE:
+    if shaper is not _ShaperKind.NONE:
         state = inverse(robot, way.pose[len(way) - 1], wrench=load).state
         light = modes(state)
-        heavy = cable_mass is not CableMass.NONE
+        heavy = cable_mass is not _CableMass.NONE
         frequency = to_shape(vibration(state, up_to=float(light.frequency.max())) if heavy else light, way)
         shaped_out = " and ".join(f"{value:.3f}" for value in frequency)
         kind = "with cable mass" if heavy else "massless"
         note("Shaper: ", f"{shaper.value} for {shaped_out} Hz ({kind}), at the end of the path")
-        way = shaped(way, {ShaperKind.ZV: ZV, ShaperKind.ZVD: ZVD, ShaperKind.EI: EI}[shaper](frequency))
+        way = shaped(way, {_ShaperKind.ZV: ZV, _ShaperKind.ZVD: ZVD, _ShaperKind.EI: EI}[shaper](frequency))
     return inverse(robot, way, tension=method, wrench=load, progress=line.stage(f"{robot.name}: planning"))
 
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
 
-class Direction(StrEnum):
+class _Direction(StrEnum):
     """Axes along which a force or about which a moment acts."""
 
     X = "x"
@@ -77,7 +77,7 @@ def vibrate(
     ] = 0.01,
     loss_time: LossTimeOption = 0,
     air_damping: AirDampingOption = 0,
-    force: Annotated[Direction, choice_option("AXIS", "Force of the response figure", Direction)] = Direction.X,
+    force: Annotated[_Direction, choice_option("AXIS", "Force of the response figure", _Direction)] = _Direction.X,
     film: Annotated[int | None, option("MODE", "Write a film of this mode, ten seconds, as GIF.")] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,

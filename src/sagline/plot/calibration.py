@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -16,8 +16,8 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import PLACE, legend_columns, wrap_heading
-from sagline.plot.sheet import COLORS, GAP_COLOR, VERMILLION, format_axes, sheet
+from sagline.plot.labels import figure_legend, set_heading
+from sagline.plot.sheet import COLORS, GAP_COLOR, MAP_COLORS, VERMILLION, color_bar, draw_map, format_axes, sheet
 from sagline.plot.style import current
 from sagline.robot.pose import Pose
 
@@ -43,7 +43,7 @@ ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # mm
 
 
-class Kind(NamedTuple):
+class _Kind(NamedTuple):
     """Residuals of one kind.
 
     Attributes:
@@ -105,7 +105,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
     return figure
 
 
-def _kinds(found: Calibration) -> list[Kind]:
+def _kinds(found: Calibration) -> list[_Kind]:
     """The residuals of what was read."""
     sensors, m = found.sensors, found.robot.cable_count
     cables, axes = tuple(f"cable {k}" for k in range(m)), ("$x$", "$y$", "$z$")
@@ -116,7 +116,7 @@ def _kinds(found: Calibration) -> list[Kind]:
         ("rotations", sensors.rotation_deviation, slice(2 * m + 3, 2 * m + 6), axes, "rotation"),
     )
     return [
-        Kind(label, found.residuals[:, where] / deviation, names, quantity)
+        _Kind(label, found.residuals[:, where] / deviation, names, quantity)
         for label, deviation, where, names, quantity in spans
         if deviation is not None and np.isfinite(found.residuals[:, where]).any()
     ]
@@ -152,20 +152,12 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
     every = f", every {-(-len(found.rows) // MOST_POSES)}th is drawn" if len(shown) < len(found.rows) else ""
     panels[-1].set_xlabel(f"row of the log{every}", fontsize=current().label)
-    handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    style, names = current(), list(handles)
-    place: Any = "outside right upper"
-    columns = 1
-    if style.direct:
-        width = cast("Figure", panels[0].get_figure(root=True)).get_figwidth()
-        place, columns = "outside lower center", legend_columns(names, width, style.tick)
-    figure.legend(handles.values(), names, loc=place, ncols=columns, fontsize=style.tick, frameon=False)
+    figure_legend(figure, panels, "outside right upper", "outside lower center")
     figure.align_ylabels(panels)
-    told = wrap_heading(f"{found.robot.name}: {chi_squared_text(found)}", current().label)
-    figure.suptitle(told, fontsize=current().label)
+    set_heading(figure, f"{found.robot.name}: {chi_squared_text(found)}")
 
 
-def _mark_outliers(ax: Axes, found: Calibration, kind: Kind) -> None:
+def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
     """A ring around what does not fit, and what it is."""
     named = 0
     for outlier in found.outliers:
@@ -204,9 +196,7 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
             names[start].replace("_", " "), (-0.5, middle), xytext=(-0.5 - 0.05 * len(names), place),
             fontsize=current().tick, ha="right", va="center", annotation_clip=False, arrowprops=LEADER,
         )  # fmt: skip
-    bar = figure.colorbar(image, ax=ax, shrink=0.8, pad=0.02)
-    bar.set_label("correlation", fontsize=current().label)
-    bar.ax.tick_params(labelsize=current().tick)
+    color_bar(image, ax, "correlation", shrink=0.8, pad=0.02)
 
 
 def _apart(places: Array, least: float, end: float) -> Array:
@@ -234,31 +224,20 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
     low, high = (float(known.min()), float(known.max())) if known.size else (1.0, 10.0)
     scale = LogNorm(low, max(high, 1.01 * low))
     panels = figure.subplots(*((2, 1) if current().narrow else (1, 2)), sharex=True, sharey=True)
-    for ax, values, name in zip(panels, maps, ("before: as the priors say", "after"), strict=True):
-        ax.set_facecolor(GAP_COLOR)
-        ax.pcolormesh(
-            x, y, np.ma.masked_invalid(values.T), norm=scale, cmap="cividis", shading="nearest", rasterized=True
-        )
-        told = (
-            f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if np.isfinite(values).any() else "told by nothing"
-        )
-        ax.set_title(f"{name}, {told}", fontsize=current().tick)
-        format_axes(ax, *PLACE[:2])
-        ax.grid(visible=False)
-        ax.set_aspect("equal")
-        ax.label_outer()
+    for ax, values, name in zip(panels, maps, ("before: from the priors", "after"), strict=True):
+        known = np.isfinite(values).any()
+        median = f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if known else "not observed"
+        draw_map(ax, x, y, values, scale, f"{name}, {median}")
     places = found.poses.position[:: -(-len(found.rows) // MOST_POSES)]
     panels[1].plot(
         places[:, 0], places[:, 1], ".", color="white", markeredgecolor="0.2", markeredgewidth=0.4, markersize=4.0
     )
-    bar = figure.colorbar(ScalarMappable(scale, "cividis"), ax=list(panels), shrink=0.85, pad=0.02, format=ROUND)
+    shown, label = ScalarMappable(scale, MAP_COLORS), "expected position error [mm]"
+    bar = color_bar(shown, list(panels), label, shrink=0.85, pad=0.02, format=ROUND)
     bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     bar.ax.yaxis.set_minor_locator(NullLocator())
-    bar.set_label("expected position error [mm]", fontsize=current().label)
-    bar.ax.tick_params(labelsize=current().tick)
-    but = ", but for a shift and a turn of the world" if own else ""
-    told = wrap_heading(f"at $z$ = {n(z, '.3g', 'm')}{but}; dots: poses of the log", current().label)
-    figure.suptitle(told, fontsize=current().label)
+    without = ", without shift and turn of the world" if own else ""
+    set_heading(figure, f"at $z$ = {n(z, '.3g', 'm')}{without}; dots: poses of the log")
 
 
 def _height_of_maps(found: Calibration) -> float:

@@ -200,8 +200,8 @@ def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
         for each in strokes
     ]
     courses = [line.points[:, :2] for line in lines]
-    numbers = number_positions(courses[: len(scene.cables)], courses, look.tick * point)
-    boxes = label_boxes(numbers, look.tick * point)
+    numbers = _number_positions(courses[: len(scene.cables)], courses, look.tick * point)
+    boxes = _label_boxes(numbers, look.tick * point)
     turned = scene.faces @ view.T
     facing = [face for face in turned if _seen_from_outside(face)]
     for flat, color in (*((each @ view[:2].T, GROUND) for each in scene.flat), *((f[:, :2], BODY) for f in facing)):
@@ -218,7 +218,7 @@ def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
     for k, place in enumerate(numbers):
         ax.text(place[0], place[1], str(k), fontsize=look.tick, ha="center", va="center", zorder=4.0)
     taken = np.concatenate([*courses, *(each @ view[:2].T for each in scene.flat)])
-    draw_axes(ax, *free_axes(taken, view, np.array([ax.get_xlim(), ax.get_ylim()]), look.tick * point), look)
+    _draw_axes(ax, *_free_axes(taken, view, np.array([ax.get_xlim(), ax.get_ylim()]), look.tick * point), look)
 
 
 def _length(part: Array) -> float:
@@ -232,7 +232,7 @@ def _seen_from_outside(face: Array) -> bool:
     return bool(one[0] * other[1] > one[1] * other[0])
 
 
-def number_positions(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
+def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
     """Positions of the cable numbers: on the cable, or close beside it if another cable is too near."""
     starts = np.concatenate([course[:-1] for course in courses])
     steps = np.concatenate([course[1:] for course in courses]) - starts
@@ -266,13 +266,13 @@ def _distances(points: Array, starts: Array, steps: Array) -> Array:
     return np.asarray(np.linalg.norm(nearest, axis=2).min(axis=1))
 
 
-def label_boxes(places: Sequence[Array], size: float) -> list[Array]:
+def _label_boxes(places: Sequence[Array], size: float) -> list[Array]:
     """Boxes that lines leave free around numbers, corners (4, 2) in order."""
     corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     return [place + corners * (0.35 * size * len(str(k)) + 0.1 * size, 0.55 * size) for k, place in enumerate(places)]
 
 
-def free_axes(taken: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
+def _free_axes(taken: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
     """The world's axes in the corner of the picture that is farthest from everything; their place means nothing."""
     width = float(np.ptp(limits[0]))
     decade = 10.0 ** floor(log10(ARROW * width))
@@ -286,7 +286,7 @@ def free_axes(taken: Array, view: Array, limits: Array, size: float) -> tuple[Ar
     return start, start + ends, n(length, unit="m")
 
 
-def draw_axes(ax: Axes, start: Array, ends: Array, length: str, look: Style) -> None:
+def _draw_axes(ax: Axes, start: Array, ends: Array, length: str, look: Style) -> None:
     """Three arrows with their names, and how long they are."""
     longest = float(np.linalg.norm(ends - start, axis=1).max())
     arrow: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5.0 * look.line, "linewidth": 0.6 * look.line}

@@ -21,8 +21,24 @@ from sagline.dynamics.simulation.results import Simulation
 from sagline.dynamics.vibration.frequency_map import FrequencyMap
 from sagline.dynamics.vibration.response import FrequencyResponse, curves_of_response, response_curves
 from sagline.dynamics.vibration.vibration import Vibration
-from sagline.plot.labels import PLACE, TIME, legend_above, name_lines, wrap_heading
-from sagline.plot.sheet import BLUE, COLORS, DASHED, GAP_COLOR, TICK, VERMILLION, WIDTH, axes_or_new, format_axes, sheet
+from sagline.plot.labels import legend_above, name_lines, set_heading, wrap_heading
+from sagline.plot.sheet import (
+    BLUE,
+    COLORS,
+    DASHED,
+    GAP_COLOR,
+    MAP_COLORS,
+    TICK,
+    VERMILLION,
+    WIDTH,
+    axes_or_new,
+    color_bar,
+    draw_map,
+    format_axes,
+    format_clock,
+    mark_event,
+    sheet,
+)
 from sagline.plot.style import current
 
 if TYPE_CHECKING:
@@ -38,7 +54,6 @@ THIN, WIDE = 0.6, 3.6  # pt: a mode in which only cables swing, one in which onl
 FAINT = 0.4  # how dense the thin ones are
 SHARES = (1.0, 0.5, 0.0)  # in the legend
 PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # heights that are drawn -> panels beside each other; none stays empty
-MAP_COLORS: Final = "cividis"  # the same to all eyes
 HIGHEST, LOWEST = 2e2, 1e-3  # over the answer at rest: undamped peaks have no top, and zeros no bottom
 MARK = 0.035  # longest mark of a mode, of the axes' height
 FAINTEST = 0.15  # mark of a mode in which the platform stands still
@@ -72,37 +87,27 @@ def energy(simulation: Simulation) -> Figure:
         courses["left with cables and loads"] = balance.removed
     for (name, course), color, style in zip(courses.items(), COLORS, ENERGY_STYLES, strict=False):
         above.plot(time, course, color=color, linestyle=style, linewidth=1.2, label=name)
-    format_axes(above, "", "energy [J]")
-    _mark_events(above, simulation, named=True)
-    if time.size > 1:
-        above.set_xlim(time[0], time[-1])
+    format_clock(above, time, "energy [J]")
+    above.set_xlabel("")
+    for event in simulation.events:
+        name = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
+        mark_event(above, event.time, name, GAP_COLOR, 1.0)
     name_lines(above)
     below.plot(time, balance.error, color="black", linewidth=1.0, label="error of the balance")
-    format_axes(below, TIME, "error [J]")
-    _mark_events(below, simulation, named=False)
+    format_clock(below, time, "error [J]")
+    for event in simulation.events:
+        mark_event(below, event.time, "", GAP_COLOR, 1.0)
     least = ROUNDING * _largest(*courses.values(), balance.potential)
     low, high = below.get_ylim()
     below.set_ylim(min(low, -least), max(high, least))
     worst = n(_largest(balance.error), ".2g", "J", size=_largest(balance.potential))
-    told = wrap_heading(f"the sum, supplied counted negative, less its start: at most {worst}", current().tick)
-    below.set_title(told, fontsize=current().tick, loc="left")
+    text = wrap_heading(f"sum of all, supplied negative, minus its initial value: at most {worst}", current().tick)
+    below.set_title(text, fontsize=current().tick, loc="left")
     return figure
 
 
 def _largest(*courses: Array) -> float:
     return max(float(np.nanmax(np.abs(course), initial=0.0)) for course in courses)
-
-
-def _mark_events(ax: Axes, simulation: Simulation, *, named: bool) -> None:
-    """A line at each event, with its name on top."""
-    for event in simulation.events:
-        ax.axvline(event.time, color=GAP_COLOR, linewidth=1.0, zorder=1.0)
-        if named:
-            what = event.kind if event.cable is None else f"{event.kind}, cable {event.cable}"
-            ax.annotate(
-                what, (event.time, 1.0), xycoords=("data", "axes fraction"), xytext=(0.0, 2.0),
-                textcoords="offset points", fontsize=current().tick, ha="center", va="bottom", annotation_clip=False,
-            )  # fmt: skip
 
 
 def frequencies(
@@ -201,7 +206,7 @@ def _legend_of_shares(ax: Axes) -> None:
     ax.legend(handles=handles, **(legend_above(ax, labels) if current().direct else place))
 
 
-class MapQuantity(NamedTuple):
+class _MapQuantity(NamedTuple):
     """A quantity of a map: attribute, label, and True for a logarithmic scale."""
 
     place: str
@@ -210,11 +215,11 @@ class MapQuantity(NamedTuple):
 
 
 MAP_QUANTITIES: Final = {
-    "frequency": MapQuantity("frequency", "lowest frequency with cable mass [Hz]", False),
-    "massless_frequency": MapQuantity("massless_frequency", "lowest frequency, massless [Hz]", False),
-    "platform_share": MapQuantity("platform_share", "platform's share of the lowest mode with cable mass", False),
-    "peak": MapQuantity("peak", "strongest answer with cable mass [m/N]", True),
-    "peak_frequency": MapQuantity("peak_frequency", "frequency of the strongest answer, with cable mass [Hz]", False),
+    "frequency": _MapQuantity("frequency", "lowest frequency with cable mass [Hz]", False),
+    "massless_frequency": _MapQuantity("massless_frequency", "lowest frequency, massless [Hz]", False),
+    "platform_share": _MapQuantity("platform_share", "platform's share of the lowest mode with cable mass", False),
+    "peak": _MapQuantity("peak", "strongest answer with cable mass [m/N]", True),
+    "peak_frequency": _MapQuantity("peak_frequency", "frequency of the strongest answer, with cable mass [Hz]", False),
 }
 
 
@@ -253,18 +258,9 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     figure = sheet(0.5 + count * (0.85 * float(tall) + 0.3))
     panels = figure.subplots(count, columns, sharex=True, sharey=True, squeeze=False)
     for ax, row in zip(panels.flat, rows, strict=True):
-        ax.set_facecolor(GAP_COLOR)
-        ax.pcolormesh(_edges(x), _edges(y), values[:, :, row].T, norm=scale, cmap=MAP_COLORS, rasterized=True)
-        ax.set_title(f"$z$ = {z[row]:.3g} m", fontsize=current().tick)
-        ax.set_aspect("equal")
-        ax.tick_params(labelsize=current().tick, length=3.0, width=0.6)
-        ax.set_xlabel(PLACE[0], fontsize=current().label)
-        ax.set_ylabel(PLACE[1], fontsize=current().label)
-        ax.label_outer()
-    bar = figure.colorbar(ScalarMappable(scale, MAP_COLORS), ax=list(panels.flat), shrink=0.8, pad=0.02)
-    bar.set_label(label, fontsize=current().label)
-    bar.ax.tick_params(labelsize=current().tick)
-    figure.suptitle(found.robot.name, fontsize=current().label)
+        draw_map(ax, x, y, values[:, :, row], scale, f"$z$ = {z[row]:.3g} m")
+    color_bar(ScalarMappable(scale, MAP_COLORS), list(panels.flat), label, shrink=0.8, pad=0.02)
+    set_heading(figure, found.robot.name)
     return figure
 
 
@@ -279,14 +275,6 @@ def _gridded(found: FrequencyMap, values: Array) -> tuple[Array, Array, Array, A
     grid = np.empty(shape)
     grid[places] = values
     return axes[0], axes[1], axes[2], grid
-
-
-def _edges(middles: Array) -> Array:
-    """Edges of the cells around points of a grid."""
-    if middles.size == 1:
-        return np.asarray(middles[0] + np.array([-0.5, 0.5]))
-    between = 0.5 * (middles[1:] + middles[:-1])
-    return np.concatenate(([2.0 * middles[0] - between[0]], between, [2.0 * middles[-1] - between[-1]]))
 
 
 def response(

@@ -10,10 +10,9 @@ from sagline.control.execution import Execution, null_space_error, position_erro
 from sagline.control.recording import EventKind
 from sagline.control.states import State
 from sagline.core.arguments import instance
-from sagline.plot.labels import TIME, legend_above, name_lines
+from sagline.plot.labels import legend_above, name_lines
 from sagline.plot.sheet import (
     BLUE,
-    COLORS,
     DASHED,
     GAP_COLOR,
     GREEN,
@@ -24,8 +23,10 @@ from sagline.plot.sheet import (
     WIDTH,
     axes_or_new,
     cable_look,
+    draw_components,
     draw_series,
-    format_axes,
+    format_clock,
+    mark_event,
     sheet,
     true_runs,
 )
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array
 
-MOST_POINTS: Final = 4000  # of a line: what lies closer is drawn as the range that it covers
 PER_METER: Final = 1e3  # mm
 BESIDE: Final[dict[str, Any]] = {  # the axes, in two columns: the band of the states is low
     "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "frameon": False,
@@ -80,7 +80,7 @@ def execution(done: Execution) -> Figure:
         if panel is not parts[-1]:
             panel.set_xlabel("")
             panel.tick_params(labelbottom=False)
-        _mark(panel, done)
+        _mark_faults(panel, done)
     return figure
 
 
@@ -108,11 +108,10 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
         spans = [(clock[first], clock[last] + done.period - clock[first]) for first, last in true_runs(there)]
         if spans:
             ax.broken_barh(spans, (0.0, 1.0), facecolors=color, label=name, linewidth=0.0)
-    format_axes(ax, TIME, "")
+    format_clock(ax, clock, "")
     ax.set_yticks([])
     ax.grid(visible=False)
     ax.spines["left"].set_visible(False)
-    _limit(ax, clock)
     handles, labels = ax.get_legend_handles_labels()
     place = legend_above(ax, labels) if current().direct else {**BESIDE, "ncols": 2, "fontsize": current().tick}
     ax.legend(handles, labels, **{**place, "handlelength": 1.0, "columnspacing": 1.0})
@@ -137,9 +136,11 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax)
     clock = _clock(done)
     for i, read in enumerate(done.tension.T):
-        _line(ax, clock, read, color=cable_look(i)["color"], linewidth=0.8, alpha=0.8, label=f"cable {i}")
+        draw_series(ax, clock, read, color=cable_look(i)["color"], linewidth=0.8, alpha=0.8, label=f"cable {i}")
     for i, planned in enumerate(done.planned_tension.T):
-        _line(ax, clock, planned, color="black", linewidth=0.7, linestyle=DASHED, label="planned" if i == 0 else "_")
+        draw_series(
+            ax, clock, planned, color="black", linewidth=0.7, linestyle=DASHED, label="planned" if i == 0 else "_"
+        )
     return _finished(ax, clock, "tension at the frame [N]")
 
 
@@ -161,7 +162,7 @@ def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
     ax = axes_or_new(ax, height=2.6)
     clock = _clock(done)
     for i, course in enumerate(null_space_error(done).T):
-        _line(ax, clock, course, **cable_look(i), linewidth=1.0, label=f"cable {i}")
+        draw_series(ax, clock, course, **cable_look(i), linewidth=1.0, label=f"cable {i}")
     return _finished(ax, clock, "mendable tension\nerror [N]")
 
 
@@ -182,10 +183,7 @@ def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
     """
     ax = axes_or_new(ax, height=2.6)
     clock = _clock(done)
-    for name, course, color, style in zip(
-        "xyz", PER_METER * position_error(done).T, COLORS[:3], ("-", "--", ":"), strict=True
-    ):
-        _line(ax, clock, course, color=color, linestyle=style, linewidth=1.1, label=f"${name}$")
+    draw_components(ax, clock, PER_METER * position_error(done))
     return _finished(ax, clock, "estimated less\nplanned [mm]")
 
 
@@ -195,42 +193,16 @@ def _clock(done: Execution) -> Array:
     return np.asarray(time - time[0]) if time.size else time
 
 
-def _line(ax: Axes, clock: Array, course: Array, **look: object) -> None:
-    """A line; one of more points than show is drawn through the lowest and the highest of each few."""
-    if clock.size > MOST_POINTS:
-        few = 2 * -(-clock.size // MOST_POINTS)
-        rows = np.arange(clock.size // few * few).reshape(-1, few)
-        values = course[rows]
-        low = np.where(np.isnan(values), np.inf, values).argmin(axis=1)
-        high = np.where(np.isnan(values), -np.inf, values).argmax(axis=1)
-        first = np.arange(len(rows))
-        chosen = np.sort(np.stack((rows[first, low], rows[first, high]), axis=1), axis=1).ravel()
-        chosen = np.append(chosen, np.arange(rows.size, clock.size))
-        clock, course = clock[chosen], course[chosen]
-    draw_series(ax, clock, course, **look)
-
-
 def _finished(ax: Axes, clock: Array, label: str) -> Axes:
     """Labels of the axes, their limits, and names of the lines."""
-    format_axes(ax, TIME, label)
-    _limit(ax, clock)
+    format_clock(ax, clock, label)
     name_lines(ax)
     return ax
 
 
-def _limit(ax: Axes, clock: Array) -> None:
-    if clock.size > 1:
-        ax.set_xlim(clock[0], clock[-1])
-
-
-def _mark(ax: Axes, done: Execution) -> None:
-    """A line at each fault, with its name over the states."""
+def _mark_faults(ax: Axes, done: Execution) -> None:
+    """A line at each fault, with its name above the states."""
     for event in done.events:
         if event.kind is EventKind.FAULT and len(done):
-            ax.axvline(event.time - done.time[0], color=VERMILLION, linewidth=1.0, zorder=4.0)
-            if not ax.get_yticks().size:
-                ax.annotate(
-                    event.name, (event.time - done.time[0], 1.0), xycoords=("data", "axes fraction"),
-                    xytext=(0.0, 2.0), textcoords="offset points", fontsize=current().tick, ha="center", va="bottom",
-                    annotation_clip=False,
-                )  # fmt: skip
+            name = "" if ax.get_yticks().size else event.name
+            mark_event(ax, float(event.time - done.time[0]), name, VERMILLION, 4.0)

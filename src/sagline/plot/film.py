@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from io import BytesIO
-from itertools import combinations, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,22 +16,18 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.dynamics.vibration.mode_list import WITH_MASS, ListedMode, listed_modes
 from sagline.dynamics.vibration.vibration import Vibration
 from sagline.files.writing import atomic_file
+from sagline.plot.robot import EDGES, fit_space, platform_box
 from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, VERMILLION, sheet
 from sagline.viewer.swing import PERIOD, Swing
 
 if TYPE_CHECKING:
-    from sagline.core.arrays import Array
     from sagline.core.progress import Progress
-    from sagline.robot.pose import Pose
-    from sagline.robot.robot import Robot
 
 SECONDS = 10.0  # of the film: so many swings that the last picture leads to the first
 PICTURES = 25  # of one swing
 WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # in, in, dots an inch
 COLORS = 48
-LEAST_SHARE = 0.01  # of a cable in the energy, that is told
-CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
-EDGES = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(CORNERS[a] != CORNERS[b]) == 1]
+LEAST_SHARE = 0.01  # of a cable in the energy that is shown
 
 
 def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, progress: Progress | None = None) -> None:
@@ -97,7 +92,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
         phase = 2.0 * np.pi * k / PICTURES
         for line, course in zip(cables, swing.courses(phase), strict=True):
             line.set_data_3d(*course.T)
-        corners = _corners(robot, swing.pose(phase))
+        corners = platform_box(robot, swing.pose(phase))
         for line, (a, b) in zip(edges, EDGES, strict=True):
             line.set_data_3d(*corners[[a, b]].T)
         figure.set_dpi(DOTS)
@@ -120,17 +115,6 @@ def energy_shares(mode: ListedMode) -> str:
 def _frame(ax: Axes3D, swing: Swing) -> None:
     """Limits of the view at one scale along all axes, without numbers."""
     points = swing.rest.reshape(-1, 3)
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = np.maximum(high - low, 0.15 * np.max(high - low))
-    middle = 0.5 * (low + high)
-    ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
-    ax.set_box_aspect(size, zoom=1.5)
+    ax.set_box_aspect(fit_space(ax, points.min(axis=0), points.max(axis=0)), zoom=1.5)
     ax.set_axis_off()
     ax.view_init(elev=18.0, azim=-62.0)
-
-
-def _corners(robot: Robot, pose: Pose) -> Array:
-    """The eight corners of the platform in the world [m]."""
-    low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
-    size = high - low if robot.platform_size is None else robot.platform_size
-    return np.asarray(pose.transform(0.5 * (low + high) + size * CORNERS))

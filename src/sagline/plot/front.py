@@ -8,9 +8,8 @@ import numpy as np
 
 from sagline.core.arguments import instance
 from sagline.optimization.front import Front
-from sagline.plot.labels import name_lines, wrap_heading
+from sagline.plot.labels import name_lines, set_heading
 from sagline.plot.sheet import BLUE, GAP_COLOR, VERMILLION, format_axes, sheet
-from sagline.plot.style import current
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,8 +50,7 @@ def front(front: Front) -> Figure:
         for k, ax in enumerate(panels, start=1):
             _draw_pair(ax, front, k)
     name_lines(panels[0])
-    told = f"{front.start.name}, {len(front.evaluated):,} robots by {front.optimizer}"
-    figure.suptitle(wrap_heading(told, current().label), fontsize=current().label)
+    set_heading(figure, f"{front.start.name}, {len(front.evaluated):,} robots by {front.optimizer}")
     return figure
 
 
@@ -62,7 +60,7 @@ def _draw_course(ax: Axes, front: Front) -> None:
     ax.plot(number, values, ".", color=GAP_COLOR, markersize=3.0, label="candidates", linestyle="none")
     ax.plot(number, best_until(values, highest=front.goals[0].maximize), color=BLUE, linewidth=1.4, label="best so far")
     ax.axhline(front.start_values[0], color=VERMILLION, linewidth=1.0, linestyle="--", label="start")
-    format_axes(ax, "candidate", label_of(front.goals[0]))
+    format_axes(ax, "candidate", _label_of(front.goals[0]))
     known = values[np.isfinite(values)]
     if known.size:
         low, high = np.quantile(known, [0.02, 0.98]).tolist()
@@ -78,10 +76,10 @@ def _draw_pair(ax: Axes, front: Front, k: int) -> None:
     if front.better:
         ax.plot(*better[order].T, "o-", color=BLUE, markersize=4.0, linewidth=1.0, label="none is better")
     ax.plot(*front.start_values[[0, k]], "D", color=VERMILLION, markersize=6.0, label="start", linestyle="none")
-    format_axes(ax, label_of(front.goals[0]), label_of(front.goals[k]))
+    format_axes(ax, _label_of(front.goals[0]), _label_of(front.goals[k]))
 
 
-def label_of(goal: Goal) -> str:
+def _label_of(goal: Goal) -> str:
     """Axis label of a goal: name, unit and direction of improvement."""
     unit = f" [{goal.unit}]" if goal.unit else ""
     return f"{goal.kind.replace('_', ' ')}{unit}, {'higher' if goal.maximize else 'lower'} is better"

@@ -7,7 +7,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.textpath import TextPath
 from scipy.optimize import isotonic_regression
@@ -15,7 +15,7 @@ from scipy.optimize import isotonic_regression
 from sagline.plot.style import SANS, SERIF, current
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
@@ -63,19 +63,21 @@ def name_lines(ax: Axes, title: str = "") -> None:
         ax.legend(handles, labels, title=title or None, **legend_above(ax, labels, title))
 
 
-def figure_legend(figure: Figure, handles: Sequence[Artist], labels: Sequence[str], place: Any) -> None:
-    """One legend for all axes of a figure: at its side, or above them all in the styles whose figures are narrow."""
+def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any, narrow: Any = "outside upper center") -> None:
+    """One legend of all lines of some axes, at a place of the figure; at another in the styles of narrow figures."""
     look, columns = current(), 1
+    handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if look.direct:
-        place, columns = "outside upper center", legend_columns(labels, figure.get_figwidth(), look.tick)
-    figure.legend(handles, labels, loc=place, ncols=columns, fontsize=look.tick, frameon=False)
+        width = figure.get_figure(root=True).get_figwidth()
+        place, columns = narrow, _legend_columns(list(handles), width, look.tick)
+    figure.legend(handles.values(), list(handles), loc=place, ncols=columns, fontsize=look.tick, frameon=False)
 
 
 def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
     """Arguments for a legend above the axes, in as many columns as there is room for."""
     look = current()
     width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
-    columns = legend_columns([*labels, title], 0.85 * width, look.tick)
+    columns = _legend_columns([*labels, title], 0.85 * width, look.tick)
     return {
         "loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": columns,
         "fontsize": look.tick, "title_fontsize": look.tick, "alignment": "left", "frameon": False,
@@ -83,11 +85,17 @@ def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, 
     }  # fmt: skip
 
 
-def legend_columns(labels: Sequence[str], width: float, size: float) -> int:
+def _legend_columns(labels: Sequence[str], width: float, size: float) -> int:
     """Number of legend columns that fit, at least 1, none of them empty."""
     widest = max((TextPath((0.0, 0.0), label, size=size).get_extents().width for label in labels if label), default=0.0)
     columns = max(1, min(len(labels), int((width / POINT + 1.2 * size) / (widest + 3.6 * size))))
     return ceil(len(labels) / ceil(len(labels) / columns))
+
+
+def set_heading(target: FigureBase | Axes, text: str) -> None:
+    """A heading of a figure, or of axes, in as many lines as its width needs."""
+    size = current().label
+    (target.suptitle if isinstance(target, FigureBase) else target.set_title)(wrap_heading(text, size), fontsize=size)
 
 
 def wrap_heading(text: str, size: float) -> str:

@@ -6,7 +6,6 @@ from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import MaxNLocator
 
 from sagline.core.arguments import HOW_TO_GET, choice, instance
 from sagline.core.errors import InvalidValueError
@@ -17,14 +16,14 @@ from sagline.motion.path import Path
 from sagline.plot.labels import LENGTHS, PLACE, TENSIONS, TIME, figure_legend, name_lines
 from sagline.plot.sheet import (
     BLUE,
-    COLORS,
-    DASHED,
     ORANGE,
     VERMILLION,
     axes_or_new,
     cable_look,
+    draw_components,
     draw_series,
     format_axes,
+    format_clock,
     shade_spans,
     sheet,
     true_runs,
@@ -42,7 +41,6 @@ INFEASIBLE = "infeasible"
 LEAST_ERROR = 1e-3  # mm: rounding errors are drawn as the flat line that they are, and told
 FLAT = 0.01  # of the axis: below it a course is a flat line to the eye
 UNCONFIRMED = "not confirmed"  # planned, but the lengths lead to no stable equilibrium that is found
-AXIS_STYLES = ("-", DASHED, (0, (1.0, 1.2)))
 OTHER_CABLES = "0.82"  # color of the other cables behind each
 ROW_HEIGHT = 1.45  # in, that a row of panels is tall
 LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
@@ -128,8 +126,7 @@ def overview(plan: Plan) -> Figure:
     for ax, quantity in zip(panels, OVERVIEW, strict=True):
         _draw_cables(ax, plan, quantity, LENGTHS | TENSIONS)
         ax.label_outer()
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure_legend(figure, handles, labels, "outside right center")
+    figure_legend(figure, panels[:1], "outside right center")
     return figure
 
 
@@ -144,25 +141,26 @@ def abscissa(plan: Plan) -> tuple[Array, str]:
     return (np.arange(plan.status.size, dtype=np.float64), "pose") if plan.path is None else (plan.path.time, TIME)
 
 
-def dress_over(ax: Axes, plan: Plan, label: str) -> None:
-    """Dress axes of what a plan does over time, or over the numbers of its poses."""
+def _values(plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> tuple[Array, str]:
+    """A quantity of the cables in the unit of its label, shape (N, m), and the label."""
+    label, scale = table[choice(quantity, "quantity", table)]
+    return scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity)), label
+
+
+def _format(ax: Axes, plan: Plan, label: str) -> None:
+    """Shade the infeasible poses, label the axes over time or over the numbers of poses, and limit them."""
     clock, axis = abscissa(plan)
-    format_axes(ax, axis, label)
-    if plan.path is None:
-        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    if clock.size > 1:
-        ax.set_xlim(clock[0], clock[-1])
+    shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    format_clock(ax, clock, label, axis)
 
 
 def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> None:
     """One line a cable, and the infeasible poses shaded."""
-    label, scale = table[choice(quantity, "quantity", table)]
-    values = scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity))
+    values, label = _values(plan, quantity, table)
     clock, _ = abscissa(plan)
     for i, course in enumerate(values.T):
         draw_series(ax, clock, course, **cable_look(i), linewidth=1.1, label=f"cable {i}")
-    shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
-    dress_over(ax, plan, label)
+    _format(ax, plan, label)
 
 
 def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
@@ -224,21 +222,17 @@ def errors(*confirmations: Confirmation) -> Figure:
         ax.label_outer()
     for ax, confirmation in zip(panels, confirmations, strict=True):
         _tell_flat(ax, confirmation)  # on the scale that they have found together
-    handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure_legend(figure, [*handles.values()], [*handles], "outside right upper")
+    figure_legend(figure, panels, "outside right upper")
     return figure
 
 
 def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
     plan = instance(confirmation, Confirmation, "confirmation").plan
     clock, _ = abscissa(plan)
-    courses = 1e3 * np.atleast_2d(confirmation.position_error)
-    for name, course, color, style in zip("xyz", courses.T, COLORS[:3], AXIS_STYLES, strict=True):
-        draw_series(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name}$")
-    shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
+    draw_components(ax, clock, 1e3 * np.atleast_2d(confirmation.position_error))
+    _format(ax, plan, "position error [mm]")
     lost = np.atleast_1d(plan.feasible & ~confirmation.held)
     shade_spans(ax, clock, true_runs(lost), UNCONFIRMED, ORANGE, 0.25)
-    dress_over(ax, plan, "position error [mm]")
     low, high = ax.get_ylim()
     ax.set_ylim(min(low, -LEAST_ERROR), max(high, LEAST_ERROR))
 
@@ -278,9 +272,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
         >>> plan = sl.inverse(robot, path)
         >>> figure = sl.plot.small_multiples(plan)
     """
-    table = TENSIONS | LENGTHS
-    label, scale = table[choice(quantity, "quantity", table)]
-    values = scale * np.atleast_2d(getattr(instance(plan, Plan, "plan").state.cables, quantity))
+    values, label = _values(plan, quantity, TENSIONS | LENGTHS)
     (clock, axis), robot, count = abscissa(plan), plan.state.one_robot, values.shape[1]
     columns = min(count, 2 if current().narrow else 4)
     rows = ceil(count / columns)
@@ -293,8 +285,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
         for other in np.delete(values, i, axis=1).T:
             draw_series(ax, clock, other, color=OTHER_CABLES, linewidth=0.6, zorder=1.5)
         draw_series(ax, clock, values[:, i], color=BLUE, linewidth=1.3, zorder=2.0, label=f"cable {i}")
-        shade_spans(ax, clock, [(gap.first, gap.last) for gap in plan.gaps], INFEASIBLE)
-        dress_over(ax, plan, "")
+        _format(ax, plan, "")
         ax.set_xlabel("")
         ax.set_title(f"cable {i}", fontsize=current().tick, loc="left", pad=2.0)
         ax.label_outer()
@@ -356,13 +347,8 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
         >>> axes = sl.plot.velocity(sl.article_path())
     """
     ax = axes_or_new(ax, height=2.6)
-    for name, course, color, style in zip(
-        "xyz", instance(path, Path, "path").twist.T[:3], COLORS[:3], ("-", "--", ":"), strict=True
-    ):
-        ax.plot(path.time, course, color=color, linestyle=style, linewidth=1.3, label=f"$v_{name}$")
-    format_axes(ax, TIME, "velocity [m/s]")
-    if len(path) > 1:
-        ax.set_xlim(path.time[0], path.time[-1])
+    draw_components(ax, instance(path, Path, "path").time, path.twist[:, :3], "v_{}")
+    format_clock(ax, path.time, "velocity [m/s]")
     name_lines(ax)
     return ax
 

@@ -19,7 +19,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
 from sagline.plot.labels import PLACE
-from sagline.plot.sheet import VERMILLION, sheet
+from sagline.plot.sheet import VERMILLION, color_bar, sheet
 from sagline.plot.style import current
 from sagline.robot.batch import points_on_pulleys, pulleys_of
 from sagline.robot.pose import Pose
@@ -104,18 +104,18 @@ def frame_box(robot: Robot) -> Array | None:
     top = robot.frame_anchors.max(axis=0)
     middle = 0.5 * (top + robot.frame_anchors.min(axis=0))
     middle[2] = top[2] - 0.5 * robot.frame_size[2]
-    return box_corners(middle, robot.frame_size)
+    return _box_corners(middle, robot.frame_size)
 
 
 def platform_box(robot: Robot, pose: Pose) -> Array:
     """Corners of the platform in the world, shape (8, 3): of its size, or of the box around its anchors."""
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
     size = high - low if robot.platform_size is None else robot.platform_size
-    corners: Array = pose.position + box_corners(0.5 * (low + high), size) @ pose.matrix.T
+    corners: Array = pose.position + _box_corners(0.5 * (low + high), size) @ pose.matrix.T
     return corners
 
 
-def box_corners(middle: Array, size: Array) -> Array:
+def _box_corners(middle: Array, size: Array) -> Array:
     """The eight corners of a box, shape (8, 3)."""
     corners: Array = middle + 0.5 * size * _SIGNS
     return corners
@@ -125,7 +125,7 @@ def ground(points: Array, platform: Array) -> tuple[Array, Array]:
     """The ground under all points, at z = 0 or lower, and the platform's shadow on it: corners, each (k, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = min(0.0, float(low[2]))
-    outline = box_corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
+    outline = _box_corners(0.5 * (low + high), high - low)[[0, 2, 6, 4], :2]
     shadow = platform[:, :2]
     if np.linalg.matrix_rank(shadow - shadow[0], tol=FLAT * float(np.ptp(points))) == 2:
         shadow = shadow[ConvexHull(shadow).vertices]
@@ -234,16 +234,21 @@ def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["l
     shown = ScalarMappable(LogNorm(scale.low, scale.high), ListedColormap(scale.colors(steps) / 255.0))
     below, above = tension.min() < scale.low * (1.0 - 1e-6), tension.max() > scale.high * (1.0 + 1e-6)
     extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-    bar = ax.figure.colorbar(
-        shown, ax=ax, location=place, shrink=0.6, pad=0.0, aspect=24, extend=extend[bool(below), bool(above)]
-    )
+    look = {"location": place, "shrink": 0.6, "pad": 0.0, "aspect": 24, "extend": extend[bool(below), bool(above)]}
+    bar = color_bar(shown, ax, r"chord tension $\tau$ [N]", **look)
     if bar.solids is not None:
         bar.solids.set_rasterized(False)
         bar.solids.set_edgecolor("face")  # no white seams
-    bar.set_label(r"chord tension $\tau$ [N]", fontsize=current().label)
     bar.set_ticks(list(scale.ticks()), labels=[n(tick, ",.4g") for tick in scale.ticks()])
     bar.ax.minorticks_off()
-    bar.ax.tick_params(labelsize=current().tick)
+
+
+def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
+    """Limit axes to a box, none of its sides below a tenth of the longest one; returns the sides."""
+    size: Array = np.maximum(high - low, 0.1 * np.max(high - low))
+    middle = 0.5 * (low + high)
+    ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
+    return size
 
 
 def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
@@ -251,9 +256,7 @@ def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
     ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(0.0, low[2])
-    size = np.maximum(high - low, 0.1 * np.max(high - low))
-    middle = 0.5 * (low + high)
-    ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
+    size = fit_space(ax, low, high)
     for name, axis, share in zip(PLACE, (ax.xaxis, ax.yaxis, ax.zaxis), size / size.max(), strict=True):
         axis.set_label_text(name, fontsize=current().label)
         axis.labelpad = 7.0

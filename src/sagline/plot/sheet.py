@@ -18,15 +18,20 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, fontManager
+from matplotlib.ticker import MaxNLocator
 
 from sagline.core.arguments import brief, file_path, optional
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import atomic_file
-from sagline.plot.labels import break_labels
+from sagline.plot.labels import PLACE, TIME, break_labels
 from sagline.plot.style import PLAIN, SANS, SERIF, Using, current
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colorbar import Colorbar
+    from matplotlib.colors import Normalize
 
     from sagline.core.arrays import Array, Flags
 
@@ -35,6 +40,9 @@ BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", 
 COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 GAP_COLOR = "#BBBBBB"
 DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
+COMPONENT_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)))  # of lines along x, y and z
+MAP_COLORS: Final = "cividis"  # the same for all kinds of color vision
+MOST_POINTS: Final = 4000  # of a line; a longer line is drawn through the extrema of its parts
 WIDTH = 7.0  # in, of a page with margins
 LABEL, TICK = PLAIN.label, PLAIN.tick  # pt, of a page of documentation
 RESOLUTION = 200  # dots an inch
@@ -121,17 +129,80 @@ def format_axes(ax: Axes, x: str, y: str) -> None:
     ax.spines[["left", "bottom"]].set_linewidth(0.6 * look.line)
 
 
+def format_clock(ax: Axes, clock: Array, label: str, axis: str = TIME) -> None:
+    """Labels and limits of axes over time, or over numbers."""
+    format_axes(ax, axis, label)
+    if axis != TIME:
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if clock.size > 1:
+        ax.set_xlim(clock[0], clock[-1])
+
+
+def draw_map(ax: Axes, x: Array, y: Array, values: Array, scale: Normalize, title: str) -> None:
+    """Values (nx, ny) at the points of a level grid, as colors; gray where there is none."""
+    ax.set_facecolor(GAP_COLOR)
+    edges = _cell_edges(x), _cell_edges(y)
+    ax.pcolormesh(*edges, np.ma.masked_invalid(values.T), norm=scale, cmap=MAP_COLORS, rasterized=True)
+    ax.set_title(title, fontsize=current().tick)
+    format_axes(ax, *PLACE[:2])
+    ax.grid(visible=False)
+    ax.set_aspect("equal")
+    ax.label_outer()
+
+
+def _cell_edges(middles: Array) -> Array:
+    """Edges of the cells around points of a grid."""
+    if middles.size == 1:
+        return np.asarray(middles[0] + np.array([-0.5, 0.5]))
+    between = 0.5 * (middles[1:] + middles[:-1])
+    return np.concatenate(([2.0 * middles[0] - between[0]], between, [2.0 * middles[-1] - between[-1]]))
+
+
+def color_bar(shown: ScalarMappable, axes: Any, label: str, **look: Any) -> Colorbar:
+    """A color bar beside axes, with its label."""
+    figure = np.ravel(axes)[0].figure
+    bar: Colorbar = figure.colorbar(shown, ax=axes, **look)
+    bar.set_label(label, fontsize=current().label)
+    bar.ax.tick_params(labelsize=current().tick)
+    return bar
+
+
+def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> None:
+    """A line at a time, with a name above the axes; none for ""."""
+    ax.axvline(time, color=color, linewidth=1.0, zorder=zorder)
+    if name:
+        ax.annotate(
+            name, (time, 1.0), xycoords=("data", "axes fraction"), xytext=(0.0, 2.0), textcoords="offset points",
+            fontsize=current().tick, ha="center", va="bottom", annotation_clip=False,
+        )  # fmt: skip
+
+
 def cable_look(cable: int) -> dict[str, Any]:
     """Color and line style of a cable; neighbors, which most robots pair at a winch post, share a color."""
     return {"color": COLORS[cable // 2 % len(COLORS)], "linestyle": "-" if cable % 2 == 0 else DASHED}
 
 
 def draw_series(ax: Axes, clock: Array, course: Array, **look: Any) -> None:
-    """A line over time; a sample that has no neighbor to be joined to is a point, not nothing."""
+    """A line over time; a sample without neighbors is a point."""
+    if clock.size > MOST_POINTS:
+        few = 2 * -(-clock.size // MOST_POINTS)
+        rows = np.arange(clock.size // few * few).reshape(-1, few)
+        values = course[rows]
+        low = np.where(np.isnan(values), np.inf, values).argmin(axis=1)
+        high = np.where(np.isnan(values), -np.inf, values).argmax(axis=1)
+        ends = np.sort(np.take_along_axis(rows, np.stack((low, high), axis=1), axis=1), axis=1).ravel()
+        kept = np.append(ends, np.arange(rows.size, clock.size))
+        clock, course = clock[kept], course[kept]
     known = np.concatenate(([False], np.isfinite(course), [False]))
     alone = np.flatnonzero(known[1:-1] & ~known[:-2] & ~known[2:])
     points: dict[str, Any] = {"marker": "o", "markersize": 3.5, "markevery": alone.tolist()} if alone.size else {}
     ax.plot(clock, course, **look, **points)
+
+
+def draw_components(ax: Axes, clock: Array, courses: Array, name: str = "{}") -> None:
+    """The components (N, 3) along x, y and z over time; `name` formats the symbol of an axis."""
+    for axis, course, color, style in zip("xyz", courses.T, COLORS, COMPONENT_STYLES, strict=False):
+        draw_series(ax, clock, course, color=color, linestyle=style, linewidth=1.2, label=f"${name.format(axis)}$")
 
 
 def true_runs(flags: Flags) -> list[tuple[int, int]]:
@@ -200,12 +271,12 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
         figure.savefig(drawn, format=kind, dpi=RESOLUTION, metadata=metadata)
     content = drawn.getvalue()
     if kind == "svg" and isinstance(figure, Sheet) and figure.style.name:
-        content = with_fonts(content.decode("utf-8")).encode("utf-8")
+        content = _with_fonts(content.decode("utf-8")).encode("utf-8")
     with atomic_file(path) as partial:
         partial.write_bytes(content)
 
 
-def with_fonts(svg: str) -> str:
+def _with_fonts(svg: str) -> str:
     """Put the fonts of the text of a drawing into it, each with the letters that are used."""
     letters = _letters(svg)
     faces = [_face(face, "".join(sorted(used))) for face, used in sorted(letters.items()) if used]

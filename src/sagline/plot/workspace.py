@@ -15,7 +15,7 @@ from sagline.core.arguments import choice, instance
 from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
-from sagline.plot.labels import PLACE, wrap_heading
+from sagline.plot.labels import PLACE, set_heading
 from sagline.plot.robot import draw_robot, format_space_axes
 from sagline.plot.sheet import GAP_COLOR, axes_or_new, format_axes, sheet
 from sagline.plot.style import current
@@ -98,9 +98,8 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
         levels = round_levels(float(cut.margin[(cut.level >= 0.0) & np.isfinite(cut.margin)].max(initial=0.0)))
         _draw_regions(ax, cut, space, levels)
         _draw_lines(ax, cut, levels)
-    held = f"{space.wrenches}; {space.orientations}"
-    told = f"{space.robot.name}, {AXES[plane.normal]} = {n(plane.at, unit='m')}; {held}"
-    ax.set_title(wrap_heading(told, current().label), fontsize=current().label)
+    place = f"{AXES[plane.normal]} = {n(plane.at, unit='m')}"
+    set_heading(ax, f"{space.robot.name}, {place}; {space.wrenches}; {space.orientations}")
     return ax
 
 
@@ -127,7 +126,7 @@ def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
     return Plane(axis, place)
 
 
-def limit_name(key: Key, space: Workspace) -> str:
+def _limit_name(key: Key, space: Workspace) -> str:
     """Name of a limit; for the margin, the first criterion, only the cable."""
     which, cable = key
     named = [space.criteria[which].title] if which > 0 or cable < 0 else []
@@ -163,7 +162,7 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array) -> None
     image.set_clip_path(inside.get_paths()[0], ax.transData)
     free = (cut.level >= 0.0) & ~_on_lines(cut.margin, levels)
     for k, key in enumerate(keys):
-        _name_region(ax, cut, (region == k) & (cut.level >= 0.0), free, limit_name(key, space))
+        _name_region(ax, cut, (region == k) & (cut.level >= 0.0), free, _limit_name(key, space))
 
 
 def _on_lines(margin: Array, levels: Array) -> Flags:
@@ -251,8 +250,7 @@ def workspace(space: Workspace) -> Figure:
     ax.set_box_aspect([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim()), np.ptp(ax.get_zlim())], zoom=ZOOM)
     for each in ax.get_children():
         each.set_clip_on(False)
-    told = f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}"
-    figure.suptitle(wrap_heading(told, current().label), fontsize=current().label)
+    set_heading(figure, f"{space.robot.name}: {amount_of(space)}; {space.wrenches}; {space.orientations}")
     if limits:
         _draw_bars(figure.add_axes(BELOW if narrow else BARS), space, colors)
     return figure
@@ -301,7 +299,7 @@ def _draw_bars(ax: Axes, space: Workspace, colors: dict[Key, tuple[float, float,
     """The shares of the surface, the largest at the top."""
     keys = [(limit.number, limit.cable) for limit in space.limits]
     bars = [
-        (limit_name(key, space), 100.0 * limit.share, colors[key])
+        (_limit_name(key, space), 100.0 * limit.share, colors[key])
         for key, limit in zip(keys, space.limits, strict=True)
     ]
     if len(bars) > MOST_LIMITS:

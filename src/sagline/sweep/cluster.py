@@ -59,7 +59,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
     Raises:
         SaglineError: If they cannot be started.
     """
-    with silence_dask():
+    with _silence_dask():
         import dask.config
         import distributed
 
@@ -103,7 +103,7 @@ def remote_workers(address: str) -> Iterator[Any]:
         SaglineError: If nobody answers there, or has workers.
     """
     check_address(address)
-    with silence_dask():
+    with _silence_dask():
         import distributed
 
         api: Any = distributed
@@ -191,7 +191,7 @@ def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tel
 
 
 @contextmanager
-def silence_dask() -> Iterator[None]:
+def _silence_dask() -> Iterator[None]:
     """Silence Dask's loggers and warnings inside, and its loggers after a failure, when its threads report late."""
     loggers = [logging.getLogger(name) for name in LOGGERS]
     levels = [logger.level for logger in loggers]

@@ -44,7 +44,7 @@ class Mark(NamedTuple):
     counts: Counts
 
 
-def read_marks(folder: SweepFolder) -> dict[int, Mark]:
+def _read_marks(folder: SweepFolder) -> dict[int, Mark]:
     """Tasks that are done, by their numbers; damaged lines are ignored."""
     try:
         lines = (folder.path / NAME).read_bytes().decode("ascii", "replace").splitlines(keepends=True)
@@ -69,7 +69,7 @@ class Marks:
         self.marks[number] = mark
         counts = mark.counts
         progress = f"{len(self.marks)} of {self._folder.tasks}"
-        progress += "" if left is None else f", {time_text(left)} left"
+        progress += "" if left is None else f", {_time_text(left)} left"
         text = f"{number:9d} {mark.seconds:8.2f} {counts.feasible:9d} {counts.infeasible:10d} "
         text += f"{counts.unable:8d} {counts.open:8d} {counts.lost:8d}   {progress}\n"
         self._write(text)
@@ -114,18 +114,18 @@ def open_marks(folder: SweepFolder) -> Iterator[Marks]:
     with file:
         if not try_lock(file.fileno(), if_unknown=True):
             raise FileError(folder.path, "is being worked on by another process", "Wait for it, or stop it.")
-        marks = Marks(folder, file, read_marks(folder))
+        marks = Marks(folder, file, _read_marks(folder))
         marks.begin()
         yield marks
 
 
-def total_of(marks: Mapping[int, Mark]) -> Counts:
+def _total_of(marks: Mapping[int, Mark]) -> Counts:
     """Sum of all counts."""
     counts = np.array([mark.counts for mark in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
     return Counts(*counts.sum(axis=0).tolist())
 
 
-def time_text(seconds: float) -> str:
+def _time_text(seconds: float) -> str:
     """Time as text: 1:02:03, or 0:07."""
     whole = max(0, round(seconds))
     hours, minutes = whole // 3600, whole // 60 % 60
@@ -241,6 +241,6 @@ def load(folder: os.PathLike[str] | str) -> Sweep:
     path = file_path(folder, "folder", folder=True)
     check_package("zarr", "sweeps")
     opened = open_folder(path)
-    marks = read_marks(opened)
+    marks = _read_marks(opened)
     seconds = sum(mark.seconds for mark in marks.values())
-    return Sweep(path, opened.request, opened.tasks, len(marks), total_of(marks), seconds)
+    return Sweep(path, opened.request, opened.tasks, len(marks), _total_of(marks), seconds)
