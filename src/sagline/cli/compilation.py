@@ -107,11 +107,7 @@ def available_cores() -> int:
 
 
 def split_entries(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Entries for this process and for the other one, with about the same time.
-
-    An entry goes with the one that it comes after, which would be compiled twice otherwise; where that one is compiled
-    already, it is found by this process.
-    """
+    """Entries for this process and for the other one, with about the same time; an entry is with the one before it."""
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(_root(name), []).append(name)
@@ -123,12 +119,7 @@ def split_entries(names: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def compile_all(names: Sequence[str], report: Callable[[Stage], None]) -> None:
-    """Compile entries, those that are not compiled yet, in two processes where there are two available_cores.
-
-    Args:
-        names: Words of the entries.
-        report: Called with the stages of the other process, from a thread of its own.
-    """
+    """Compile missing entries, in two processes if there are two cores; `report` is called from another thread."""
     waiting = not_compiled(names)
     here, beside = split_entries(waiting) if available_cores() > 1 else (waiting, [])
     if not beside:

@@ -1,7 +1,4 @@
-"""The server of `sagline view`, and the first run of the viewer.
-
-Cables can be dragged as soon as they are compiled; further readings are compiled by another process meanwhile.
-"""
+"""The server of `sagline view`; further readings are compiled by another process while cables can be dragged."""
 
 from __future__ import annotations
 

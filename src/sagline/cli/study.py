@@ -47,12 +47,7 @@ SAME_PLACE = 1e-6  # m: far above rounding, far below the distance of a second e
 
 
 class Run(NamedTuple):
-    """A confirmed plan along a path.
-
-    Attributes:
-        confirmation: The plan, and the equilibria with its lengths.
-        seconds: Time of the inverse kinematics, compiled [s].
-    """
+    """A confirmed plan along a path, and the time of the compiled inverse kinematics [s]."""
 
     confirmation: Confirmation
     seconds: float

@@ -30,12 +30,7 @@ _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 @contextmanager
 def working(what: str, *needed: str) -> Iterator[ProgressLine]:
-    """Show a piece of work while it is done, on a terminal, and in any case what is compiled for it.
-
-    Args:
-        what: The work.
-        needed: Entries of the kernels (`sagline.cli.entries`), which are compiled before it begins.
-    """
+    """Show work and its progress on a terminal, after compiling entries of the kernels (`sagline.cli.entries`)."""
     from sagline.cli.progress import progress_line
 
     with progress_line(_err, what) as line:
@@ -86,14 +81,7 @@ def note(head: str, text: str, style: str = "") -> None:
 
 
 def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
-    """Print a part of the result for a person; lines are broken between words at the width of the terminal.
-
-    Args:
-        what: The text.
-        indent: Columns before each line.
-        style: Of rich.
-        whole: Whether it stays one line, so that paths and commands in it can be copied.
-    """
+    """Print a part of the result; lines are broken between words, or kept `whole` so that paths can be copied."""
     if whole:
         _emit(Text(printable(what), style))
     else:
@@ -102,11 +90,7 @@ def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) ->
 
 
 def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
-    """Print parts of the result that are made for the width of the terminal; elsewhere the width is free.
-
-    Args:
-        pieces: Function of a console and its width; gives what to print, each with the least number of columns.
-    """
+    """Print parts of the result, made for the width of the terminal, each with its least width."""
     console = _out if _out.is_terminal else _wide
     for piece, least in pieces(console, console.width):
         _emit(piece, max(console.width, least))
@@ -154,11 +138,7 @@ def _write(text: str) -> None:
 
 @contextmanager
 def _refused() -> Iterator[None]:
-    """Turn errors of the system on stdout into one of ours.
-
-    Raises:
-        FileError: If it is closed or full; a pipe without reader stays a BrokenPipeError.
-    """
+    """Turn errors of the system on stdout into FileError; a pipe without reader stays a BrokenPipeError."""
     try:
         if sys.stdout is None:
             raise OSError(errno.EBADF, "it is closed")

@@ -1,8 +1,7 @@
-"""Figures a person would put in a paper: every function draws on the Axes it is given, or makes a figure of its own.
+"""Figures for papers: every function draws on given Axes or makes a figure of its own, without `matplotlib.pyplot`.
 
-No global state: `matplotlib.pyplot` is neither used nor needed. In a notebook a returned figure shows itself; of an
-Axes it is `ax.figure` that does. `save` writes either to a file. What is drawn inside `with style("ieee"):` has the
-width, the fonts and the sizes of a journal.
+A notebook shows a returned figure; of Axes, show `ax.figure`. `save` writes either to a file. `with style("ieee"):`
+sets width, fonts and sizes of a journal.
 """
 
 from sagline.plot.calibration import calibration

@@ -44,14 +44,7 @@ PER_METER: Final = 1e3  # mm
 
 
 class _Kind(NamedTuple):
-    """Residuals of one kind.
-
-    Attributes:
-        label: Of their axis.
-        values: In standard deviations, shape (N, c).
-        names: Of the columns.
-        quantity: As outliers call it.
-    """
+    """Residuals of one kind: label of the axis, values in standard deviations (N, c), columns, and name of outliers."""
 
     label: str
     values: Array
@@ -225,8 +218,8 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
     scale = LogNorm(low, max(high, 1.01 * low))
     panels = figure.subplots(*((2, 1) if current().narrow else (1, 2)), sharex=True, sharey=True)
     for ax, values, name in zip(panels, maps, ("before: from the priors", "after"), strict=True):
-        known = np.isfinite(values).any()
-        median = f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if known else "not observed"
+        is_known = bool(np.isfinite(values).any())
+        median = f"median {n(float(np.nanmedian(values)), '.2g', 'mm')}" if is_known else "not observed"
         draw_map(ax, x, y, values, scale, f"{name}, {median}")
     places = found.poses.position[:: -(-len(found.rows) // MOST_POSES)]
     panels[1].plot(

@@ -57,15 +57,7 @@ END_ON: Final = 0.12  # of its length: an axis seen so short has no name
 
 
 class _Stroke(NamedTuple):
-    """Something drawn as a line.
-
-    Attributes:
-        points: In the world [m], shape (P, 3).
-        color: Its color.
-        width: Its width [pt].
-        style: Solid, or dashes.
-        covers: Whether it hides what lies behind it.
-    """
+    """A line of the drawing: points in the world (P, 3) [m], look, width [pt], and True if it hides lines behind it."""
 
     points: Array
     color: Any
@@ -133,14 +125,7 @@ def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USU
 
 
 class _Scene(NamedTuple):
-    """Geometry of the drawing in world axes.
-
-    Attributes:
-        cables: As they hang.
-        others: Frame, platform, pulleys and drums.
-        faces: Of the platform, each with its corners in order, seen from outside, shape (6, 4, 3).
-        flat: The ground and the shadow of the platform, corners of each.
-    """
+    """Geometry of the drawing in world axes; faces of the platform (6, 4, 3) have their corners in order."""
 
     cables: list[_Stroke]
     others: list[_Stroke]

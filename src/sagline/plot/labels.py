@@ -45,11 +45,7 @@ LEADER = 8.0  # pt, from the end of a line to its name
 
 
 def name_lines(ax: Axes, title: str = "") -> None:
-    """Say which line is which: in a legend to the right of the axes, or as the style in use likes it.
-
-    Styles of journals and slides write the name of each line at its end, in its color. Where lines end elsewhere, or
-    are more than there is room for, a legend stands above the axes; there also stands what is no line.
-    """
+    """Name the lines of axes: in a legend at the right, or, in styles of journals and slides, at their ends."""
     if not current().direct:
         _beside(ax, title)
         return
@@ -117,14 +113,7 @@ def break_labels(figure: Figure) -> None:
 
 
 class _End(NamedTuple):
-    """The end of a line that carries its name there.
-
-    Attributes:
-        name: Of the line.
-        color: Of the line.
-        place: Where it ends, in the data of the axes.
-        height: The same, of the axes: 0 below, 1 above.
-    """
+    """End of a line that carries its name there, with its place in the data and its height in the axes, 0 to 1."""
 
     name: str
     color: Any

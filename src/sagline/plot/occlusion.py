@@ -1,8 +1,7 @@
 """Hidden line removal in parallel projection: parts behind surfaces and behind nearer lines are cut away.
 
-Sorting things by how far away they are cannot do that: three cables can each pass before the next. Seen from infinitely
-far away all is linear along a segment, in the picture and in depth, so that what hides a part of it begins and ends
-where one of a few straight lines is crossed, exactly.
+Sorting by distance cannot do this: three cables can each pass before the next. In parallel projection all is linear
+along a segment, so that the ends of hidden parts are crossings of straight lines, without approximation.
 """
 
 from __future__ import annotations
@@ -25,10 +24,9 @@ class Line(NamedTuple):
     """A line in the picture.
 
     Attributes:
-        points: Along it: to the right, up, and toward the viewer [m], shape (P, 3).
-        half_width: Half as wide as it is drawn [m]: so far from its middle it hides what lies behind it.
-        gap: How much farther it hides what passes behind it, where they cross [m]: so that one sees which is in front.
-            0 for both if it hides nothing. What is not farther behind than half_width + gap passes on, as cables do
+        points: To the right, up, and toward the viewer [m], shape (P, 3).
+        half_width: Half of its width [m]; it hides lines behind it within this distance; 0 if it hides nothing.
+        gap: Additional distance at crossings [m]. Lines less than half_width + gap behind it are not hidden, as cables
             that meet at an anchor.
     """
 
@@ -38,14 +36,14 @@ class Line(NamedTuple):
 
 
 class _Covers(NamedTuple):
-    """R convex flat pieces that hide what lies behind them, each within K limits.
+    """R convex flat pieces that hide lines behind them, each within K limits.
 
     Attributes:
-        normals: Outward, of the limits in the picture, shape (R, K, 2).
-        offsets: Normal times place is at most that inside, shape (R, K).
-        planes: Depth is planes[:, :2] times place, and planes[:, 2], shape (R, 3).
-        behind: How much farther away something must be to be hidden, shape (R,).
-        owners: Numbers of the lines they belong to, -1 for surfaces, shape (R,).
+        normals: Outward normals of the limits in the picture, shape (R, K, 2).
+        offsets: Upper bounds of normal times place inside, shape (R, K).
+        planes: Depth as planes[:, :2] times place plus planes[:, 2], shape (R, 3).
+        behind: Least distance behind the piece of a hidden point, shape (R,).
+        owners: Numbers of their lines, -1 for surfaces, shape (R,).
         hides: Numbers of the lines that they hide, -1 for all but their owners, shape (R,).
     """
 
@@ -58,14 +56,7 @@ class _Covers(NamedTuple):
 
 
 class _Crossing(NamedTuple):
-    """A crossing of two lines in the picture.
-
-    Attributes:
-        line: Number of the line in front.
-        behind: Number of the other.
-        place: On it, in the picture and in depth, shape (3,).
-        along: Its direction there, of length 1 in the picture, shape (3,).
-    """
+    """A crossing of a line in front and another one behind; place on it and unit direction there, shapes (3,)."""
 
     line: int
     behind: int

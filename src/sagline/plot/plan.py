@@ -131,11 +131,7 @@ def overview(plan: Plan) -> Figure:
 
 
 def abscissa(plan: Plan) -> tuple[Array, str]:
-    """Times of a plan's path or the numbers of its poses, shape (N,), and their label.
-
-    Raises:
-        InvalidValueError: If it has no pose.
-    """
+    """Times of a plan's path or numbers of its poses (N,), and their label; InvalidValueError without poses."""
     if not plan.status.size:
         raise InvalidValueError("plan", "one of no pose", "one pose at least", "Plan some poses first.")
     return (np.arange(plan.status.size, dtype=np.float64), "pose") if plan.path is None else (plan.path.time, TIME)
@@ -354,10 +350,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 
 
 def _arrow_samples(path: Path) -> list[int]:
-    """Samples before the middle of each stretch between two rests, so that arrows there and back do not meet.
-
-    Of more stretches than anybody can tell apart, evenly chosen ones.
-    """
+    """Samples of the arrows, before the middle of each motion between two rests; of many motions evenly chosen ones."""
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
     moving = np.concatenate(([False], speed > 1e-3 * speed.max(initial=0.0), [False]))
     edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)

@@ -85,15 +85,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
 
 class _Name(NamedTuple):
-    """The name of a side and where it stands.
-
-    Attributes:
-        text: "cable 3 min".
-        middle: Of the side, in coordinates of the null space [N].
-        offset: From there to the middle of the name [pt].
-        half: Half the width and height of the name [pt].
-        moved: Whether it has made room for others.
-    """
+    """Name of a side: middle of the side [N], offset and half size of the name [pt], True if it is moved outward."""
 
     text: str
     middle: Array
@@ -153,10 +145,7 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
 
 
 def _normals(corners: Array) -> Array:
-    """Outward directions of the sides, shape (h, 2); a side without length has one between its neighbors'.
-
-    Where those are opposite, at the tip of a flat polygon, it points away from the tip: every name has a way out.
-    """
+    """Outward directions of the sides (h, 2); a side without length has one between its neighbors', or from the tip."""
     along = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(along, axis=1)
     long = np.flatnonzero(lengths > SHORT * lengths.max())

@@ -47,11 +47,7 @@ LABEL_DISTANCE = 0.045  # of the robot's size: how far outside its anchor a labe
 
 
 def pose_of(robot: Robot, pose: Pose | None) -> Pose:
-    """The pose that is drawn: the one given, or the middle of the robot's test box.
-
-    Raises:
-        InvalidValueError: If no pose is given and the robot has no test box, or the pose is a batch.
-    """
+    """The given pose, or the middle of the robot's test box; InvalidValueError for a batch or without both."""
     if pose is None and robot.test_box is not None:
         return Pose(0.5 * (robot.test_box.low + robot.test_box.high), np.eye(3))
     if pose is None or pose.shape:
@@ -75,10 +71,7 @@ def straight_points(robot: Robot, pose: Pose) -> Array:
 
 
 def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple[Array, bool]]]:
-    """Circles of the pulleys and of the drums that are known; and the runs behind pulleys, and whether each is upright.
-
-    Of dead cable only its length and its rise are known: of a run that is not upright its rise is drawn.
-    """
+    """Circles of pulleys and known drums; runs behind pulleys, drawn by their rise, and True for vertical runs."""
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     pulleys = np.swapaxes(points_on_pulleys(robot, pose, turn), 0, 1)[pulleys_of(robot).radius > 0.0]
     known = None if robot.winches is None else robot.winches.drum_radius

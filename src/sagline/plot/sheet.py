@@ -104,11 +104,7 @@ def _thicken(figure: Figure, factor: float) -> None:
 
 
 def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> Axes:
-    """The caller's Axes, or the only ones of a new figure.
-
-    Raises:
-        InvalidValueError: If the caller's are none, or not flat.
-    """
+    """The given Axes, or those of a new figure; InvalidValueError for other objects or for Axes in space."""
     optional(ax, Axes, "ax")
     if ax is None:
         return sheet(height, width).add_subplot()

@@ -20,16 +20,16 @@ class Style:
     """A style of figures, activated by `style`.
 
     Attributes:
-        name: What it is called; "" for that of a page of documentation.
-        width: Of every figure [in]; None for as wide as each function likes.
-        height: Heights of figures, relative to those on a page of documentation.
-        tallest: What no figure is taller than [in].
-        font: The family of all text.
-        mathematics: What Matplotlib calls the font of formulas.
+        name: Name; "" for the style of the documentation.
+        width: Width of every figure [in]; None for the width of each function.
+        height: Heights of figures, relative to those of the documentation.
+        tallest: Largest height of a figure [in].
+        font: Font family of all text.
+        mathematics: Matplotlib's name for the font of formulas.
         label: Size of the text at axes, in titles and at bars [pt].
         tick: Size of numbers and of names of lines [pt].
-        line: Widths of lines and sizes of markers, relative to those on a page of documentation.
-        direct: Whether lines carry their names where they can.
+        line: Widths of lines and sizes of markers, relative to those of the documentation.
+        direct: True if the names of lines stand at their ends.
     """
 
     name: str

@@ -104,11 +104,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
 
 
 def _plane(space: Workspace, normal: str, at: float | None) -> Plane:
-    """The plane that is asked for.
-
-    Raises:
-        InvalidValueError: If it is not in the box.
-    """
+    """The plane of a slice; InvalidValueError if it is not in the box of the workspace."""
     axis = AXES.index(choice(normal, "normal", AXES))
     low, high = float(space.box.low[axis]), float(space.box.high[axis])
     flat = flat_axis(space.box)

@@ -47,18 +47,7 @@ def cores() -> int:
 
 @contextmanager
 def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
-    """Worker processes of this machine, not reachable from others.
-
-    Args:
-        workers: Number of processes.
-        tell: Called with the address of the dashboard.
-
-    Yields:
-        The client.
-
-    Raises:
-        SaglineError: If they cannot be started.
-    """
+    """Worker processes of this machine, not reachable from others; `tell` gets the address of the dashboard."""
     with _silence_dask():
         import dask.config
         import distributed
@@ -90,18 +79,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
 
 @contextmanager
 def remote_workers(address: str) -> Iterator[Any]:
-    """The workers of a scheduler.
-
-    Args:
-        address: Address of the scheduler: "tcp://10.0.0.1:8786".
-
-    Yields:
-        The client.
-
-    Raises:
-        InvalidValueError: If it is no address.
-        SaglineError: If nobody answers there, or has workers.
-    """
+    """The workers of a scheduler at an address, "tcp://10.0.0.1:8786"; SaglineError if there are none."""
     check_address(address)
     with _silence_dask():
         import distributed
@@ -133,20 +111,7 @@ def check_address(address: object) -> str:
 
 
 def run_tasks(client: Any, job: Job, numbers: Iterable[int], finish: Finish, tell: Callable[[str], None]) -> None:
-    """Run tasks on the workers, a few ahead of each worker.
-
-    Where something fails, or Ctrl-C comes, the tasks that are with the workers are finished, and no others begun.
-
-    Args:
-        client: Of Dask.
-        job: Folder and digest.
-        numbers: The tasks.
-        finish: Told of each that is done.
-        tell: Called with a text when it stops.
-
-    Raises:
-        SaglineError: If the scheduler is gone, or a task ends its workers.
-    """
+    """Run tasks on the workers, a few ahead of each worker; after an error or Ctrl-C the running tasks are finished."""
     import distributed
 
     api: Any = distributed

@@ -1,7 +1,7 @@
-"""Folders of sweeps: a Zarr group with the request in it, one chunk of each variable a task.
+"""Folders of sweeps: a Zarr group with the request in it, one chunk of each variable for each task.
 
-Whoever has the folder has the request, to the last bit; so a task is a number, on any machine that sees the folder.
-Chunks carry their checksum: one that is incomplete is recognized.
+The folder has the exact request; so a task is a number, on any machine that sees the folder. Chunks carry their
+checksum, which shows incomplete ones.
 """
 
 from __future__ import annotations
@@ -68,16 +68,7 @@ class TaskSize(NamedTuple):
 
 
 class SweepFolder(NamedTuple):
-    """An open folder of a sweep.
-
-    Attributes:
-        path: Path of the folder.
-        group: Its Zarr group.
-        request: The request in it.
-        digest: Of the request.
-        size: Of a task.
-        made_by: The sagline that made it.
-    """
+    """An open folder of a sweep: path, Zarr group, request with its digest, size of a task, and sagline's version."""
 
     path: Path
     group: Group
@@ -106,11 +97,7 @@ class SweepFolder(NamedTuple):
         return Part(robot, rows, slice(left, min(left + self.size.wrenches, wrenches)))
 
     def write(self, number: int, numbers: Mapping[str, NDArray[np.generic]]) -> None:
-        """Write the chunks of a task, each atomically.
-
-        Raises:
-            FileError: If the disk is full, or the folder cannot be written.
-        """
+        """Write the chunks of a task, each atomically; FileError if they cannot be written."""
         robot, rows, columns = self.part(number)
         try:
             for name, values in numbers.items():
@@ -141,17 +128,7 @@ class SweepFolder(NamedTuple):
 
 
 def make_folder(path: Path, request: Request, size: TaskSize) -> None:
-    """Make the folder of a sweep, whole or not at all.
-
-    Args:
-        path: Path at which there is nothing, or an empty folder.
-        request: The request.
-        size: Of a task.
-
-    Raises:
-        FileError: If it cannot be made.
-        InvalidValueError: If the model or the way of sharing is none of sagline's.
-    """
+    """Make the folder of a sweep atomically; FileError or InvalidValueError if the request cannot be written."""
     check_package("zarr", "sweeps")
     texts = [dump_robot(robot) for robot in request.robots]
     options = _options(request)
@@ -173,17 +150,7 @@ def make_folder(path: Path, request: Request, size: TaskSize) -> None:
 
 
 def open_folder(path: Path) -> SweepFolder:
-    """Open the folder of a sweep.
-
-    Args:
-        path: Path of the folder.
-
-    Returns:
-        The folder, with the request.
-
-    Raises:
-        FileError: If there is none, or it is not as it was made.
-    """
+    """Open the folder of a sweep with its request; FileError if there is none or it is damaged."""
     import zarr
 
     check_package("zarr", "sweeps")
@@ -225,11 +192,7 @@ def digest_of(request: Request) -> str:
 
 
 def check_made_here(folder: SweepFolder) -> None:
-    """Refuse to continue the sweep of another version: its numbers may differ.
-
-    Raises:
-        FileError: If it was another version.
-    """
+    """Raise FileError for a sweep of another version, whose numbers may differ."""
     here = f"sagline {version('sagline')}"
     if folder.made_by != here:
         step = f"Finish it with {folder.made_by}, or sweep into another folder."
@@ -242,11 +205,7 @@ def is_installed(package: str) -> bool:
 
 
 def check_package(name: str, purpose: str) -> None:
-    """Refuse to go on without an optional package; the message names the command that installs it.
-
-    Raises:
-        InvalidValueError: If it is not installed.
-    """
+    """Raise InvalidValueError, with the command that installs it, if an optional package is missing."""
     if not is_installed(name):
         step = 'Install it: pip install "sagline[sweep]".'
         raise InvalidValueError(f"the package {name}", "not installed", f"installed, for {purpose}", step)

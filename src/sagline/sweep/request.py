@@ -203,13 +203,7 @@ def _sequence(value: Any, item: str, allowed: str) -> tuple[Any, ...]:
 
 
 class Part(NamedTuple):
-    """A box of requests.
-
-    Attributes:
-        robot: Index of the robot.
-        poses: Range of poses.
-        wrenches: Range of wrenches.
-    """
+    """A box of requests: index of the robot, ranges of poses and wrenches."""
 
     robot: int
     poses: slice

@@ -33,12 +33,7 @@ HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     los
 
 
 class Mark(NamedTuple):
-    """Record of a task that is done.
-
-    Attributes:
-        seconds: Time it took a worker [s]; 0 where the chunk was found on the disk.
-        counts: Outcomes of its requests.
-    """
+    """Record of a finished task: time of its worker [s], 0 for a chunk from the disk, and outcomes of its requests."""
 
     seconds: float
     counts: Counts
@@ -95,17 +90,7 @@ class Marks:
 
 @contextmanager
 def open_marks(folder: SweepFolder) -> Iterator[Marks]:
-    """Open the marks of a folder with a lock.
-
-    Args:
-        folder: The folder.
-
-    Yields:
-        The marks.
-
-    Raises:
-        FileError: If another process works on this sweep, or the file cannot be written.
-    """
+    """Open the marks of a folder with a lock; FileError if another process works on this sweep."""
     path = folder.path / NAME
     try:
         file = path.open("a+b", buffering=0)

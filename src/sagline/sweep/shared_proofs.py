@@ -1,8 +1,8 @@
-"""Verdicts of many loads at each pose, with shared proofs: the proof of one load holds for all beyond it.
+"""Verdicts of many loads at each pose, with shared proofs: the proof of one load holds for all loads beyond it.
 
-What proves a load w infeasible is a direction y along which the cables give too little, by a gap. That does not depend
-on the load; for another load w' of the same pose the gap is that of w less y (w' - w). Where it is above zero it proves
-w' infeasible too, and it is a least change of the force as well. So one proof decides half a plane of loads.
+The proof that a load w is infeasible is a direction y in which the cable forces are too small, by a gap. For another
+load w' of the same pose the gap is that of w minus y (w' - w). A positive gap proves w' infeasible; it is also a least
+change of the force. So one proof decides a half-plane of loads.
 """
 
 from __future__ import annotations
@@ -26,16 +26,8 @@ PROVED: Final = 0  # column of the brackets
 def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
     """Decide the requests that the tension distribution left open; complete the feasible ones.
 
-    Args:
-        robot: The robot.
-        options: Of `kernel_options`.
-        poses: Pose rows (P, POSE_COLUMNS).
-        loads: Wrenches (W, 6); the requests are all loads at the first pose, then all at the next.
-        found: The answers, (P W) requests.
-
-    Returns:
-        Proved least change of the force [N], (P W,): 0 where a request is feasible, NaN where the load is not the
-        reason that it is not.
+    Poses are rows (P, POSE_COLUMNS), loads (W, 6); the P W requests in `found` are all loads at the first pose, then at the
+    next. Returns the proved least change of the force [N], (P W,): 0 if feasible, NaN if the load is not the reason.
     """
     proof = np.full(found.pose_status.size, np.nan)
     proof[found.pose_status == codes.POSE_SOLVED] = 0.0

@@ -50,16 +50,7 @@ class Counts(NamedTuple):
 
 
 def numbers_of(request: Request, part: Part) -> dict[str, NDArray[np.generic]]:
-    """All variables of a part.
-
-    Args:
-        request: The request.
-        part: Box of the request.
-
-    Returns:
-        Arrays by the names of the variables, (poses, wrenches), those of cables (poses, wrenches, cables): NaN where a
-        robot has fewer, and where there is no answer.
-    """
+    """All variables of a part by name, (poses, wrenches[, cables]): NaN for missing cables and results."""
     asked = variables_of(request.quantities)
     shape = part.shape
     filled: dict[str, NDArray[np.generic]] = {each.name: _room(each, shape, request.cable_count) for each in asked}
@@ -162,19 +153,7 @@ TIMED: Final = 0.5  # s: what has been timed for so long is known well enough
 
 
 def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]:
-    """Compute one task and write its chunks, on any machine that sees the folder.
-
-    Args:
-        folder: The folder of the sweep, as this machine sees it.
-        digest: Of the request that the folder must hold.
-        number: Of the task.
-
-    Returns:
-        Seconds that it took, and the `Counts` of its requests.
-
-    Raises:
-        FileError: If the folder is not there, holds another sweep, or cannot be written.
-    """
+    """Compute one task of the folder with a digest and write its chunks; returns its seconds and outcomes."""
     start = time.perf_counter()
     opened = _opened(folder, digest)
     numbers = opened.read(number)  # written by a worker that ended before it reported
