@@ -26,8 +26,8 @@ PROVED: Final = 0  # column of the brackets
 def proofs_of(robot: Robot, options: Options, poses: Array, loads: Array, found: InverseRows) -> Array:
     """Decide the requests that the tension distribution left open; complete the feasible ones.
 
-    Poses are rows (P, POSE_COLUMNS), loads (W, 6); the P W requests in `found` are all loads at the first pose, then at the
-    next. Returns the proved least change of the force [N], (P W,): 0 if feasible, NaN if the load is not the reason.
+    Poses are rows (P, POSE_COLUMNS), loads (W, 6); the P W requests in `found` are all loads at the first pose, then at
+    the next. Returns the proved least change of the force [N], (P W,): 0 if feasible, NaN if it is not the reason.
     """
     proof = np.full(found.pose_status.size, np.nan)
     proof[found.pose_status == codes.POSE_SOLVED] = 0.0
