@@ -159,21 +159,13 @@ def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
 
 
 class Courses(NamedTuple):
-    """Several courses with their fits.
+    """Several courses with their fits."""
 
-    Attributes:
-        x: Where they are sampled, shape (n,).
-        rows: The samples, shape (k, n).
-        fine: Where the fits are drawn, shape (l,).
-        fits: The fits, shape (k, l).
-        names: What the courses are called in the legend.
-    """
-
-    x: Array
-    rows: Array
-    fine: Array
-    fits: Array
-    names: list[str]
+    x: Array  # where they are sampled, shape (n,)
+    rows: Array  # the samples, shape (k, n)
+    fine: Array  # where the fits are drawn, shape (l,)
+    fits: Array  # the fits, shape (k, l)
+    names: list[str]  # what the courses are called in the legend
 
     def draw(self, ax: Axes, title: str) -> None:
         """All of them, dark to light."""

@@ -7,38 +7,23 @@ from typing import NamedTuple
 
 
 class Quantity(NamedTuple):
-    """A computed number.
-
-    Attributes:
-        label: What it is.
-        value: The number.
-        unit: Its unit; "" for none.
-        size: Of what it is a difference, in the unit: tells rounding from a small number. 0 where it is none.
-    """
+    """A computed number."""
 
     label: str
     value: float
-    unit: str
-    size: float = 0.0
+    unit: str  # its unit; "" for none
+    size: float = 0.0  # of what it is a difference, in the unit: tells rounding from a small number. 0 where it is none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Erratum:
-    """An erratum of the article, with the computation that shows it.
+    """An erratum of the article, with the computation that shows it."""
 
-    Attributes:
-        number: As in docs/errata.md.
-        title: A few words.
-        printed: What the article says, and where.
-        right: What is right.
-        numbers: What the demonstration computes.
-    """
-
-    number: int
+    number: int  # as in docs/errata.md
     title: str
-    printed: str
-    right: str
-    numbers: tuple[Quantity, ...]
+    printed: str  # what the article says, and where
+    right: str  # what is right
+    numbers: tuple[Quantity, ...]  # what the demonstration computes
 
     def __getitem__(self, label: str) -> float:
         """The number of a label."""

@@ -101,51 +101,29 @@ class Watch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Experiment:
-    """Result of the experiment: K points of the time series, m winches.
-
-    Attributes:
-        table: The article's Table 2.
-        robot: As the controller knew it.
-        true: Where the platform was at the ten stops [m], shape (10, 3).
-        estimated: Where the encoders put it [m], shape (10, 3).
-        tension: What the load cells read there, mean of a second [N], shape (10, m).
-        planned_tension: What was planned there [N], shape (10, m).
-        null_error: What of their error lengths can mend that do not move the platform: largest of a cable [N], (10,).
-        correction: What the tension loop had in the lengths there [m], shape (10, m).
-        back: Where the platform was at home in the end, less where it began [m], shape (3,).
-        time: Of the courses, without the stops [s], shape (K,).
-        cells: What the load cells read [N], shape (K, m).
-        planned: What they should have read by the plan [N], shape (K, m).
-        lengths: Less those at home [m], shape (K, m).
-        stops: When the ten stops were, in the same time [s], shape (10,).
-        duration: From home to home, stops included [s].
-        winch_speed: Of the fastest winch [m/s].
-        farthest: Largest distance of the true position from the set point, under way [m].
-        misjudged: Largest distance of the true position from the estimate [m].
-        acting: Share of the cycles at stops in which the tension loop changed the lengths.
-        events: What the controller had to say.
-    """
+    """Result of the experiment: K points of the time series, m winches."""
 
     table: Table2
-    robot: sl.Robot
-    true: Array
-    estimated: Array
-    tension: Array
-    planned_tension: Array
+    robot: sl.Robot  # as the controller knew it
+    true: Array  # where the platform was at the ten stops [m], shape (10, 3)
+    estimated: Array  # where the encoders put it [m], shape (10, 3)
+    tension: Array  # what the load cells read there, mean of a second [N], shape (10, m)
+    planned_tension: Array  # what was planned there [N], shape (10, m)
+    # what of their error lengths can mend that do not move the platform: largest of a cable [N], (10,)
     null_error: Array
-    correction: Array
-    back: Array
-    time: Array
-    cells: Array
-    planned: Array
-    lengths: Array
-    stops: Array
-    duration: float
-    winch_speed: float
-    farthest: float
-    misjudged: float
-    acting: float
-    events: tuple[control.Event, ...]
+    correction: Array  # what the tension loop had in the lengths there [m], shape (10, m)
+    back: Array  # where the platform was at home in the end, less where it began [m], shape (3,)
+    time: Array  # of the courses, without the stops [s], shape (K,)
+    cells: Array  # what the load cells read [N], shape (K, m)
+    planned: Array  # what they should have read by the plan [N], shape (K, m)
+    lengths: Array  # less those at home [m], shape (K, m)
+    stops: Array  # when the ten stops were, in the same time [s], shape (10,)
+    duration: float  # from home to home, stops included [s]
+    winch_speed: float  # of the fastest winch [m/s]
+    farthest: float  # largest distance of the true position from the set point, under way [m]
+    misjudged: float  # largest distance of the true position from the estimate [m]
+    acting: float  # share of the cycles at stops in which the tension loop changed the lengths
+    events: tuple[control.Event, ...]  # what the controller had to say
 
     @property
     def error(self) -> Array:

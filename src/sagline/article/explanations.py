@@ -22,29 +22,19 @@ ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual less desired 
 
 
 class Explanation(NamedTuple):
-    """The errors of some parameters, none beyond what we think plausible, that fit the measured positions best.
+    """The errors of some parameters, none beyond what we think plausible, that fit the measured positions best."""
 
-    Attributes:
-        parameters: The parameters, k of them.
-        values: Their errors, each in its unit, shape (k,).
-        deviation: Their standard deviations, each in its unit, shape (k,); NaN for one that stands at a limit.
-        at_limit: Whether each has run into the limit of what is plausible, shape (k,).
-        predicted: Actual less desired position with these errors [m], shape (N, 3).
-        rms: Root mean square of measured less predicted position, over all coordinates [m].
-        worst: Largest distance of measured and predicted position [m].
-        aicc: Akaike's information criterion, corrected for few measurements: smaller is better, and 2 more is little.
-        left_out: Root mean square of measured less predicted position, over all coordinates, where each pose is
-            predicted by the fit to the others [m].
-    """
-
-    parameters: Model
-    values: Array
-    deviation: Array
-    at_limit: Flags
-    predicted: Array
-    rms: float
-    worst: float
+    parameters: Model  # the parameters, k of them
+    values: Array  # their errors, each in its unit, shape (k,)
+    deviation: Array  # their standard deviations, each in its unit, shape (k,); NaN for one that stands at a limit
+    at_limit: Flags  # whether each has run into the limit of what is plausible, shape (k,)
+    predicted: Array  # actual less desired position with these errors [m], shape (N, 3)
+    rms: float  # root mean square of measured less predicted position, over all coordinates [m]
+    worst: float  # largest distance of measured and predicted position [m]
+    # Akaike's information criterion, corrected for few measurements: smaller is better, and 2 more is little
     aicc: float
+    # root mean square of measured less predicted position, over all coordinates, where each pose is predicted by the
+    # fit to the others [m]
     left_out: float
 
     @property
@@ -54,15 +44,10 @@ class Explanation(NamedTuple):
 
 
 class _Tangent(NamedTuple):
-    """Positions about some errors of a model's parameters, to first order.
+    """Positions about some errors of a model's parameters, to first order."""
 
-    Attributes:
-        error: Actual less desired, shape (3 N,) [m].
-        slopes: Its change with each parameter, shape (3 N, k) [m by the parameter's unit].
-    """
-
-    error: Array
-    slopes: Array
+    error: Array  # actual less desired, shape (3 N,) [m]
+    slopes: Array  # its change with each parameter, shape (3 N, k) [m by the parameter's unit]
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:

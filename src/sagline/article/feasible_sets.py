@@ -25,15 +25,10 @@ LOW_PART = 50.0  # N: below it the article ignores the curve
 
 
 class End(NamedTuple):
-    """Desired position of the platform end of a cable.
+    """Desired position of the platform end of a cable."""
 
-    Attributes:
-        span: Horizontal distance from the frame end [m].
-        rise: Height above the frame end [m].
-    """
-
-    span: float
-    rise: float
+    span: float  # horizontal distance from the frame end [m]
+    rise: float  # height above the frame end [m]
 
     @property
     def chord(self) -> float:
@@ -43,29 +38,17 @@ class End(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _FeasibleSets:
-    """The sets psi for some lengths, the curve Psi over all, and the line pi through its projection.
+    """The sets psi for some lengths, the curve Psi over all, and the line pi through its projection."""
 
-    Attributes:
-        cable: Material.
-        end: The wanted position B_d.
-        tolerance: epsilon_max of (20) [m].
-        psi_lengths: Lengths L of the sets psi [m], shape (s,).
-        psi: Their outlines in the (T_x, T_z) plane [N], shape (s, points, 2).
-        tensions: T_x along the curve Psi [N], shape (t,).
-        vertical: T_z along it [N], shape (t,).
-        lengths: L along it [m], shape (t,).
-        line: The line pi of least squares through (T_x, T_z): slope a_pi, intercept b_pi [N].
-    """
-
-    cable: sl.Cable
-    end: End
-    tolerance: float
-    psi_lengths: Array
-    psi: Array
-    tensions: Array
-    vertical: Array
-    lengths: Array
-    line: Line
+    cable: sl.Cable  # material
+    end: End  # the wanted position B_d
+    tolerance: float  # epsilon_max of (20) [m]
+    psi_lengths: Array  # lengths L of the sets psi [m], shape (s,)
+    psi: Array  # their outlines in the (T_x, T_z) plane [N], shape (s, points, 2)
+    tensions: Array  # T_x along the curve Psi [N], shape (t,)
+    vertical: Array  # T_z along it [N], shape (t,)
+    lengths: Array  # L along it [m], shape (t,)
+    line: Line  # the line pi of least squares through (T_x, T_z): slope a_pi, intercept b_pi [N]
 
     @property
     def tangent(self) -> float:

@@ -29,16 +29,11 @@ class Estimate(NamedTuple):
 
     The interval is that of least squares. Its scatter is no measuring noise but what the model's form cannot
     follow in the working range, so it says how far the constant moves within the range, not how exact the fit is.
-
-    Attributes:
-        value: The constant.
-        low: Lower end of the 95 % interval.
-        high: Upper end.
     """
 
-    value: float
-    low: float
-    high: float
+    value: float  # the constant
+    low: float  # lower end of the 95 % interval
+    high: float  # upper end
 
 
 @dataclass(frozen=True, slots=True, eq=False)

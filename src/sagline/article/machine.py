@@ -21,21 +21,13 @@ Errors: TypeAlias = Mapping[
 
 
 class Parameter(NamedTuple):
-    """Something about the prototype that may be other than Table 1 says, for all cables alike.
-
-    Attributes:
-        name: What it is.
-        unit: Unit in which its error is told.
-        typical: An error that is told as an example, in that unit.
-        plausible: The largest error we think possible, in that unit; ours, the article says nothing of it.
-        positive: Whether it can only be larger than planned.
-    """
+    """Something about the prototype that may be other than Table 1 says, for all cables alike."""
 
     name: str
-    unit: str
-    typical: float
-    plausible: float
-    positive: bool = False
+    unit: str  # unit in which its error is told
+    typical: float  # an error that is told as an example, in that unit
+    plausible: float  # the largest error we think possible, in that unit; ours, the article says nothing of it
+    positive: bool = False  # whether it can only be larger than planned
 
 
 PARAMETERS = (

@@ -50,28 +50,17 @@ class _ModelErrors:
     All models are asked for the same horizontal tension, so a length error is what a winch would wind wrongly, and a
     position error, |dx| + |dz| of (20), is how far the end of an exact cable with the model's force and length is
     from where it should be.
-
-    Attributes:
-        models: The models, shape (5,).
-        axial_stiffness: EA [N].
-        chords: D [m], shape (c,).
-        angles: phi [rad], shape (a,).
-        densities: rho [kg/m], shape (r,).
-        tensions: Chord tension tau [N], shape (t,).
-        length_error: L of the model less the exact one [m], shape (5, c, a, r, t).
-        force_error: T_z of the model less the exact one [N], shape (5, c, a, r, t).
-        position_error: [m], shape (5, c, a, r, t).
     """
 
-    models: tuple[sl.CableModel, ...]
-    axial_stiffness: float
-    chords: Array
-    angles: Array
-    densities: Array
-    tensions: Array
-    length_error: Array
-    force_error: Array
-    position_error: Array
+    models: tuple[sl.CableModel, ...]  # the models, shape (5,)
+    axial_stiffness: float  # EA [N]
+    chords: Array  # D [m], shape (c,)
+    angles: Array  # phi [rad], shape (a,)
+    densities: Array  # rho [kg/m], shape (r,)
+    tensions: Array  # chord tension tau [N], shape (t,)
+    length_error: Array  # L of the model less the exact one [m], shape (5, c, a, r, t)
+    force_error: Array  # T_z of the model less the exact one [N], shape (5, c, a, r, t)
+    position_error: Array  # [m], shape (5, c, a, r, t)
 
     def sufficient(self, tolerance: float) -> Array:
         """The coarsest model that will do."""

@@ -22,25 +22,15 @@ LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # N: where the range of the
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterceptStudy:
-    """Intercepts b_pi of the forces on one end of the cable, and what the article regresses from them.
+    """Intercepts b_pi of the forces on one end of the cable, and what the article regresses from them."""
 
-    Attributes:
-        sampling: The cables, a angles, c chords, r densities.
-        slope: a_pi of the fitted lines, shape (a, c, r).
-        intercept: b_pi of the fitted lines [N], shape (a, c, r).
-        r_squared: How well the lines fit, shape (a, c, r).
-        h_b: Factor of D in b_pi = h_b D [N/m], shape (a, r).
-        k_h_of_angle: Factor of rho in h_b = k_h rho, angle by angle [m/s^2], shape (a,).
-        k_h: The same over all angles [m/s^2].
-    """
-
-    sampling: Sampling
-    slope: Array
-    intercept: Array
-    r_squared: Array
-    h_b: Array
-    k_h_of_angle: Array
-    k_h: float
+    sampling: Sampling  # the cables, a angles, c chords, r densities
+    slope: Array  # a_pi of the fitted lines, shape (a, c, r)
+    intercept: Array  # b_pi of the fitted lines [N], shape (a, c, r)
+    r_squared: Array  # how well the lines fit, shape (a, c, r)
+    h_b: Array  # factor of D in b_pi = h_b D [N/m], shape (a, r)
+    k_h_of_angle: Array  # factor of rho in h_b = k_h rho, angle by angle [m/s^2], shape (a,)
+    k_h: float  # the same over all angles [m/s^2]
 
 
 def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
@@ -74,48 +64,28 @@ def _study(sampling: Sampling, vertical: Array) -> InterceptStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StretchStudy:
-    """The adjusting length d = L - D of one cable over its tension.
+    """The adjusting length d = L - D of one cable over its tension."""
 
-    Attributes:
-        cable: Material.
-        end: Where its platform end is.
-        tensions: T_x [N], shape (t,).
-        magnitude: |T| on the platform end of the unstretchable cable [N], shape (t,).
-        unstretchable: d of a cable that does not stretch [m], shape (t,).
-        stretchable: d_e of the cable [m], shape (t,).
-        relieved: d_e plus the article's elongation |T| L/EA of (36) [m], shape (t,).
-        relieved_exactly: d_e plus the true elongation, of the mean force along the cable [m], shape (t,).
-    """
-
-    cable: sl.Cable
-    end: End
-    tensions: Array
-    magnitude: Array
-    unstretchable: Array
-    stretchable: Array
-    relieved: Array
-    relieved_exactly: Array
+    cable: sl.Cable  # material
+    end: End  # where its platform end is
+    tensions: Array  # T_x [N], shape (t,)
+    magnitude: Array  # |T| on the platform end of the unstretchable cable [N], shape (t,)
+    unstretchable: Array  # d of a cable that does not stretch [m], shape (t,)
+    stretchable: Array  # d_e of the cable [m], shape (t,)
+    relieved: Array  # d_e plus the article's elongation |T| L/EA of (36) [m], shape (t,)
+    relieved_exactly: Array  # d_e plus the true elongation, of the mean force along the cable [m], shape (t,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SagStudy:
-    """The article's chain of regressions from d to k_p, for cables that do not stretch.
+    """The article's chain of regressions from d to k_p, for cables that do not stretch."""
 
-    Attributes:
-        sampling: The cables, a angles, c chords, r densities, t tensions.
-        adjusting_length: d [m], shape (a, c, r, t).
-        a_d: Factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r).
-        q_a: Factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r).
-        p_q: Factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,).
-        k_p: Factor in p_q = k_p rho^2 (45) [m^2/s^4].
-    """
-
-    sampling: Sampling
-    adjusting_length: Array
-    a_d: Array
-    q_a: Array
-    p_q: Array
-    k_p: float
+    sampling: Sampling  # the cables, a angles, c chords, r densities, t tensions
+    adjusting_length: Array  # d [m], shape (a, c, r, t)
+    a_d: Array  # factor in d = a_d/T_x^2 (41) [m N^2], shape (a, c, r)
+    q_a: Array  # factor in a_d = q_a D^3 (43) [N^2/m^2], shape (a, r)
+    p_q: Array  # factor in q_a = p_q cos^4(phi) (44) [N^2/m^2], shape (r,)
+    k_p: float  # factor in p_q = k_p rho^2 (45) [m^2/s^4]
 
     @property
     def fitted_length(self) -> Array:
@@ -201,40 +171,25 @@ def sag_study(sampling: Sampling) -> SagStudy:
 
 
 class Constants(NamedTuple):
-    """Constants by the regressions for one range of tensions.
+    """Constants by the regressions for one range of tensions."""
 
-    Attributes:
-        lowest: Lowest sampled T_x [N].
-        highest: Highest sampled T_x [N].
-        k_h_platform: k_h at the platform end [m/s^2].
-        k_h_frame: k_h at the frame end [m/s^2], negative.
-        k_p: [m^2/s^4].
-    """
-
-    lowest: float
-    highest: float
-    k_h_platform: float
-    k_h_frame: float
-    k_p: float
+    lowest: float  # lowest sampled T_x [N]
+    highest: float  # highest sampled T_x [N]
+    k_h_platform: float  # k_h at the platform end [m/s^2]
+    k_h_frame: float  # k_h at the frame end [m/s^2], negative
+    k_p: float  # [m^2/s^4]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstantsStudy:
-    """The constants over the range of tensions.
+    """The constants over the range of tensions."""
 
-    Attributes:
-        sampling: The cables; only their tensions change.
-        over_lowest: From each lowest tension to the same highest one.
-        over_highest: From the same lowest tension to each highest one.
-        scaled: Both ends of the article's range multiplied by 1, 2, 4, ...: the limit of taut cables.
-        published: The range in which the frame end gives the published |k_h|, and k_p comes out as published.
-    """
-
-    sampling: Sampling
-    over_lowest: tuple[Constants, ...]
-    over_highest: tuple[Constants, ...]
+    sampling: Sampling  # the cables; only their tensions change
+    over_lowest: tuple[Constants, ...]  # from each lowest tension to the same highest one
+    over_highest: tuple[Constants, ...]  # from the same lowest tension to each highest one
+    # both ends of the article's range multiplied by 1, 2, 4, ...: the limit of taut cables
     scaled: tuple[Constants, ...]
-    published: Constants
+    published: Constants  # the range in which the frame end gives the published |k_h|, and k_p comes out as published
 
 
 def constants(sampling: Sampling) -> Constants:

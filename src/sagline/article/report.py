@@ -43,19 +43,12 @@ ROBOTS = (("suspended", BLUE, -0.16), ("mixed", VERMILLION, 0.16))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArticleReport:
-    """A report that has been written.
+    """A report that has been written."""
 
-    Attributes:
-        page: The HTML file.
-        data: The JSON file of its numbers.
-        chapters: What is in it.
-        numbers: Chapter -> finding -> the numbers behind it, plain.
-    """
-
-    page: Path
-    data: Path
-    chapters: tuple[Chapter, ...]
-    numbers: dict[str, dict[str, Any]]
+    page: Path  # the HTML file
+    data: Path  # the JSON file of its numbers
+    chapters: tuple[Chapter, ...]  # what is in it
+    numbers: dict[str, dict[str, Any]]  # chapter -> finding -> the numbers behind it, plain
 
 
 def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
@@ -81,21 +74,13 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
 
 
 class Part(NamedTuple):
-    """A chapter that can be asked for.
+    """A chapter that can be asked for."""
 
-    Attributes:
-        key: Its name.
-        figures: The article's figures that it redoes.
-        tables: The article's tables that it redoes.
-        module: Where it is built; loaded only when it is.
-        function: The function that builds it.
-    """
-
-    key: str
-    figures: tuple[int, ...]
-    tables: tuple[int, ...]
-    module: str
-    function: str
+    key: str  # its name
+    figures: tuple[int, ...]  # the article's figures that it redoes
+    tables: tuple[int, ...]  # the article's tables that it redoes
+    module: str  # where it is built; loaded only when it is
+    function: str  # the function that builds it
 
     def build(self) -> Chapter:
         """Do the studies and draw."""
@@ -119,17 +104,11 @@ PARTS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Selection:
-    """Chapters, figures and tables that are requested.
+    """Chapters, figures and tables that are requested."""
 
-    Attributes:
-        whole: Keys of chapters that are wanted whole.
-        figures: Numbers of figures that are wanted.
-        tables: Numbers of tables that are wanted.
-    """
-
-    whole: frozenset[str]
-    figures: frozenset[int]
-    tables: frozenset[int]
+    whole: frozenset[str]  # keys of chapters that are wanted whole
+    figures: frozenset[int]  # numbers of figures that are wanted
+    tables: frozenset[int]  # numbers of tables that are wanted
 
     @property
     def parts(self) -> tuple[Part, ...]:

@@ -17,19 +17,12 @@ UNSTRETCHABLE = 1e20  # N: strains below the rounding of a length
 
 
 class Line(NamedTuple):
-    """Lines y = slope x + intercept fitted along the last axis.
+    """Lines y = slope x + intercept fitted along the last axis."""
 
-    Attributes:
-        slope: Shape (...).
-        intercept: Shape (...).
-        r_squared: Share of the variance of y that the line explains, shape (...).
-        deviation: Largest distance of a sample from the line, in the unit of y, shape (...).
-    """
-
-    slope: Array
-    intercept: Array
-    r_squared: Array
-    deviation: Array
+    slope: Array  # shape (...)
+    intercept: Array  # shape (...)
+    r_squared: Array  # share of the variance of y that the line explains, shape (...)
+    deviation: Array  # largest distance of a sample from the line, in the unit of y, shape (...)
 
 
 def fit_line(x: Array, y: Array) -> Line:
@@ -57,21 +50,13 @@ def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampling:
-    """Every combination of four quantities of a cable that is held with its platform end above its frame end.
+    """Every combination of four quantities of a cable that is held with its platform end above its frame end."""
 
-    Attributes:
-        angles: Angle phi of the chord (the article's beta) [rad], shape (a,), between 0 and pi/2.
-        chords: D [m], shape (c,), > 0.
-        densities: rho [kg/m], shape (r,), > 0.
-        tensions: T_x [N], shape (t,), > 0.
-        axial_stiffness: EA of all of them [N].
-    """
-
-    angles: Array
-    chords: Array
-    densities: Array
-    tensions: Array
-    axial_stiffness: float = UNSTRETCHABLE
+    angles: Array  # angle phi of the chord (the article's beta) [rad], shape (a,), between 0 and pi/2
+    chords: Array  # D [m], shape (c,), > 0
+    densities: Array  # rho [kg/m], shape (r,), > 0
+    tensions: Array  # T_x [N], shape (t,), > 0
+    axial_stiffness: float = UNSTRETCHABLE  # EA of all of them [N]
 
     def __init__(
         self,

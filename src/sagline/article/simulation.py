@@ -20,42 +20,25 @@ ERROR_BAND = 6e-3  # m, the article's "(-6, 6) mm"
 
 
 class Figures(NamedTuple):
-    """A run in numbers, over its feasible poses.
+    """A run in numbers, over its feasible poses."""
 
-    Attributes:
-        error_max: Largest distance of the platform from where it was planned [m].
-        error_mean: Mean distance [m].
-        axis_error_max: Largest error along one axis [m].
-        tension_min: Smallest T_x [N].
-        tension_max: Largest T_x [N].
-        vertical_max: Largest |T_z| [N].
-        step_max: Largest change of T_x from one sample to the next [N].
-        slope_max: Largest |dT_x/dt| [N/s].
-        slope_jump: Largest change of dT_x/dt from one step to the next [N/s]: it stays, however small the step, where
-            a course has a corner.
-        length_min: Smallest L [m].
-        length_max: Largest L [m].
-        adjusting_min: Smallest d [m].
-        adjusting_max: Largest d [m].
-        feasible: Share of feasible poses.
-        held: Share of poses that the lengths hold in a stable equilibrium.
-    """
-
-    error_max: float
-    error_mean: float
-    axis_error_max: float
-    tension_min: float
-    tension_max: float
-    vertical_max: float
-    step_max: float
-    slope_max: float
+    error_max: float  # largest distance of the platform from where it was planned [m]
+    error_mean: float  # mean distance [m]
+    axis_error_max: float  # largest error along one axis [m]
+    tension_min: float  # smallest T_x [N]
+    tension_max: float  # largest T_x [N]
+    vertical_max: float  # largest |T_z| [N]
+    step_max: float  # largest change of T_x from one sample to the next [N]
+    slope_max: float  # largest |dT_x/dt| [N/s]
+    # largest change of dT_x/dt from one step to the next [N/s]: it stays, however small the step, where a course has a
+    # corner
     slope_jump: float
-    length_min: float
-    length_max: float
-    adjusting_min: float
-    adjusting_max: float
-    feasible: float
-    held: float
+    length_min: float  # smallest L [m]
+    length_max: float  # largest L [m]
+    adjusting_min: float  # smallest d [m]
+    adjusting_max: float  # largest d [m]
+    feasible: float  # share of feasible poses
+    held: float  # share of poses that the lengths hold in a stable equilibrium
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,21 +71,13 @@ class Simulation:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LowTension:
-    """The empirical model's position error over the lowest tension that is allowed.
+    """The empirical model's position error over the lowest tension that is allowed."""
 
-    Attributes:
-        tension_min: Lower limit of the chord tension [N], shape (k,).
-        suspended: Largest error along one axis of the first configuration [m], shape (k,).
-        mixed: The same of the second [m], shape (k,).
-        suspended_bound: With the article's bound (54) in its place, T_adj = 0, and the share of feasible poses.
-        mixed_bound: The same of the second configuration.
-    """
-
-    tension_min: Array
-    suspended: Array
-    mixed: Array
-    suspended_bound: Figures
-    mixed_bound: Figures
+    tension_min: Array  # lower limit of the chord tension [N], shape (k,)
+    suspended: Array  # largest error along one axis of the first configuration [m], shape (k,)
+    mixed: Array  # the same of the second [m], shape (k,)
+    suspended_bound: Figures  # with the article's bound (54) in its place, T_adj = 0, and the share of feasible poses
+    mixed_bound: Figures  # the same of the second configuration
 
 
 def simulate(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> Simulation:

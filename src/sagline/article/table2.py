@@ -13,19 +13,12 @@ from sagline.core.arrays import Array, locked
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table2:
-    """The article's Table 2, as printed.
+    """The article's Table 2, as printed."""
 
-    Attributes:
-        points: Names of the poses, shape (10,).
-        desired: Desired positions [m], shape (10, 3).
-        actual: Measured positions [m], shape (10, 3).
-        printed_error: Positioning errors as printed [m], shape (10,).
-    """
-
-    points: tuple[str, ...]
-    desired: Array
-    actual: Array
-    printed_error: Array
+    points: tuple[str, ...]  # names of the poses, shape (10,)
+    desired: Array  # desired positions [m], shape (10, 3)
+    actual: Array  # measured positions [m], shape (10, 3)
+    printed_error: Array  # positioning errors as printed [m], shape (10,)
 
     @property
     def error(self) -> Array:

@@ -32,73 +32,46 @@ TOUR_SPEED = 0.2  # m/s, ours: the article says "low speed"
 
 
 class Trend(NamedTuple):
-    """One parameter off by a typical error.
-
-    Attributes:
-        parameter: The parameter.
-        error: Predicted actual less desired position [m], shape (10, 3).
-        height_slope: Change of the vertical error with the height of the pose, mm per m; the measured one is negative.
-        height_correlation: Correlation of the vertical error with the height.
-    """
+    """One parameter off by a typical error."""
 
     parameter: Parameter
-    error: Array
+    error: Array  # predicted actual less desired position [m], shape (10, 3)
+    # change of the vertical error with the height of the pose, mm per m; the measured one is negative
     height_slope: float
-    height_correlation: float
+    height_correlation: float  # correlation of the vertical error with the height
 
 
 class Tour(NamedTuple):
-    """The prototype's way through the ten poses.
+    """The prototype's way through the ten poses."""
 
-    Attributes:
-        plan: Planned along it with the empirical model.
-        stops: When it passes the ten poses [s], shape (10,).
-    """
-
-    plan: sl.Plan
-    stops: Array
+    plan: sl.Plan  # planned along it with the empirical model
+    stops: Array  # when it passes the ten poses [s], shape (10,)
 
 
 class Limits(NamedTuple):
-    """Limits of ten poses near the best explanation by two parameters.
+    """Limits of ten poses near the best explanation by two parameters."""
 
-    Attributes:
-        imitated: Of what a pulley radius does to the positions, the part that a zero of the lengths and an anchor
-            height do together: length of the projection over length of the whole.
-        single_zero: Standard deviation of the zero of each cable if every cable had its own [m], shape (m,).
-    """
-
+    # of what a pulley radius does to the positions, the part that a zero of the lengths and an anchor height do
+    # together: length of the projection over length of the whole
     imitated: float
-    single_zero: Array
+    single_zero: Array  # standard deviation of the zero of each cable if every cable had its own [m], shape (m,)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TenPoses:
-    """The ten poses.
-
-    Attributes:
-        table: The article's Table 2.
-        plan: The prototype's plan for them, with the empirical model.
-        home: The plan of its home pose.
-        model_error: Error that the empirical model itself makes at the ten poses [m], shape (10, 3).
-        height_line: Line of least squares of the measured vertical error over the height of the pose.
-        trends: One parameter off at a time.
-        explanations: All explanations by one, by two and by three parameters, those that leave least first within each.
-        limits: What the poses cannot tell apart.
-        dead_meter: Predicted actual less desired position with 1 m of dead cable [m], shape (10, 3).
-        measured_rms: Root mean square of the measured errors, over all coordinates [m].
-    """
+    """The ten poses."""
 
     table: Table2
-    plan: sl.Plan
-    home: sl.Plan
-    model_error: Array
-    height_line: Line
-    trends: tuple[Trend, ...]
+    plan: sl.Plan  # the prototype's plan for them, with the empirical model
+    home: sl.Plan  # the plan of its home pose
+    model_error: Array  # error that the empirical model itself makes at the ten poses [m], shape (10, 3)
+    height_line: Line  # line of least squares of the measured vertical error over the height of the pose
+    trends: tuple[Trend, ...]  # one parameter off at a time
+    # all explanations by one, by two and by three parameters, those that leave least first within each
     explanations: tuple[tuple[Explanation, ...], ...]
-    limits: Limits
-    dead_meter: Array
-    measured_rms: float
+    limits: Limits  # what the poses cannot tell apart
+    dead_meter: Array  # predicted actual less desired position with 1 m of dead cable [m], shape (10, 3)
+    measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
     def best(self, count: int) -> Explanation:
         """The explanation by so many parameters that leaves least."""

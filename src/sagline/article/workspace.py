@@ -21,15 +21,10 @@ POINTS = 121  # along each side of a slice
 
 
 class Pair(NamedTuple):
-    """One robot's workspace with sag and without.
+    """One robot's workspace with sag and without."""
 
-    Attributes:
-        exact: On exact catenaries.
-        straight: On straight cables without weight.
-    """
-
-    exact: sl.Workspace
-    straight: sl.Workspace
+    exact: sl.Workspace  # on exact catenaries
+    straight: sl.Workspace  # on straight cables without weight
 
 
 def workspace_chapter() -> Chapter:

@@ -21,19 +21,13 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format(Content, Generic[T]):
-    """The NetCDF format of one kind of result.
+    """The NetCDF format of one kind of result."""
 
-    Attributes:
-        kind: Type of the result.
-        pack: Data set of a result.
-        unpack: Result of a data set; takes the path for messages. None for results that are only written.
-        sealed_from: First version whose files end with a digest.
-    """
-
-    kind: type[T]
-    pack: Callable[[T], Dataset]
+    kind: type[T]  # type of the result
+    pack: Callable[[T], Dataset]  # data set of a result
+    # result of a data set; takes the path for messages. None for results that are only written
     unpack: Callable[[Path, Dataset], T] | None = None
-    sealed_from: int = 1
+    sealed_from: int = 1  # first version whose files end with a digest
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
         """Write a result to a file, whole or not at all, with a digest at its end."""

@@ -112,19 +112,12 @@ PER_METER: Final = 1e3  # mm
 
 
 class _CycleField(NamedTuple):
-    """A quantity of `/cycle`, of which people need not all digits: `/record` has them.
+    """A quantity of `/cycle`, of which people need not all digits: `/record` has them."""
 
-    Attributes:
-        digits: Behind the point.
-        unit: Its unit.
-        what: What it is.
-        several: Whether it is a list.
-    """
-
-    digits: int
+    digits: int  # behind the point
     unit: str
     what: str
-    several: bool = False
+    several: bool = False  # whether it is a list
 
 
 CYCLE_FIELDS: Final = {

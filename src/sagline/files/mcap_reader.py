@@ -36,60 +36,35 @@ _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)
 
 
 class Ending(NamedTuple):
-    """End of a plan.
+    """End of a plan."""
 
-    Attributes:
-        status: Name of its `ExecutionStatus`.
-        reason: One line.
-    """
-
-    status: str
-    reason: str
+    status: str  # name of its `ExecutionStatus`
+    reason: str  # one line
 
 
 class Truth(NamedTuple):
-    """True pose of the platform at one time.
+    """True pose of the platform at one time."""
 
-    Attributes:
-        stamp: When, on the log's own clock [ns].
-        time: On the twin's [s].
-        position: [m], 3.
-        quaternion: Scalar last, 4.
-    """
-
-    stamp: int
-    time: float
-    position: list[float]
-    quaternion: list[float]
+    stamp: int  # when, on the log's own clock [ns]
+    time: float  # on the twin's [s]
+    position: list[float]  # [m], 3
+    quaternion: list[float]  # scalar last, 4
 
 
 @dataclass(slots=True)
 class Log:
-    """Content of a log as far as it has been read.
+    """Content of a log as far as it has been read."""
 
-    Attributes:
-        path: The file.
-        robot: The robot; None until it has been read.
-        period: Of a cycle [s].
-        plans: The plans, packed.
-        endings: How they ended, by their numbers; -1 for what had none.
-        blocks: Columns of cycles, chunk by chunk.
-        events: What happened.
-        truth: Where the platform really was, in the log of a twin.
-        epoch: Of the log's own clock [ns].
-        complete: Whether the log has its end.
-    """
-
-    path: Path
-    robot: Robot | None = None
-    period: float = 0.0
-    plans: list[bytes] = field(default_factory=list)
-    endings: dict[int, Ending] = field(default_factory=dict)
-    blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    truth: list[Truth] = field(default_factory=list)
-    epoch: int = 0
-    complete: bool = False
+    path: Path  # the file
+    robot: Robot | None = None  # the robot; None until it has been read
+    period: float = 0.0  # of a cycle [s]
+    plans: list[bytes] = field(default_factory=list)  # the plans, packed
+    endings: dict[int, Ending] = field(default_factory=dict)  # how they ended, by their numbers; -1 for what had none
+    blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, chunk by chunk
+    events: list[Event] = field(default_factory=list)  # what happened
+    truth: list[Truth] = field(default_factory=list)  # where the platform really was, in the log of a twin
+    epoch: int = 0  # of the log's own clock [ns]
+    complete: bool = False  # whether the log has its end
 
 
 class LogReader:

@@ -19,27 +19,17 @@ UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
 
 class Lengths(NamedTuple):
-    """N samples of the unstrained lengths of m cables.
+    """N samples of the unstrained lengths of m cables."""
 
-    Attributes:
-        time: [s], shape (N,); None where the file has none.
-        unstrained_length: [m], shape (N, m).
-    """
-
-    time: Array | None
-    unstrained_length: Array
+    time: Array | None  # [s], shape (N,); None where the file has none
+    unstrained_length: Array  # [m], shape (N, m)
 
 
 class Counts(NamedTuple):
-    """N samples of the counts of m encoders.
+    """N samples of the counts of m encoders."""
 
-    Attributes:
-        time: [s], shape (N,); None where the file has none.
-        counts: Shape (N, m).
-    """
-
-    time: Array | None
-    counts: Array
+    time: Array | None  # [s], shape (N,); None where the file has none
+    counts: Array  # shape (N, m)
 
 
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> Lengths:
@@ -94,19 +84,12 @@ def _samples(table: Table, names: list[str]) -> tuple[Array | None, Array]:
 
 
 class Measurements(NamedTuple):
-    """n measurements of a cable.
+    """n measurements of a cable."""
 
-    Attributes:
-        span: Horizontal distance of the ends [m], shape (n,).
-        rise: Height of the platform end above the frame end [m], shape (n,).
-        unstrained_length: As an encoder counts it [m], shape (n,).
-        tension: [N], shape (n,).
-    """
-
-    span: Array
-    rise: Array
-    unstrained_length: Array
-    tension: Array
+    span: Array  # horizontal distance of the ends [m], shape (n,)
+    rise: Array  # height of the platform end above the frame end [m], shape (n,)
+    unstrained_length: Array  # as an encoder counts it [m], shape (n,)
+    tension: Array  # [N], shape (n,)
 
 
 def load_measurements(file: os.PathLike[str] | str) -> Measurements:

@@ -77,23 +77,14 @@ def _line(handle: BinaryIO, size: int) -> bytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """One kind of content, in a reader's words.
+    """One kind of content, in a reader's words."""
 
-    Attributes:
-        name: What it is called: "plan".
-        made: What a file of it is: "run of sagline track".
-        give: Which file to give: "Give the .nc file that sagline track wrote."
-        again: What to do about a damaged file.
-        key: The attribute that has its format.
-        version: Newest version of the format; raised whenever an older sagline could misread the file.
-    """
-
-    name: str
-    made: str
-    give: str
-    again: str
-    key: str
-    version: int
+    name: str  # what it is called: "plan"
+    made: str  # what a file of it is: "run of sagline track"
+    give: str  # which file to give: "Give the .nc file that sagline track wrote."
+    again: str  # what to do about a damaged file
+    key: str  # the attribute that has its format
+    version: int  # newest version of the format; raised whenever an older sagline could misread the file
 
     def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
         """Version of the format of a file; FileError if it is of other content or of a newer version."""

@@ -32,21 +32,13 @@ _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 
 @dataclass(frozen=True, slots=True)
 class _Column:
-    """Head of a packed column.
+    """Head of a packed column."""
 
-    Attributes:
-        name: What it is called.
-        type: Of its numbers.
-        shape: Its own.
-        decimals: How many its numbers have at most; -1: the bits of its floats are kept, or it is whole.
-        order: Of the differences.
-    """
-
-    name: str
-    type: str
-    shape: tuple[int, ...]
-    decimals: int
-    order: int
+    name: str  # what it is called
+    type: str  # of its numbers
+    shape: tuple[int, ...]  # its own
+    decimals: int  # how many its numbers have at most; -1: the bits of its floats are kept, or it is whole
+    order: int  # of the differences
 
 
 def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:

@@ -32,21 +32,13 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """Columns of numbers in SI.
+    """Columns of numbers in SI."""
 
-    Attributes:
-        path: The file, for messages.
-        columns: Name and numbers of each column, shape (rows,).
-        lines: Line of each row in the file, from 1.
-        header: Line of the columns' names.
-        plain: The columns whose unit is the SI unit because the header gives none.
-    """
-
-    path: FilePath
-    columns: dict[str, Array]
-    lines: array[int]
-    header: int
-    plain: frozenset[str]
+    path: FilePath  # the file, for messages
+    columns: dict[str, Array]  # name and numbers of each column, shape (rows,)
+    lines: array[int]  # line of each row in the file, from 1
+    header: int  # line of the columns' names
+    plain: frozenset[str]  # the columns whose unit is the SI unit because the header gives none
 
     @classmethod
     def read(

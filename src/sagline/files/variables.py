@@ -41,30 +41,19 @@ EVERYWHERE, SOLVED, SOMEWHERE = Known
 
 
 class Quantity(NamedTuple):
-    """One variable of a file, and the range of its values.
+    """One variable of a file, and the range of its values."""
 
-    Attributes:
-        name: Name in the file.
-        parts: Dimensions after those of the rows: poses, or samples in time.
-        unit: Unit as the file states it; "" for a plain number.
-        long_name: Description, in a reader's words.
-        source: Dotted attribute of the result that holds the values; "" for that of the same name.
-        known: Poses at which it has values; a whole number of a record that is known SOMEWHERE is `NONE` elsewhere.
-        low: Lowest value.
-        infinite: Whether it may be infinite.
-        codes: Status type of the codes it holds, if any.
-        values: Type of the values where they are no codes: float, int, bool or str.
-    """
-
-    name: str
-    parts: tuple[str, ...]
-    unit: str
-    long_name: str
-    source: str = ""
+    name: str  # name in the file
+    parts: tuple[str, ...]  # dimensions after those of the rows: poses, or samples in time
+    unit: str  # unit as the file states it; "" for a plain number
+    long_name: str  # description, in a reader's words
+    source: str = ""  # dotted attribute of the result that holds the values; "" for that of the same name
+    # poses at which it has values; a whole number of a record that is known SOMEWHERE is `NONE` elsewhere
     known: Known = EVERYWHERE
-    low: float = -np.inf
-    infinite: bool = False
-    codes: type[IntEnum] | None = None
+    low: float = -np.inf  # lowest value
+    infinite: bool = False  # whether it may be infinite
+    codes: type[IntEnum] | None = None  # status type of the codes it holds, if any
+    # type of the values where they are no codes: float, int, bool or str
     values: type[float | int | bool | str] = float
 
     @property

@@ -27,17 +27,11 @@ from sagline.kernels.dynamics.progress import COUNTERS, FAILED
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedPlatform:
-    """The rigid body of a platform with masses at its cables' ends; both have principal axes of their own.
+    """The rigid body of a platform with masses at its cables' ends; both have principal axes of their own."""
 
-    Attributes:
-        inertia: Mass and principal moments of the whole, infinite where it does not turn, (4,).
-        center: Of its mass, from that of the platform's, the platform's principal axes [m], (3,).
-        axes: Its principal axes in those of the platform, one a column, (3, 3).
-    """
-
-    inertia: Array
-    center: Array
-    axes: Array
+    inertia: Array  # mass and principal moments of the whole, infinite where it does not turn, (4,)
+    center: Array  # of its mass, from that of the platform's, the platform's principal axes [m], (3,)
+    axes: Array  # its principal axes in those of the platform, one a column, (3, 3)
 
     @classmethod
     def of(cls, inertia: Array, masses: Array, ends: Array) -> LoadedPlatform:

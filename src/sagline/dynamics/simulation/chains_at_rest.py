@@ -20,34 +20,22 @@ LONGEST_STEP = 0.2  # of a force: a longer one is shortened, which keeps far sta
 
 
 class _ChainsAtRest(NamedTuple):
-    """Chains in equilibrium with a platform.
+    """Chains in equilibrium with a platform."""
 
-    Attributes:
-        pose: Of the platform.
-        place: Of the nodes, world axes, from the platform's end to the exit [m], shape (m, 3, nodes + 1).
-        force: On the platform ends of the cables, half an element's weight included [N], shape (m, 3); the platform
-            feels the opposite.
-    """
-
-    pose: Pose
-    place: Array
+    pose: Pose  # of the platform
+    place: Array  # of the nodes, world axes, from the platform's end to the exit [m], shape (m, 3, nodes + 1)
+    # on the platform ends of the cables, half an element's weight included [N], shape (m, 3); the platform feels the
+    # opposite
     force: Array
 
 
 class _LumpedCables(NamedTuple):
-    """Cables divided into elements.
+    """Cables divided into elements."""
 
-    Attributes:
-        element: Unstrained length of the elements [m], shape (m,).
-        weight: Of a length [N/m], shape (m,).
-        stiffness: EA [N], shape (m,).
-        nodes: Elements a cable.
-    """
-
-    element: Array
-    weight: Array
-    stiffness: Array
-    nodes: int
+    element: Array  # unstrained length of the elements [m], shape (m,)
+    weight: Array  # of a length [N/m], shape (m,)
+    stiffness: Array  # EA [N], shape (m,)
+    nodes: int  # elements a cable
 
     def elements(self, force: Array) -> tuple[Array, Array]:
         """Forces of the elements from the platform on, those of the cable at their middles, and their sizes.

@@ -31,19 +31,12 @@ TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and a
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTable:
-    """n numbers in time: a cubic between two instants, by values and rates at both; held before and after.
+    """n numbers in time: a cubic between two instants, by values and rates at both; held before and after."""
 
-    Attributes:
-        time: Instants [s], shape (K,), increasing.
-        value: Shape (K, n).
-        begin: Rates where each interval begins, shape (K - 1, n).
-        end: Rates where each ends, shape (K - 1, n).
-    """
-
-    time: Array
-    value: Array
-    begin: Array
-    end: Array
+    time: Array  # instants [s], shape (K,), increasing
+    value: Array  # shape (K, n)
+    begin: Array  # rates where each interval begins, shape (K - 1, n)
+    end: Array  # rates where each ends, shape (K - 1, n)
 
     @classmethod
     def constant(cls, value: Array) -> TimeTable:
@@ -158,33 +151,19 @@ ROUNDING = 1e-12  # of the largest force and moment: less is none
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InitialConditions:
-    """A robot at the first instant, and what is given to it from then on.
-
-    Attributes:
-        robot: The robot.
-        model: Cable model.
-        state: State at the start, a single one.
-        poses: Poses on the way, a batch.
-        twist: Velocity of the platform's origin and angular velocity at the start, world axes, (6,).
-        rate: dL/dt at the start [m/s], (m,): of a plan its own, else none.
-        lengths: Set points of the unstrained lengths [m].
-        tensions: Expected at the drums [N], at the same instants.
-        wrench: Given on the platform.
-        begin: First time [s].
-        end: Last time of what is given [s].
-    """
+    """A robot at the first instant, and what is given to it from then on."""
 
     robot: Robot
-    model: CableModel
-    state: Equilibrium
-    poses: Pose
-    twist: Array
-    rate: Array
-    lengths: TimeTable
-    tensions: TimeTable
-    wrench: TimeTable
-    begin: float
-    end: float
+    model: CableModel  # cable model
+    state: Equilibrium  # state at the start, a single one
+    poses: Pose  # poses on the way, a batch
+    twist: Array  # velocity of the platform's origin and angular velocity at the start, world axes, (6,)
+    rate: Array  # dL/dt at the start [m/s], (m,): of a plan its own, else none
+    lengths: TimeTable  # set points of the unstrained lengths [m]
+    tensions: TimeTable  # expected at the drums [N], at the same instants
+    wrench: TimeTable  # given on the platform
+    begin: float  # first time [s]
+    end: float  # last time of what is given [s]
 
 
 def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> InitialConditions:

@@ -30,21 +30,13 @@ SMALL: Final = 0.02  # of its length: what a cable may be let out
 
 
 class _ModalModel(NamedTuple):
-    """Response of the modes of a state to changes u = (dL, dw) of lengths and wrench, (m + 6,).
+    """Response of the modes of a state to changes u = (dL, dw) of lengths and wrench, (m + 6,)."""
 
-    Attributes:
-        found: The modes.
-        drive: Of u on every mode, (K, m + 6).
-        motion: Motion of the platform by u beyond what the modes have at rest, (6, m + 6).
-        pulled: Tensions at the frame ends by every mode, (m, K) [N/(m sqrt(kg))].
-        tension: Tensions by u beyond those of the modes at rest, (m, m + 6).
-    """
-
-    found: Vibration
-    drive: Array
-    motion: Array
-    pulled: Array
-    tension: Array
+    found: Vibration  # the modes
+    drive: Array  # of u on every mode, (K, m + 6)
+    motion: Array  # motion of the platform by u beyond what the modes have at rest, (6, m + 6)
+    pulled: Array  # tensions at the frame ends by every mode, (m, K) [N/(m sqrt(kg))]
+    tension: Array  # tensions by u beyond those of the modes at rest, (m, m + 6)
 
 
 class _ModalMotion(NamedTuple):

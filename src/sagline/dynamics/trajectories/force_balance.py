@@ -23,15 +23,10 @@ _WIDER: Final = (1.0, 0.03)  # N: limits that a pose on their border is solved w
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HalfPlanes:
-    """Half planes at K places: rates @ (acceleration, square of the speed) <= bound, row by row.
+    """Half planes at K places: rates @ (acceleration, square of the speed) <= bound, row by row."""
 
-    Attributes:
-        rates: Shape (K, R, 2).
-        bound: Shape (K, R); infinite where a row says nothing.
-    """
-
-    rates: Array
-    bound: Array
+    rates: Array  # shape (K, R, 2)
+    bound: Array  # shape (K, R); infinite where a row says nothing
 
     def joined(self, other: HalfPlanes) -> HalfPlanes:
         """Half planes of both."""
@@ -44,26 +39,16 @@ class ForceBalance:
 
     J tau = needed - u w_u - x w_x, u the acceleration and x the square of the speed along the curve's parameter. What
     the cables pull beside their chords is that of the tensions last found: it is exact there, and hardly changes.
-
-    Attributes:
-        robot: The robot; its limits are those to keep.
-        jet: The places.
-        wrenches: w_u and w_x: inertial wrenches for u = 1 and for x = 1, shape (2, K, 6).
-        normals: Directions of wrenches that may bound what cables can give, shape (K, R, n).
-        gains: What a unit of each tension gives along them, shape (K, R, m), at most 1.
-        standing: The needed wrench where u = x = 0, in free motions, shape (K, n).
-        low: Lower limits of the chord tensions [N], shape (K, m).
-        high: Upper limits [N], shape (K, m).
     """
 
-    robot: Robot
-    jet: Jet
-    wrenches: Array
-    normals: Array
-    gains: Array
-    standing: Array
-    low: Array
-    high: Array
+    robot: Robot  # the robot; its limits are those to keep
+    jet: Jet  # the places
+    wrenches: Array  # w_u and w_x: inertial wrenches for u = 1 and for x = 1, shape (2, K, 6)
+    normals: Array  # directions of wrenches that may bound what cables can give, shape (K, R, n)
+    gains: Array  # what a unit of each tension gives along them, shape (K, R, m), at most 1
+    standing: Array  # the needed wrench where u = x = 0, in free motions, shape (K, n)
+    low: Array  # lower limits of the chord tensions [N], shape (K, m)
+    high: Array  # upper limits [N], shape (K, m)
 
     @classmethod
     def at(cls, robot: Robot, jet: Jet, plan: Plan) -> ForceBalance:
@@ -148,17 +133,11 @@ _FLAT = 1e-12  # of the largest: rates that are none
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Profile:
-    """Constant acceleration of the parameter from place to place.
+    """Constant acceleration of the parameter from place to place."""
 
-    Attributes:
-        place: Parameters, shape (K,).
-        square: Squares of the speed there, shape (K,).
-        time: When they are passed [s], shape (K,).
-    """
-
-    place: Array
-    square: Array
-    time: Array
+    place: Array  # parameters, shape (K,)
+    square: Array  # squares of the speed there, shape (K,)
+    time: Array  # when they are passed [s], shape (K,)
 
     @classmethod
     def of(cls, place: Array, square: Array) -> Profile:

@@ -26,15 +26,10 @@ _SIDES: Final = 32  # directions in which a polygon's border is looked for
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JerkProfile:
-    """Constant jerk of the parameter in equal pieces of the time.
+    """Constant jerk of the parameter in equal pieces of the time."""
 
-    Attributes:
-        jerk: Third derivative of the parameter by the share of the time, shape (P,).
-        duration: The time [s].
-    """
-
-    jerk: Array
-    duration: float
+    jerk: Array  # third derivative of the parameter by the share of the time, shape (P,)
+    duration: float  # the time [s]
 
     def at(self, time: Array) -> Array:
         """Parameter and its first three derivatives by time, shape (4, N)."""

@@ -22,15 +22,10 @@ _NARROW: Final = 0.2  # of the mean step: knots of a spline are no nearer, as wh
 
 
 class Jet(NamedTuple):
-    """Poses of a curve, and how they change with its parameter.
+    """Poses of a curve, and how they change with its parameter."""
 
-    Attributes:
-        pose: Poses, a batch of N.
-        rates: Twist for a parameter that grows by 1 a second, and its first two derivatives by the parameter, shape
-            (3, N, 6).
-    """
-
-    pose: Pose
+    pose: Pose  # poses, a batch of N
+    # twist for a parameter that grows by 1 a second, and its first two derivatives by the parameter, shape (3, N, 6)
     rates: Array
 
     def twists(self, motion: Array) -> Array:
@@ -52,13 +47,9 @@ class Curve(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LineCurve:
-    """A straight way with a turn about a fixed axis; its parameter is the share of both that is done.
+    """A straight way with a turn about a fixed axis; its parameter is the share of both that is done."""
 
-    Attributes:
-        ends: The one segment that it is.
-    """
-
-    ends: Segments
+    ends: Segments  # the one segment that it is
 
     @classmethod
     def between(cls, pose: Pose) -> _LineCurve:
@@ -100,15 +91,10 @@ class _LineCurve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SplineCurve:
-    """A curve through samples, by splines of 5th degree in position and quaternion over its own length.
+    """A curve through samples, by splines of 5th degree in position and quaternion over its own length."""
 
-    Attributes:
-        position: Spline of the position.
-        quaternion: Spline of a quaternion that need not be of unit length.
-    """
-
-    position: Any
-    quaternion: Any
+    position: Any  # spline of the position
+    quaternion: Any  # spline of a quaternion that need not be of unit length
 
     @classmethod
     def through(cls, pose: Pose, parameter: Array) -> SplineCurve:
@@ -209,21 +195,13 @@ _SAME_TIME: Final = 1e-9  # of the path's duration
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestToRestSegment:
-    """A motion from rest to rest.
+    """A motion from rest to rest."""
 
-    Attributes:
-        begin: When it begins [s].
-        end: When it ends [s].
-        curve: Where it leads; None where the platform stands all the time.
-        progress: Parameter of the curve over the time since the begin: scipy's PPoly; None likewise.
-        sample: Index of its first sample.
-    """
-
-    begin: float
-    end: float
-    curve: Curve | None
-    progress: Any
-    sample: int
+    begin: float  # when it begins [s]
+    end: float  # when it ends [s]
+    curve: Curve | None  # where it leads; None where the platform stands all the time
+    progress: Any  # parameter of the curve over the time since the begin: scipy's PPoly; None likewise
+    sample: int  # index of its first sample
 
     @property
     def duration(self) -> float:

@@ -127,18 +127,12 @@ class Motions(NamedTuple):
     """Motions of the taut cables in one plane, k of each.
 
     Displacements of a cable's u unknowns are times the roots of their masses.
-
-    Attributes:
-        rest: Of the nodes with the platform end displaced at rest, shape (t, u, d).
-        square: Angular frequencies squared, ascending [1/s^2], shape (t, k).
-        shape: Of the nodes, shape (t, u, k).
-        drive: By the platform end, shape (t, k, d).
     """
 
-    rest: Array
-    square: Array
-    shape: Array
-    drive: Array
+    rest: Array  # of the nodes with the platform end displaced at rest, shape (t, u, d)
+    square: Array  # angular frequencies squared, ascending [1/s^2], shape (t, k)
+    shape: Array  # of the nodes, shape (t, u, k)
+    drive: Array  # by the platform end, shape (t, k, d)
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> Components:

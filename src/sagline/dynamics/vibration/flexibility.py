@@ -16,43 +16,25 @@ _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 
 
 class Flexibility(NamedTuple):
-    """Derivatives of the flexibility of every cable, a symmetric matrix [m/N], in world axes.
+    """Derivatives of the flexibility of every cable, a symmetric matrix [m/N], in world axes."""
 
-    Attributes:
-        by_force: By the force on the platform end, symmetric in all three axes [m/N^2], shape (..., m, 3, 3, 3).
-        by_length: By the unstrained length, which enters at the frame end [1/N], shape (..., m, 3, 3).
-        by_density: By the linear density [m^2/(N kg)], shape (..., m, 3, 3).
-        by_stiffness: By the axial stiffness [m/N^2], shape (..., m, 3, 3).
-        stretch: Integral of t t^T/EA ds, t the tangent: the part that is stretch [m/N], shape (..., m, 3, 3).
-    """
-
-    by_force: Array
-    by_length: Array
-    by_density: Array
-    by_stiffness: Array
-    stretch: Array
+    by_force: Array  # by the force on the platform end, symmetric in all three axes [m/N^2], shape (..., m, 3, 3, 3)
+    by_length: Array  # by the unstrained length, which enters at the frame end [1/N], shape (..., m, 3, 3)
+    by_density: Array  # by the linear density [m^2/(N kg)], shape (..., m, 3, 3)
+    by_stiffness: Array  # by the axial stiffness [m/N^2], shape (..., m, 3, 3)
+    stretch: Array  # integral of t t^T/EA ds, t the tangent: the part that is stretch [m/N], shape (..., m, 3, 3)
 
 
 class _CatenaryState(NamedTuple):
-    """Cables in their planes, fields of shape (..., m).
+    """Cables in their planes, fields of shape (..., m)."""
 
-    Attributes:
-        h: Horizontal force [N].
-        a: Vertical force at the frame end [N].
-        b: Vertical force at the platform end [N].
-        size_a: Tension at the frame end [N].
-        size_b: Tension at the platform end [N].
-        weight: A length [N/m].
-        length: [m].
-    """
-
-    h: Array
-    a: Array
-    b: Array
-    size_a: Array
-    size_b: Array
-    weight: Array
-    length: Array
+    h: Array  # horizontal force [N]
+    a: Array  # vertical force at the frame end [N]
+    b: Array  # vertical force at the platform end [N]
+    size_a: Array  # tension at the frame end [N]
+    size_b: Array  # tension at the platform end [N]
+    weight: Array  # a length [N/m]
+    length: Array  # [m]
 
     @property
     def product(self) -> Array:

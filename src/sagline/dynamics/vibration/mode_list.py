@@ -96,25 +96,15 @@ WITH_MASS, MASSLESS = "with cable mass", "massless"
 
 
 class ListedMode(NamedTuple):
-    """One mode.
+    """One mode."""
 
-    Attributes:
-        number: From 1 on, among those of its kind.
-        kind: "with cable mass" or "massless".
-        frequency: [Hz].
-        platform_share: Share of the kinetic energy that is the platform's.
-        cable: The cable that has the largest share; None where no cable has any.
-        cable_share: Its share.
-        loss: Damping ratio.
-    """
-
-    number: int
-    kind: str
-    frequency: float
-    platform_share: float
-    cable: int | None
-    cable_share: float
-    loss: float
+    number: int  # from 1 on, among those of its kind
+    kind: str  # "with cable mass" or "massless"
+    frequency: float  # [Hz]
+    platform_share: float  # share of the kinetic energy that is the platform's
+    cable: int | None  # the cable that has the largest share; None where no cable has any
+    cable_share: float  # its share
+    loss: float  # damping ratio
 
     @property
     def name(self) -> str:

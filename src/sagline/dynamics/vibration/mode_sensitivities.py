@@ -15,59 +15,34 @@ from sagline.statics.stiffness import mass_matrix, stiffness
 
 
 class StateSlopes(NamedTuple):
-    """A state, and how it settles.
+    """A state, and how it settles."""
 
-    Attributes:
-        state: The state, a single one.
-        slopes: Of its cables.
-        by_datum: Force on the platform ends by length, linear density and axial stiffness, shape (3, m, 3).
-        settling: Motion by each of the same, shape (3, 6, m).
-        compliance: Shape (6, 6).
-        mass: Of the platform, shape (6, 6).
-    """
-
-    state: Equilibrium
-    slopes: CableSlopes
-    by_datum: Array
-    settling: Array
-    compliance: Array
-    mass: Array
+    state: Equilibrium  # the state, a single one
+    slopes: CableSlopes  # of its cables
+    by_datum: Array  # force on the platform ends by length, linear density and axial stiffness, shape (3, m, 3)
+    settling: Array  # motion by each of the same, shape (3, 6, m)
+    compliance: Array  # shape (6, 6)
+    mass: Array  # of the platform, shape (6, 6)
 
 
 class ModeGroup(NamedTuple):
-    """Some modes of one frequency, g of them: the forms of what cables change by, for each two of them.
+    """Some modes of one frequency, g of them: the forms of what cables change by, for each two of them."""
 
-    Attributes:
-        motion: Of the platform, unit modal mass, shape (6, g).
-        square: Of the angular frequency [1/s^2].
-        end_force: Of the cables on their platform ends, shape (m, g, 3).
-        by_force: Integral of f^T dC f by the force at rest on the platform end, shape (m, g, g, 3).
-        by_datum: The same by length, linear density (with that of mu u^2) and axial stiffness, shape (3, m, g, g).
-    """
-
-    motion: Array
-    square: float
-    end_force: Array
-    by_force: Array
-    by_datum: Array
+    motion: Array  # of the platform, unit modal mass, shape (6, g)
+    square: float  # of the angular frequency [1/s^2]
+    end_force: Array  # of the cables on their platform ends, shape (m, g, 3)
+    by_force: Array  # integral of f^T dC f by the force at rest on the platform end, shape (m, g, g, 3)
+    by_datum: Array  # the same by length, linear density (with that of mu u^2) and axial stiffness, shape (3, m, g, g)
 
 
 class SquareDerivatives(NamedTuple):
-    """Forms whose eigenvalues are derivatives of the square of the frequency, each (..., g, g).
+    """Forms whose eigenvalues are derivatives of the square of the frequency, each (..., g, g)."""
 
-    Attributes:
-        datum: By length, linear density and axial stiffness of each cable, shape (3, m, g, g).
-        pose: By motions at fixed lengths, shape (6, g, g).
-        wrench: Shape (6, g, g).
-        mass: Shape (g, g).
-        inertia: Shape (3, 3, g, g).
-    """
-
-    datum: Array
-    pose: Array
-    wrench: Array
-    mass: Array
-    inertia: Array
+    datum: Array  # by length, linear density and axial stiffness of each cable, shape (3, m, g, g)
+    pose: Array  # by motions at fixed lengths, shape (6, g, g)
+    wrench: Array  # shape (6, g, g)
+    mass: Array  # shape (g, g)
+    inertia: Array  # shape (3, 3, g, g)
 
 
 def state_slopes(state: Equilibrium) -> StateSlopes:
@@ -156,23 +131,14 @@ class Cable(NamedTuple):
 
 
 class _Waves(NamedTuple):
-    """Displacement and force along a cable for each component of the force on its frame end.
+    """Displacement and force along a cable for each component of the force on its frame end."""
 
-    Attributes:
-        force: In the cable at rest, shape (P, 3) [N].
-        below: Length from the point to the platform end, shape (P,) [m].
-        share: Of the length, shape (P,) [m].
-        moved: Displacement, one component of the force a column, shape (P, 3, 3).
-        pulled: Change of the force, shape (P, 3, 3).
-        end: Both at the platform end, shape (2, 3, 3).
-    """
-
-    force: Array
-    below: Array
-    share: Array
-    moved: Array
-    pulled: Array
-    end: Array
+    force: Array  # in the cable at rest, shape (P, 3) [N]
+    below: Array  # length from the point to the platform end, shape (P,) [m]
+    share: Array  # of the length, shape (P,) [m]
+    moved: Array  # displacement, one component of the force a column, shape (P, 3, 3)
+    pulled: Array  # change of the force, shape (P, 3, 3)
+    end: Array  # both at the platform end, shape (2, 3, 3)
 
 
 def string_data(rest: StateSlopes) -> tuple[Cable, ...]:

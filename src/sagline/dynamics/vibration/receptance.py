@@ -23,19 +23,12 @@ FixedEndModes: TypeAlias = tuple[Components, Array | None]  # of one state; loss
 
 
 class Receptance(NamedTuple):
-    """Receptance of the platform.
+    """Receptance of the platform."""
 
-    Attributes:
-        model: Of one state, with a leading axis 1.
-        matrix: Stiffness of the platform, not symmetric where a moment is given, shape (6, 6).
-        cables: That of the cables' platform ends, shape (m, 3, 3).
-        damping: What takes energy out.
-    """
-
-    model: VibrationModel
-    matrix: Array
-    cables: Array
-    damping: Damping
+    model: VibrationModel  # of one state, with a leading axis 1
+    matrix: Array  # stiffness of the platform, not symmetric where a moment is given, shape (6, 6)
+    cables: Array  # that of the cables' platform ends, shape (m, 3, 3)
+    damping: Damping  # what takes energy out
 
     def fixed_end_modes(self, up_to: float) -> FixedEndModes:
         """Fixed-end modes of the cables.

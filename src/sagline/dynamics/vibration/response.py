@@ -116,21 +116,13 @@ BELOW = 6.0  # lowest frequency of a mode over that at which the curves begin
 
 
 class ResponseCurves(NamedTuple):
-    """Two answers to the same force.
+    """Two answers to the same force."""
 
-    Attributes:
-        frequency: [Hz], ascending, shape (F,).
-        with_mass: Amplitude of the motion over that of the force, cables with mass, in `unit`, shape (F,).
-        massless: The same on cables whose mass does not swing, shape (F,).
-        static: The same at rest.
-        unit: Of all of them.
-    """
-
-    frequency: Array
-    with_mass: Array
-    massless: Array
-    static: float
-    unit: str
+    frequency: Array  # [Hz], ascending, shape (F,)
+    with_mass: Array  # amplitude of the motion over that of the force, cables with mass, in `unit`, shape (F,)
+    massless: Array  # the same on cables whose mass does not swing, shape (F,)
+    static: float  # the same at rest
+    unit: str  # of all of them
 
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:

@@ -26,21 +26,13 @@ _TINY = 1e-300
 
 
 class VibrationModel(NamedTuple):
-    """Stiffness, mass and cables of N states, for their vibrations.
+    """Stiffness, mass and cables of N states, for their vibrations."""
 
-    Attributes:
-        strings: Their cables.
-        ends: Of each cable, what takes a motion of the platform to that of the platform end, shape (N, m, 3, 6).
-        stiffness: Of the platform, symmetric, shape (N, 6, 6).
-        mass: Of the platform, shape (N, 6, 6).
-        freedom: Rows that pick the free motions, shape (n, 6).
-    """
-
-    strings: Strings
-    ends: Array
-    stiffness: Array
-    mass: Array
-    freedom: Array
+    strings: Strings  # their cables
+    ends: Array  # of each cable, what takes a motion of the platform to that of the platform end, shape (N, m, 3, 6)
+    stiffness: Array  # of the platform, symmetric, shape (N, 6, 6)
+    mass: Array  # of the platform, shape (N, 6, 6)
+    freedom: Array  # rows that pick the free motions, shape (n, 6)
 
     def at(self, row: int) -> VibrationModel:
         """One of them, with a leading axis 1."""
@@ -50,23 +42,14 @@ class VibrationModel(NamedTuple):
 
 
 class _ReducedModel(NamedTuple):
-    """The eigenproblem of one state.
+    """The eigenproblem of one state."""
 
-    Attributes:
-        matrix: Symmetric, shape (n + k, n + k): first the platform, then motions of the cables [1/s^2].
-        platform: Its first unknowns to motions of the platform, shape (6, n).
-        driven: The same to what the motions are driven by, shape (k, n).
-        kept: Which components of the cables are motions by themselves, the first of the k, shape (T,).
-        beyond: The others by the last of the k, shape (T - those, b).
-        components: Of the cables.
-    """
-
-    matrix: Array
-    platform: Array
-    driven: Array
-    kept: Flags
-    beyond: Array
-    components: Components
+    matrix: Array  # symmetric, shape (n + k, n + k): first the platform, then motions of the cables [1/s^2]
+    platform: Array  # its first unknowns to motions of the platform, shape (6, n)
+    driven: Array  # the same to what the motions are driven by, shape (k, n)
+    kept: Flags  # which components of the cables are motions by themselves, the first of the k, shape (T,)
+    beyond: Array  # the others by the last of the k, shape (T - those, b)
+    components: Components  # of the cables
 
     def amplitudes(self, vectors: Array) -> Array:
         """Amplitudes of the components beside their motion at rest.
@@ -194,23 +177,14 @@ BORDER: Final = 1e-6  # of a frequency, within which the count says on which sid
 
 @dataclass(frozen=True, eq=False)
 class StateModes:
-    """Modes of one state below a frequency.
+    """Modes of one state below a frequency."""
 
-    Attributes:
-        frequency: [Hz], shape (K,).
-        platform: Motion of the platform, shape (6, K).
-        ends: Displacements of the platform ends, shape (m, 3, K).
-        number: How many, by the exact count.
-        problem: Whose solutions they are.
-        vectors: Solutions of the problem, shape (n + k, K).
-    """
-
-    frequency: Array
-    platform: Array
-    ends: Array
-    number: int
-    problem: _ReducedModel
-    vectors: Array
+    frequency: Array  # [Hz], shape (K,)
+    platform: Array  # motion of the platform, shape (6, K)
+    ends: Array  # displacements of the platform ends, shape (m, 3, K)
+    number: int  # how many, by the exact count
+    problem: _ReducedModel  # whose solutions they are
+    vectors: Array  # solutions of the problem, shape (n + k, K)
 
     @property
     def components(self) -> Components:
