@@ -26,7 +26,7 @@ LOWEST, HIGHEST = "P8", "P7"
 
 
 def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
-    """The best explanations, and what more parameters are worth."""
+    """The best explanations, and the value of more parameters."""
     one, two, three = (study.best(count) for count in (1, 2, 3))
     second = study.explanations[1][1]
     alone = {found.parameters[0].name: found for found in study.explanations[0]}
@@ -158,7 +158,7 @@ def _values(found: Explanation) -> str:
 
 
 def _told(found: Explanation, name: str) -> str:
-    """A value with its standard uncertainty, or that it stands at a limit."""
+    """A value with its standard uncertainty, or with a mark if it is at a limit."""
     k = [parameter.name for parameter in found.parameters].index(name)
     value, unit = found.values[k], found.parameters[k].unit
     if found.at_limit[k]:

@@ -93,7 +93,7 @@ def legend(ax: Axes, title: str = "") -> None:
 
 
 def _grow(figure: Sheet, more: float) -> None:
-    """Make room above the axes [in]; they keep their size."""
+    """Add height above the axes [in]; they keep their size."""
     before, place = figure.get_figheight(), figure.subplotpars
     after = before + more
     figure.set_figheight(after)
@@ -101,11 +101,9 @@ def _grow(figure: Sheet, more: float) -> None:
 
 
 def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
-    """A logarithmic vertical axis that ends at a floor.
-
-    Curves below it run under a shaded strip that says what is there; none is lifted onto the floor. Without any the
-    axis is an ordinary one.
-    """
+    """A logarithmic vertical axis that ends at a floor."""
+    # Curves below it run under a shaded strip that says what is there; none is lifted onto the floor. Without any the
+    # axis is an ordinary one.
     ax.set_yscale("log")
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.get_lines()])
     seen = values[np.isfinite(values)]
@@ -196,11 +194,9 @@ def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
 def draw_errors(
     ax: Axes, x: Array, y: Array, error: Array, edges: Array, ticks: tuple[float, ...], lines: tuple[float, ...]
 ) -> None:
-    """Fill a map between round errors and draw some errors as lines, interpolated between the samples.
-
-    An error with a sign is followed through zero: bands around it are as narrow as they are. What is below the first
-    edge is gray, which the color bar says.
-    """
+    """Fill a map between round errors and draw some errors as lines, interpolated between the samples."""
+    # An error with a sign is followed through zero: bands around it are as narrow as they are. What is below the first
+    # edge is gray, which the color bar says.
     colors = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.92, len(edges)))
     filled = [*colors[::-1], matplotlib.colors.to_rgba(GAP_COLOR), *colors]
     ax.contourf(x, y, error, levels=[*-edges[::-1], *edges], colors=filled, extend="both").set_rasterized(True)

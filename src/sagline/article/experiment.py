@@ -38,10 +38,10 @@ Tell = Callable[[float], None]  # share of the experiment that is over
 
 
 class Watch:
-    """Looks on: what is to be seen at a stop, and the courses between stops. A `sagline.control.Recorder`."""
+    """Observer of stops, and of the courses between them; used as a `sagline.control.Recorder`."""
 
     def __init__(self, where: Where, tell: Tell | None = None) -> None:
-        """Begin with nothing seen."""
+        """No observations yet."""
         self.stopped = ""  # nothing stops it
         self.farthest = self.misjudged = 0.0
         self.courses: list[Array] = []
@@ -53,17 +53,17 @@ class Watch:
         self._before: Array | None = None
 
     def begins(self, plan: sl.Plan) -> None:
-        """Take the plan of a leg; the first cycle still tells of the stop before it."""
+        """Take the plan of a leg; the first cycle still belongs to the stop before it."""
         self._plan, self._begun = plan, False
 
     def ends(self, status: Status, reason: str) -> None:
-        """Leave how it ended to the one who asked for it."""
+        """Ignore the end: the caller of the controller handles it."""
 
     def event(self, event: control.Event) -> None:
-        """Leave events to the controller, which keeps them."""
+        """Ignore events: the controller keeps them."""
 
     def cycle(self, cycle: control.Recorded) -> None:
-        """Look at a cycle."""
+        """Observe a cycle."""
         answer = cycle.answer
         if not isinstance(answer, control.Sample) or cycle.state not in (
             control.State.MOVING,
@@ -137,7 +137,7 @@ class Experiment:
 
 
 def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
-    """A robot that is other than it was planned, and how it was planned, both with what a twin needs."""
+    """Robot with errors, and the robot as planned, both with the data that a twin needs."""
     true, nominal = robot_with_errors(robot, errors), robot
     assert true.winches is not None
     assert robot.winches is not None
@@ -170,12 +170,7 @@ def in_process(
     loop: control.TensionSettings | None = None,
     tell: Tell | None = None,
 ) -> Experiment:
-    """Do the experiment on a twin in this process, whose clock waits for the controller.
-
-    Raises:
-        RefusedError: If the machine does not agree that it is at home, or the experiment ends on the way.
-        InvalidValueError: If the true robot lacks data, or does not rest where it should begin.
-    """
+    """Experiment on a twin in this process, whose clock waits for the controller."""
     planned = sl.load_robot(PROTOTYPE) if nominal is None else nominal
     real = with_cells(planned if true is None else true)
     twin = sl.twin.Machine(real, nominal=planned, start=level_poses(HOME), seed=seed)
@@ -184,11 +179,7 @@ def in_process(
 
 
 def experiment(controller: control.Controller, watch: Watch) -> Experiment:
-    """Do the experiment.
-
-    Raises:
-        RefusedError: If it cannot be connected or homed, or the experiment ends on the way; it says where.
-    """
+    """Run the experiment; RefusedError if it cannot be connected or homed, or ends on the way."""
     legs = _legs(controller.period)
     controller.connect()
     controller.home(level_poses(HOME))

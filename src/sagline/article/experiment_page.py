@@ -24,11 +24,7 @@ AREA = 600.0  # pt^2 of the largest error of a figure
 
 
 def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
-    """Write an HTML page that needs nothing else, and its numbers as JSON.
-
-    Raises:
-        FileError: If the folder cannot be written; then nothing has been.
-    """
+    """Write an HTML page that needs nothing else, and its numbers as JSON."""
     chapter = experiment_chapter(result, how)
     lead = (
         "Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7: home, ten points, home, with a stop at "
@@ -41,7 +37,7 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
 
 
 def experiment_chapter(result: Experiment, how: str) -> Chapter:
-    """Everything that is told of an experiment."""
+    """Chapter of an experiment."""
     draw = Drawings("experiment")
     return Chapter(
         "experiment",

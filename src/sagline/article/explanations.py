@@ -51,11 +51,7 @@ class _Tangent(NamedTuple):
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
-    """Fit models to measured positions: least squares within what is plausible, by Gauss-Newton, all at once.
-
-    Raises:
-        InvalidValueError: If a fit does not settle.
-    """
+    """Fit models to measured positions: least squares within what is plausible, by Gauss-Newton, all at once."""
     values, slopes = _start(error_of, measured, models)
     steps = [np.zeros(len(model)) for model in models]
     moving = list(range(len(models)))
@@ -122,11 +118,8 @@ def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
 
 
 def corrected_aic(rms: float, count: int, parameters: int) -> float:
-    """Akaike's information criterion, corrected for few measurements.
-
-    Source:
-        Hurvich and Tsai 1989, Biometrika 76(2), 297-307.
-    """
+    """Akaike's information criterion, corrected for few measurements."""
+    # source: Hurvich and Tsai 1989, Biometrika 76(2), 297-307
     unknown = parameters + 1
     return float(
         2.0 * count * np.log(1e3 * rms) + 2.0 * unknown + 2.0 * unknown * (unknown + 1) / (count - unknown - 1)
@@ -170,7 +163,7 @@ def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, m
 
 
 def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
-    """Standard deviations of values, from how much is left; NaN for those that are not free."""
+    """Standard deviations of values, from the residuals; NaN for those at a limit."""
     normal = slopes[:, free].T @ slopes[:, free]
     scatter = np.sum(rest**2) / (rest.size - free.sum())
     deviation = np.full(free.size, np.nan)

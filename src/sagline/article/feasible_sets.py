@@ -64,17 +64,10 @@ class _FeasibleSets:
 def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> _FeasibleSets:
-    """The article's psi and Psi, exactly.
-
-    The map from (T, L) to B is one to one at a given L, so the outline of psi is the image of the outline of the
-    tolerance, |dx| + |dz| = epsilon_max around B_d, under its inverse: no search is needed.
-
-    Raises:
-        InvalidValueError: If points is no multiple of 4.
-
-    Source:
-        Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2.
-    """
+    """The article's psi and Psi, exactly."""
+    # The map from (T, L) to B is one to one at a given L, so the outline of psi is the image of the outline of the
+    # tolerance, |dx| + |dz| = epsilon_max around B_d, under its inverse: no search is needed
+    # source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
     if points % 4:
         raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
     model, stretch = sl.Catenary(), end.chord / end.span

@@ -177,14 +177,9 @@ def identify_empirical(
 
 
 def position_error(state: CableState) -> Array:
-    """The article's (20): how far from B_d exact cables of a state's forces and lengths end, |dx| + |dz| [m].
-
-    Args:
-        state: Of any model, shape (...).
-
-    Returns:
-        Shape (...).
-    """
+    """The article's (20): how far from B_d exact cables of a state's forces and lengths end, |dx| + |dz| [m]."""
+    # state: of any model, shape (...)
+    # returns shape (...)
     shape = state.shape
     horizontal, vertical, length, weight, stiffness = (
         kernel_input(operand, shape).reshape(-1)

@@ -228,7 +228,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
 
 
 def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-    """Beyond any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
+    """Bounds beyond any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
     low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
     high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
     return [low[name] for name in names], [high[name] for name in names]

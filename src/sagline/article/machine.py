@@ -21,7 +21,7 @@ Errors: TypeAlias = Mapping[
 
 
 class Parameter(NamedTuple):
-    """Something about the prototype that may be other than Table 1 says, for all cables alike."""
+    """Parameter of the prototype that may deviate from Table 1, for all cables alike."""
 
     name: str
     unit: str  # unit in which its error is told
@@ -45,7 +45,7 @@ PARAMETERS = (
 
 
 def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
-    """The robot with some of its parameters off: what the cables hang from, what they are and what they carry."""
+    """Robot with errors of some parameters: anchors, cables, routing and load."""
     off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
     cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
     changes: dict[str, Any] = {}  # what is as planned is not made again: a fit makes a thousand robots
@@ -74,14 +74,9 @@ def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
 
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
-    """Equilibria of robots with errors, whose winches wind the lengths of a plan of the robot without.
-
-    Encoders are set while the platform rests in its home pose, held as planned: what pulleys and dead cable add to the
-    lengths there is not counted.
-
-    Raises:
-        InvalidValueError: If the cables do not hold the platform in a stable equilibrium at some pose.
-    """
+    """Equilibria of robots with errors, whose winches wind the lengths of a plan of the robot without."""
+    # Encoders are set while the platform rests in its home pose, held as planned: what pulleys and dead cable add to
+    # the lengths there is not counted
     robots = [robot_with_errors(robot, one) for one in errors]
     off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
     count, poses, m = off_drum.shape

@@ -72,11 +72,7 @@ class _ModelErrors:
 def model_errors(
     axial_stiffness: float, chords: ArrayLike, angles: ArrayLike, densities: ArrayLike, tensions: ArrayLike
 ) -> _ModelErrors:
-    """Compare the five models on a grid.
-
-    Raises:
-        InvalidValueError: If a value is not finite or out of its range.
-    """
+    """Compare the five models on a grid."""
     axes = (
         checked(chords, "chords", "m", shape=(None,), above=0.0),
         checked(angles, "angles", "rad", shape=(None,)),

@@ -34,14 +34,10 @@ class InterceptStudy:
 
 
 def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
-    """The article's regressions (21), (27), (28) at the platform end and at the frame end.
-
-    Both lines give the vertical force on the cable: at the frame end it is smaller by the cable's weight, so the
-    intercept is negative there.
-
-    Source:
-        Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in docs/errata.md.
-    """
+    """The article's regressions (21), (27), (28) at the platform end and at the frame end."""
+    # Both lines give the vertical force on the cable: at the frame end it is smaller by the cable's weight, so the
+    # intercept is negative there
+    # source: Gia Luan & Truong Thinh 2020, section 4.2, figures 6 and 7; erratum 1 in docs/errata.md
     state = sampling.hang()
     frame_end = state.vertical_force - state.cable_weight
     return _study(sampling, state.vertical_force), _study(sampling, frame_end)
@@ -125,14 +121,10 @@ def density_shape(density: Array) -> Array:
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
-    """Take the stretch out of a cable's adjusting length, as (36) and (38) do, and as they should.
-
-    The elongation under the force at the platform end, |T| L/EA, is too large by half the cable's weight
-    along the chord, w L^2 sin(phi)/(2 EA) (erratum 5).
-
-    Source:
-        Gia Luan & Truong Thinh 2020, (33) to (38), figures 8 and 9.
-    """
+    """Take the stretch out of a cable's adjusting length, as (36) and (38) do, and as they should."""
+    # The elongation under the force at the platform end, |T| L/EA, is too large by half the cable's weight along the
+    # chord, w L^2 sin(phi)/(2 EA) (erratum 5)
+    # source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8 and 9
     model, chord_tension = sl.Catenary(), tensions * end.chord / end.span
     stiff = model.from_tension(cable.replace(axial_stiffness=UNSTRETCHABLE), *end, chord_tension, GRAVITY)
     soft = model.from_tension(cable, *end, chord_tension, GRAVITY)
@@ -151,11 +143,8 @@ def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
 
 
 def sag_study(sampling: Sampling) -> SagStudy:
-    """The article's regressions (41), (43), (44), (45), one after the other.
-
-    Source:
-        Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15.
-    """
+    """The article's regressions (41), (43), (44), (45), one after the other."""
+    # source: Gia Luan & Truong Thinh 2020, section 5.2, figures 10 to 15
     excess = sampling.hang().adjusting_length
     a_d = fit_factor(length_shape(sampling.tensions), excess)
     q_a = fit_factor(chord_shape(sampling.chords)[:, None], a_d, axis=-2)
@@ -220,13 +209,8 @@ def published_sampling() -> Sampling:
 
 
 def published_range(sampling: Sampling) -> Constants:
-    """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385.
-
-    Two ends of the range for two constants: k_p falls with the lower end, |k_h| rises with the upper one.
-
-    Raises:
-        InvalidValueError: If there is none for these cables between LOWEST and HIGHEST.
-    """
+    """The range of tensions that gives both published constants: k_h = -4.845 at the frame end and k_p = 4.385."""
+    # Two ends of the range for two constants: k_p falls with the lower end, |k_h| rises with the upper one
     from scipy.optimize import brentq
 
     def best_lowest(highest: float) -> float:

@@ -52,12 +52,7 @@ class ArticleReport:
 
 
 def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
-    """Redo the article's studies and write a self-contained HTML page and a JSON file of its numbers.
-
-    Raises:
-        InvalidValueError: If a part is unknown.
-        FileError: If the folder cannot be written; then nothing has been.
-    """
+    """Redo the article's studies and write a self-contained HTML page and a JSON file of its numbers."""
     wanted = selection(parts)
     check_files(folder, NAMES)
     chapters = []
@@ -74,7 +69,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
 
 
 class Part(NamedTuple):
-    """A chapter that can be asked for."""
+    """A chapter that can be selected."""
 
     key: str  # its name
     figures: tuple[int, ...]  # the article's figures that it redoes
@@ -83,7 +78,7 @@ class Part(NamedTuple):
     function: str  # the function that builds it
 
     def build(self) -> Chapter:
-        """Do the studies and draw."""
+        """Build the chapter."""
         function: Callable[[], Chapter] = getattr(import_module(f"sagline.article.{self.module}"), self.function)
         return function()
 
@@ -126,11 +121,7 @@ class _Selection:
 
 
 def selection(words: Sequence[str]) -> _Selection:
-    """Read what is asked for; nothing means everything.
-
-    Raises:
-        InvalidValueError: If a word is none of these, or a figure has no data.
-    """
+    """Selected chapters, figures and tables; all for no words."""
     if not words:
         return _Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
     whole: set[str] = set()

@@ -38,11 +38,9 @@ def fit_line(x: Array, y: Array) -> Line:
 
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
-    """The factor a of least squares in y = a * shape, along one axis.
-
-    Every regression of the article but that of the line is of this form, with the shape 1/T_x^2, D^3,
-    cos^4(phi), rho^2, D or rho.
-    """
+    """The factor a of least squares in y = a * shape, along one axis."""
+    # Every regression of the article but that of the line is of this form, with the shape 1/T_x^2, D^3, cos^4(phi),
+    # rho^2, D or rho
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
     return factor
@@ -66,11 +64,7 @@ class Sampling:
         tensions: ArrayLike,
         axial_stiffness: float = UNSTRETCHABLE,
     ) -> None:
-        """Check the four.
-
-        Raises:
-            InvalidValueError: If a value is not finite or out of its range.
-        """
+        """Check the four."""
         object.__setattr__(self, "angles", checked(angles, "angles", "rad", shape=(None,)))
         for name, value, unit in (
             ("chords", chords, "m"),
@@ -97,14 +91,10 @@ class Sampling:
 
 
 def article_sampling() -> Sampling:
-    """Our choice of what the article samples: it gives phi = 0.754 rad and rho in (0, 2), and no other number.
-
-    Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
-    tensions from 100 N to 10 kN, evenly spaced.
-
-    Source:
-        Gia Luan & Truong Thinh 2020, figures 6 to 15.
-    """
+    """Our choice of what the article samples: it gives phi = 0.754 rad and rho in (0, 2), and no other number."""
+    # Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
+    # tensions from 100 N to 10 kN, evenly spaced
+    # source: Gia Luan & Truong Thinh 2020, figures 6 to 15
     return Sampling(
         angles=[0.25, 0.5, ANGLE, 1.0, 1.25],
         chords=np.linspace(2.0, 16.0, 8),

@@ -32,11 +32,8 @@ class Table2:
 
 
 def table2() -> Table2:
-    """Read the table that comes with the package.
-
-    Source:
-        Gia Luan & Truong Thinh 2020, Table 2.
-    """
+    """Read the table that comes with the package."""
+    # source: Gia Luan & Truong Thinh 2020, Table 2
     text = files("sagline.article").joinpath("data/table2.csv").read_text(encoding="utf-8")
     rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))[1:]
     numbers = np.array([row[1:] for row in rows], dtype=np.float64)

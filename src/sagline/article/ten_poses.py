@@ -83,11 +83,9 @@ class TenPoses:
 
 
 def ten_poses(most: int = 3) -> TenPoses:
-    """Plan the prototype at the ten poses, and look for what explains its measured errors.
-
-    Every model of up to three of the parameters is fitted with the exact machine, within what we think plausible.
-    Positions are printed in whole millimeters: no fit can be better than 0.3 mm.
-    """
+    """Plan the prototype at the ten poses, and look for what explains its measured errors."""
+    # Every model of up to three of the parameters is fitted with the exact machine, within what we think plausible.
+    # Positions are printed in whole millimeters: no fit can be better than 0.3 mm.
     table, robot = table2(), sl.load_robot("article-prototype")
     plan, home = _planned(robot, table.desired), _planned(robot, np.array([HOME]))
 

@@ -67,7 +67,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
 
 
 def execution_of_log(log: Log, plan: int | None = None) -> Execution:
-    """The execution that is in a log."""
+    """Execution of a log."""
     count = len(log.plans)
     chosen = None if plan is None else integer(plan)
     if plan is not None and (chosen is None or not -count <= chosen < count):

@@ -1,4 +1,4 @@
-"""A log in MCAP as it is read: whole, cut off by a killed process, or while it still grows."""
+"""Reading of logs in MCAP: whole, cut off by a killed process, or still growing."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Log:
 
 
 class LogReader:
-    """A log that is read as far as it goes, and again when it has grown.
+    """Reader of a log that may still grow.
 
     Attributes:
         log: What has been read so far.
@@ -82,7 +82,7 @@ class LogReader:
         self._topics: dict[int, str] = {}
 
     def more(self) -> bool:
-        """Read what has been added since."""
+        """Read the records added since the last call; True if there are any."""
         before, data = self._offset, self._bytes()
         if not before:
             self._check_kind(data)
@@ -125,7 +125,7 @@ class LogReader:
         raise FileError(self.log.path, "is another kind of file, no log in MCAP", step)
 
     def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
-        """The records that are there whole; what follows the last one comes with the next look."""
+        """Complete records; the rest is read by the next call."""
         place = 0 if self._offset else len(MAGIC)
         start = self._offset
         if not start:
@@ -217,7 +217,7 @@ class LogReader:
 
 
 def read_log(file: os.PathLike[str] | str) -> Log:
-    """A log as far as it goes."""
+    """Content of a log, also of one that was cut off."""
     reader = LogReader(file)
     reader.more()
     log = reader.log

@@ -72,14 +72,10 @@ class McapFile:
     """The writer of one log. Not for several threads at a time."""
 
     def __init__(self, file: RawIOBase, robot: Robot, period: float, epoch: int = 0) -> None:
-        """Begin a log.
-
-        Args:
-            file: Where to; opened unbuffered, closed by whoever opened it.
-            robot: The robot.
-            period: Of a cycle [s].
-            epoch: What is added to times for the log's own [ns].
-        """
+        """Begin a log."""
+        # file: where to; opened unbuffered, closed by whoever opened it
+        # period: of a cycle [s]
+        # epoch: what is added to times for the log's own [ns]
         import xarray  # noqa: F401 — whatever is loaded is loaded here, before anything moves
         from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -233,11 +229,11 @@ class Recorder:
         self._put(partial(self._begin, plan))
 
     def ends(self, status: Status, reason: str) -> None:
-        """Take the end of the plan, after its last cycle."""
+        """Record the end of the plan, after its last cycle."""
         self._put(partial(self._end, status.name, reason))
 
     def cycle(self, cycle: Recorded) -> None:
-        """Take a cycle."""
+        """Record a cycle."""
         self._date(cycle.answer.time)
         self._put(partial(self._add, cycle))
 

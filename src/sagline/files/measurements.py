@@ -33,15 +33,10 @@ class Counts(NamedTuple):
 
 
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> Lengths:
-    """Read a CSV file with a column for each cable, L0, L1, ..., and perhaps the time.
-
-    Units stand in brackets, `time [s],L0 [mm],L1 [mm]`; without, they are s and m.
-
-    Args:
-        file: The file.
-        cable_count: Number of cables m of the robot.
-        size: Largest extent of the robot [m]; lengths a hundred times longer must have another unit.
-    """
+    """Read a CSV file with a column for each cable, L0, L1, ..., and perhaps the time."""
+    # Units stand in brackets, `time [s],L0 [mm],L1 [mm]`; without, they are s and m
+    # cable_count: number of cables m of the robot
+    # size: largest extent of the robot [m]; lengths a hundred times longer must have another unit
     table, names = _read(file, "L", "m", cable_count)
     for name in names:
         table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
@@ -50,11 +45,8 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
 
 
 def load_counts(file: os.PathLike[str] | str, cable_count: int) -> Counts:
-    """Read a CSV file with a column for each encoder, C0, C1, ..., and perhaps the time.
-
-    Returns:
-        Times [s], if there are any, and counts.
-    """
+    """Read a CSV file with a column for each encoder, C0, C1, ..., and perhaps the time."""
+    # returns times [s], if there are any, and counts
     return Counts(*_samples(*_read(file, "C", "", cable_count)))
 
 

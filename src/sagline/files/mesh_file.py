@@ -133,14 +133,10 @@ def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
 
 
 def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
-    """Write a surface to a file, whole or not at all, in meters.
-
-    Args:
-        surface: The surface.
-        file: The file; its ending says what it becomes: .stl, .glb (y up, as that format wants it), .ply, .vtk or
-            .vtu (meshio or PyVista writes these). One that exists is replaced.
-        colors: Red, green, blue of each vertex, 0 to 255, shape (V, 3); GLB and PLY have them.
-    """
+    """Write a surface to a file, whole or not at all, in meters."""
+    # file: the file; its ending says what it becomes: .stl, .glb (y up, as that format wants it), .ply, .vtk or .vtu
+    # (meshio or PyVista writes these). One that exists is replaced
+    # colors: red, green, blue of each vertex, 0 to 255, shape (V, 3); GLB and PLY have them
     target = file_path(file)
     ending = target.suffix.lower()
     if ending not in ENDINGS:

@@ -180,14 +180,12 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
 
 
 def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
-    """Time step [s], damping of a cable over its stiffness [s], and damping of each joint [N s/m, N m s/rad].
-
-    The last is zero where the cables resist every motion.
-
-    The cables' springs are the same at every pose, so none of its motions is faster than if each cable pulled where the
-    platform gives way most easily: the square of its frequency is at most the sum over the cables of stiffness times
-    largest mobility of the end. The many steps in a period leave room for what forces that turn with the platform add.
-    """
+    """Time step [s], damping of a cable over its stiffness [s], and damping of each joint [N s/m, N m s/rad]."""
+    # The last is zero where the cables resist every motion
+    # The cables' springs are the same at every pose, so none of its motions is faster than if each cable pulled where
+    # the platform gives way most easily: the square of its frequency is at most the sum over the cables of stiffness
+    # times largest mobility of the end. The many steps in a period leave room for what forces that turn with the
+    # platform add.
     levers = (robot.platform_anchors - robot.center_of_mass) @ pose.matrix.T
     along, about = robot.freedom[:, :3], robot.freedom[:, 3:]
     moved = along + np.cross(about, levers[:, None])  # of cable i's end by free motion j, (m, n, 3)

@@ -53,13 +53,10 @@ def pack(
     decimals: Mapping[str, int] | None = None,
     rest: Callable[[], Any] = int,
 ) -> bytes:
-    """Columns in few bytes.
-
-    Args:
-        columns: Floats, whole numbers or flags of any shape; the first axis is the course.
-        decimals: Of columns that may have no more than so many: one that has more is kept bit by bit.
-        rest: Called between two columns, for a thread that should let others go on.
-    """
+    """Pack columns, first axis first, without loss."""
+    # columns: floats, whole numbers or flags of any shape; the first axis is the course
+    # decimals: of columns that may have no more than so many: one that has more is kept bit by bit
+    # rest: called between two columns, for a thread that should let others go on
     from zstandard import compress
 
     known = decimals or {}
@@ -174,7 +171,7 @@ def _values(column: _Column, planes: bytes) -> NDArray[Any]:
 
 
 def pack_dataset(data: Dataset) -> bytes:
-    """A data set in few bytes."""
+    """Pack a data set without loss."""
     numbers: dict[str, Any] = {}
     variables: dict[str, Any] = {}
     for name, variable in data.variables.items():

@@ -176,7 +176,7 @@ class _Cables(_RobotPart):
 
 
 class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
-    """The machine behind the frame anchors; each value one number for all cables, or a list."""
+    """Winches and pulleys; each value is one number for all cables, or a list."""
 
     swivel_axis: Any = None  # may be a word
 

@@ -32,11 +32,9 @@ _STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # kg/m
 
 
 def read_xml(path: Path) -> Element:
-    """The root element of an XML file.
-
-    A file that declares entities is refused, so that none can grow without bound or name another file; a document
-    type is skipped, and what it points to is never opened.
-    """
+    """The root element of an XML file."""
+    # A file that declares entities is refused, so that none can grow without bound or name another file; a document
+    # type is skipped, and what it points to is never opened
     data = read_bytes(path, _LIMIT)
     builder, parser = TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler = builder.start

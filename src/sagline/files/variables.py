@@ -140,15 +140,12 @@ def check_variables(
     rows: Iterable[str] = (),
     solved: Flags | None = None,
 ) -> None:
-    """Refuse a data set whose labels or variables are not as declared.
-
-    Args:
-        data: The data set.
-        quantities: Declared quantities, in the order of the checks.
-        sizes: Number of entries along each dimension that has no labels.
-        rows: Dimensions before those of the declaration.
-        solved: Rows at which there is a solution; None: all.
-    """
+    """Refuse a data set whose labels or variables are not as declared."""
+    # data: the data set
+    # quantities: declared quantities, in the order of the checks
+    # sizes: number of entries along each dimension that has no labels
+    # rows: dimensions before those of the declaration
+    # solved: rows at which there is a solution; None: all
     for name, labels in PARTS.items():
         if name in data.variables and list(data.variables[name].values) != list(labels):
             raise InvalidValueError(name, list(data.variables[name].values), ", ".join(labels), STEP)

@@ -64,10 +64,8 @@ def file_stem(name: str, *words: str) -> str:
 
 @contextmanager
 def staging(folder: Path) -> Iterator[Path]:
-    """New temporary folder inside a folder, removed when the block ends.
-
-    What processes that were killed have left there is removed first.
-    """
+    """New temporary folder inside a folder, removed when the block ends."""
+    # What processes that were killed have left there is removed first
     for left in folder.glob(f"{PREFIX}*{SUFFIX}"):
         _remove_if_left(left)
     place, lock = _new_place(folder)
@@ -127,11 +125,9 @@ def try_lock(lock: int, *, if_unknown: bool) -> bool:
 
 @contextmanager
 def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
-    """Temporary file that replaces a file when the block ends without an error.
-
-    The block writes to a new file beside the real one. When it ends, that file is flushed to the disk and takes the
-    real one's name in one step; when it fails or is interrupted, it is removed and whatever was there before stays.
-    """
+    """Temporary file that replaces a file when the block ends without an error."""
+    # The block writes to a new file beside the real one. When it ends, that file is flushed to the disk and takes the
+    # real one's name in one step; when it fails or is interrupted, it is removed and whatever was there before stays.
     target = check_file(file)
     with atomic_files(target.parent, [target.name], size) as (partial,):
         yield partial

@@ -85,11 +85,9 @@ def _at(schema: type[Entry], where: tuple[int | str, ...]) -> type[Entry]:
 
 
 def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
-    """A YAML text whose top level is a mapping, no key given twice.
-
-    Text stays text but for plain decimal numbers, true, false and null: no yes that becomes true, no 1:30 that becomes
-    90, no dates, no tags. Aliases may be used as long as what they stand for is not too much.
-    """
+    """A YAML text whose top level is a mapping, no key given twice."""
+    # Text stays text but for plain decimal numbers, true, false and null: no yes that becomes true, no 1:30 that
+    # becomes 90, no dates, no tags. Aliases may be used as long as what they stand for is not too much.
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:

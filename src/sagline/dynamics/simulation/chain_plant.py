@@ -1,4 +1,4 @@
-"""A robot that is simulated on lumped-mass cables."""
+"""Simulated robot with lumped-mass cables."""
 
 from __future__ import annotations
 
@@ -35,10 +35,7 @@ class LoadedPlatform:
 
     @classmethod
     def of(cls, inertia: Array, masses: Array, ends: Array) -> LoadedPlatform:
-        """A platform and masses at places on it.
-
-        Shapes: inertia (4,); masses (m,) [kg]; ends (m, 3) [m].
-        """
+        """A platform and masses at places on it; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
         mass = inertia[0] + masses.sum()
         center = (masses @ ends) / mass
         turns = np.isfinite(inertia[1:])
@@ -57,10 +54,8 @@ class LoadedPlatform:
         return levers
 
     def state(self, place: Array, turning: Array, velocity: Array, spin: Array) -> Array:
-        """The row of the whole's state, where the platform is and moves.
-
-        Shapes: place (3,) [m]; turning (3, 3); velocity (3,) [m/s]; spin (3,) [rad/s].
-        """
+        """The row of the whole's state, where the platform is and moves."""
+        # shapes: place (3,) [m]; turning (3, 3); velocity (3,) [m/s]; spin (3,) [rad/s]
         lever, axes = turning @ self.center, turning @ self.axes
         moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
         quaternion = Rotation.from_matrix(axes).as_quat()
@@ -125,10 +120,7 @@ class ChainPlant(Plant):
     cable_mass: ClassVar[str] = "lumped"
 
     def __init__(self, given: InitialConditions, data: Array, nodes: int, losses: Damping) -> None:
-        """Hang a robot on chains, at rest or at the speed of its path.
-
-        Shapes: data (DATA_ROWS, m).
-        """
+        """Chains of a robot at rest, or at the speed of its path; data (DATA_ROWS, m)."""
         state, robot = given.state, given.robot
         rest = chains_at_rest(state, nodes)
         super().__init__(robot, given.model, rest.pose, given.twist, state.unstrained_length, data)
@@ -221,7 +213,7 @@ class ChainPlant(Plant):
             self.state[body.MOMENTUM :] = state[body.MOMENTUM :] + np.cross(arm, momentum)
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Why the kernel stopped."""
+        """Error for a stopped kernel."""
         cable, how = int(self.cables[int(self.counters[FAILED]) - 1]), self.counters[ends.ENDED]
         if how == ends.GROWN:
             return super().failure(time, step)

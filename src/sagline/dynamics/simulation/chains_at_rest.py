@@ -38,28 +38,20 @@ class _LumpedCables(NamedTuple):
     nodes: int  # elements a cable
 
     def elements(self, force: Array) -> tuple[Array, Array]:
-        """Forces of the elements from the platform on, those of the cable at their middles, and their sizes.
-
-        Shapes: force (m, 3) [N]; returns (m, nodes, 3) [N].
-        """
+        """Forces of the elements from the platform on, those of the cable at their middles, and their sizes."""
+        # shapes: force (m, 3) [N]; returns (m, nodes, 3) [N]
         below = (np.arange(self.nodes) + 0.5) * (self.weight * self.element)[:, None]
         forces = np.repeat(force[:, None, :], self.nodes, axis=1)
         forces[..., 2] -= below
         return forces, np.linalg.norm(forces, axis=-1)
 
     def steps(self, force: Array) -> Array:
-        """The elements as vectors towards the platform [m], shape (m, nodes, 3).
-
-        Shapes: force (m, 3) [N].
-        """
+        """The elements as vectors towards the platform [m], shape (m, nodes, 3); force (m, 3) [N]."""
         forces, size = self.elements(force)
         return (self.element[:, None] * (1.0 / self.stiffness[:, None] + 1.0 / size))[..., None] * forces
 
     def compliance(self, force: Array) -> Array:
-        """Derivative of a chain's platform end by the force on it [m/N], shape (m, 3, 3).
-
-        Shapes: force (m, 3) [N].
-        """
+        """Derivative of a chain's platform end by the force on it [m/N], shape (m, 3, 3); force (m, 3) [N]."""
         forces, size = self.elements(force)
         unit = forces / size[..., None]
         across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
@@ -69,14 +61,10 @@ class _LumpedCables(NamedTuple):
 
 
 def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
-    """The chains into which the cables of an equilibrium are divided, at rest at the same lengths.
-
-    An element's force is the exact cable's at its middle: a chain reaches as far as the midpoint rule says. Pose and
-    forces therefore differ from the exact ones by the order of nodes^-2, and the wrench is balanced to rounding.
-
-    Source:
-        docs/model.md, section 11.
-    """
+    """The chains into which the cables of an equilibrium are divided, at rest at the same lengths."""
+    # An element's force is the exact cable's at its middle: a chain reaches as far as the midpoint rule says. Pose and
+    # forces therefore differ from the exact ones by the order of nodes^-2, and the wrench is balanced to rounding.
+    # source: docs/model.md, section 11
     robot, exits = state.one_robot, state.exit_point
     length, material = state.free_length, state.cables.cable
     chains = _LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
@@ -138,10 +126,8 @@ def _size(levers: Array) -> float:
 
 
 def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
-    """The motion that takes an unbalance away; none in directions in which the platform is neutral.
-
-    So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, but for rounding.
-    """
+    """The motion that takes an unbalance away; none in directions in which the platform is neutral."""
+    # So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, but for rounding
     units = np.array([1.0, 1.0, 1.0, size, size, size])
     slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
     found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]

@@ -126,10 +126,8 @@ class TimeTable:
 
 
 def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: float) -> TimeTable:
-    """Rows in time as a caller gives them: one row that holds all the time, or times and rows, straight in between.
-
-    Shapes: given (n,) [s]; begin [s].
-    """
+    """Rows in time as a caller gives them: one row that holds all the time, or times and rows, straight in between."""
+    # shapes: given (n,) [s]; begin [s]
     if not (isinstance(given, tuple | list) and len(given) == 2):
         return TimeTable.constant(exactly(given, item, unit, (columns,)))
     try:
@@ -167,10 +165,7 @@ class InitialConditions:
 
 
 def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> InitialConditions:
-    """Checked initial conditions and inputs of `simulate`.
-
-    Units: duration [s].
-    """
+    """Checked initial conditions and inputs of `simulate`, with the duration in s."""
     if isinstance(start, Plan):
         if unstrained_length is not None:
             step = "Give plan.state[0] to wind other lengths than the plan's."
@@ -270,10 +265,7 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
 
 
 def check_lengths(robot: Robot, lengths: TimeTable) -> None:
-    """Refuse lengths that are none, or all dead cable.
-
-    Units: lengths [m].
-    """
+    """Refuse lengths [m] that are not longer than the dead cable."""
     checked(lengths.value, "unstrained_length", "m")
     least, dead = lengths.value.min(axis=0), dead_cable(robot)
     if (short := least <= dead).any():

@@ -49,11 +49,8 @@ class _ModalMotion(NamedTuple):
 
 
 def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
-    """Modal model of a state.
-
-    Source:
-        docs/model.md, section 11.
-    """
+    """Modal model of a state."""
+    # source: docs/model.md, section 11
     found = vibration(state, up_to=UP_TO * float(np.nanmax(modes(state).frequency)), damping=damping)
     if found.status is not VibrationStatus.SOLVED:
         step = 'Start elsewhere, or give cable_mass="lumped" or "none".'
@@ -76,10 +73,8 @@ def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
 
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
-    """Changes of the forces at the frame ends in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))].
-
-    Along a cable f = f_0 - g with g' = rho omega^2 u; its end moves by the integral of C f.
-    """
+    """Changes of the forces at the frame ends in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))]."""
+    # Along a cable f = f_0 - g with g' = rho omega^2 u; its end moves by the integral of C f
     material, length = state.cables.cable, state.free_length
     at_frame, points = frame_end_forces(state), found.cable_shape.shape[2]
     square = (2.0 * np.pi * found.frequency) ** 2
@@ -101,10 +96,8 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
 
 
 def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> _ModalMotion:
-    """Modes that rest at first, under forces that are straight between instants: exact but for rounding.
-
-    Shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s].
-    """
+    """Modes that rest at first, under forces that are straight between instants: exact but for rounding."""
+    # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
     root = -ratio * frequency + 1j * ringing
     whole = np.exp(root * step)
@@ -130,10 +123,7 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
-    """A robot in small motion about its equilibrium at the start.
-
-    Units: step [s]; record [s].
-    """
+    """Small motion of a robot about its equilibrium at the start, with step and record in s."""
     state = given.state
     _check(given)
     model = modal_model(state, damping)
@@ -183,14 +173,14 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
 
 
 def check_modal_arguments(others: list[str]) -> None:
-    """Refuse what modes about one equilibrium do not know."""
+    """Refuse arguments that modes about one equilibrium do not support."""
     if others:
         step = 'Leave it out, or give cable_mass="lumped".'
         raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
 
 
 def _check(given: InitialConditions) -> None:
-    """Refuse what has no modes that are known."""
+    """Refuse initial conditions without modes."""
     if given.state.contact is not None:
         step = 'Leave winches out of the robot, or give cable_mass="lumped".'
         raise InvalidValueError("start", "a robot with pulleys or dead cable", 'none for cable_mass="modal"', step)

@@ -1,4 +1,4 @@
-"""A robot that is simulated: its state, and its data as kernel arrays."""
+"""Simulated robot: its state, and its data as kernel arrays."""
 
 from __future__ import annotations
 
@@ -84,10 +84,7 @@ class Plant:
     cable_mass: ClassVar[str] = "none"
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:
-        """Place a robot at a pose.
-
-        Shapes: twist (6,); length (m,) [m]; data (DATA_ROWS, m).
-        """
+        """Place a robot at a pose; twist (6,); length (m,) [m]; data (DATA_ROWS, m)."""
         m = robot.cable_count
         self.robot, self.model, self.data = robot, model, data
         moments, self.axes = _principal_axes(robot, pose)
@@ -110,10 +107,8 @@ class Plant:
         self._work = np.zeros(0)
 
     def remember_winding(self, longest: float) -> None:
-        """Let the drums remember the strain at which cable was wound in, up to a length off the drum [m] and MARGIN.
-
-        What lies farther in lies at the winding tension, and comes to it when it is wound in.
-        """
+        """Let the drums remember the strain at which cable was wound in, up to a length off the drum [m] and MARGIN."""
+        # What lies farther in lies at the winding tension, and comes to it when it is wound in
         self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
 
     def arguments(
@@ -141,7 +136,7 @@ class Plant:
         return states
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Why the kernel stopped: at a time [s], with steps of so many seconds."""
+        """Error for a kernel that stopped at a time [s], with steps of this length [s]."""
         return energy_error(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
     def remove_cable(self, cable: int) -> None:
@@ -153,10 +148,8 @@ class Plant:
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
 
     def cut(self, places: Any) -> None:
-        """Let cables break in the midst of a run, by their places: the kernel's arrays stay as they are.
-
-        Stiffness and weight fall by one factor, so that every cable hangs as before and all it pulls with is nothing.
-        """
+        """Let cables break in the midst of a run, by their places: the kernel's arrays stay as they are."""
+        # Stiffness and weight fall by one factor, so that every cable hangs as before and all it pulls with is nothing
         for column in (tables.STIFFNESS, tables.DENSITY):
             self._table[places, column] *= BROKEN
         self.counters[k.READY] = 0  # look at all forces and energies anew
@@ -212,9 +205,6 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
-    """Error for a run whose energy grows or fades by itself.
-
-    Units: step [s]; time [s].
-    """
+    """Error for a run whose energy drifts, with step and time in s."""
     value = f"{step:g} s, at which energy grows or fades by itself: at {time:.6g} s most of it is in cable {cable}"
     return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")

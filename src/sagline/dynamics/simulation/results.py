@@ -104,10 +104,7 @@ def event_cable(event: Event) -> int | None:
 
 
 def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple[Event, ...]:
-    """Events in order of time.
-
-    Units: begin [s]; end [s].
-    """
+    """Checked events in order of time, between begin and end [s]."""
     given = (events,) if isinstance(events, Event) else events
     if not isinstance(given, Iterable) or isinstance(given, str):
         step = "Give sl.Break(cable=3, time=2.5), or several in a list."
@@ -134,7 +131,7 @@ def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple
 
 
 def _check_order(events: list[Event], robot: Robot) -> None:
-    """Refuse what happens to a broken cable, and loads that are not there."""
+    """Refuse events of broken cables, and drops of more than the platform's mass."""
     broken: set[int] = set()
     mass = robot.mass
     for event in events:
@@ -257,9 +254,7 @@ def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
 
 
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:
-    """Twists of the platform frame's origin, as a path has them, from motions of the center of mass.
-
-    Shapes: velocity (N, 3) [m/s]; spin (N, 3) [rad/s]; returns (N, 6).
-    """
+    """Twists of the platform frame's origin, as a path has them, from motions of the center of mass."""
+    # shapes: velocity (N, 3) [m/s]; spin (N, 3) [rad/s]; returns (N, 6)
     lever = pose.matrix @ robot.center_of_mass
     return locked(np.concatenate((velocity - np.cross(spin, lever), spin), axis=1))

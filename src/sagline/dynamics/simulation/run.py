@@ -34,7 +34,7 @@ Inputs = tuple[TimeTable, TimeTable, TimeTable]
 
 
 class Run:
-    """A simulation on its way."""
+    """A simulation in progress."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class Run:
         events: tuple[Event, ...] = (),
         settings: dict[str, Any] | None = None,
     ) -> None:
-        """Look at the start."""
+        """Record the first sample."""
         self._events, self._settings = list(events), settings or {}
         self.plant, self.every, self.steps = plant, every, steps
         self._rules, self._numbers, self._inputs = rules, numbers, inputs
@@ -70,7 +70,7 @@ class Run:
         return float(self.plant.audit[d.BEGIN] + step * self.step)
 
     def _advance(self, last: int) -> None:
-        """Go on to a step, recording on the way."""
+        """Integrate up to a step, with records."""
         plant, first = self.plant, int(self.plant.counters[k.STEPS])
         row = first // self.every + 1 if plant.counters[k.READY] else 0
         records = plant.records(last // self.every + 1 - row)
@@ -93,7 +93,7 @@ class Run:
             self._store_records(self._record_now(), last // self.every + 1)
 
     def _store_records(self, records: Records, row: int) -> None:
-        """Take over what was recorded, from a row of the whole record on."""
+        """Copy records of the kernel to the whole record, from a row on."""
         plant = self.plant
         rows = slice(row, row + int(plant.counters[k.RECORDS]))
         kept = slice(0, rows.stop - rows.start)
@@ -107,7 +107,7 @@ class Run:
         self._record.lengths[rows, plant.cables] = records.lengths[kept]
 
     def _store_notes(self, records: Records) -> None:
-        """Take over what began by itself."""
+        """Store the events that the kernel has noted."""
         for row in records.notes[: int(self.plant.counters[k.NOTES])]:
             cable = int(self.plant.cables[int(row[k.NOTE_CABLE])])
             kind = NAMES[row[k.NOTE_KIND]]
@@ -115,7 +115,7 @@ class Run:
             self._occurrences.append(Occurrence(float(row[k.NOTE_TIME]), kind, cable, before, after))
 
     def _record_now(self) -> Records:
-        """The step that is reached, by itself."""
+        """Record of the current step."""
         plant, here = self.plant, self.plant.records(1)
         plant.counters[k.RECORDS] = plant.counters[k.NOTES] = 0
         plant.kernel(*self._arguments, here.arrays, 0, self.every)
@@ -123,7 +123,7 @@ class Run:
         return here
 
     def apply_event(self, event: Event) -> None:
-        """Go on to an event, and let it happen at the first step that is not earlier."""
+        """Integrate up to an event and apply it at the first step that is not earlier."""
         plant = self.plant
         self._advance(self._step_of(event))
         time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._record_now())
@@ -172,14 +172,11 @@ class Run:
             self._occurrences[last] = Occurrence(event.time, event.kind, event.cable, event.tension_before, after)
 
     def finish(self) -> Simulation:
-        """Go on to the end."""
+        """Integrate to the end."""
         return self.until(math.inf)
 
     def until(self, time: float) -> Simulation:
-        """Go on, and look back.
-
-        Units: time [s].
-        """
+        """Continue to a time [s]; the simulation so far."""
         ahead = (time - float(self.plant.audit[d.BEGIN])) / self.step
         records = math.ceil(min(ahead, self.steps) / self.every - 1e-9)
         last = max(min(records * self.every, self.steps), int(self.plant.counters[k.STEPS]))
@@ -194,7 +191,7 @@ class Run:
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
     def _result(self, count: int) -> Simulation:
-        """So many of the records."""
+        """Simulation of the first records."""
         plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
         kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)

@@ -152,7 +152,7 @@ def started_run(
     damping: Damping | None = None,
     record: float | None = None,
 ) -> Run:
-    """A simulation that has begun, and can be looked at on its way."""
+    """Simulation at its first step, to be continued."""
     if elements:
         check_lumped(given)
     kind, losses = winch_kind(winches), checked_damping(damping)
@@ -188,7 +188,7 @@ def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
 def initial_plant(
     given: InitialConditions, winches: Winches, with_wind: bool, elements: int = 0, losses: Damping | None = None
 ) -> Plant:
-    """A robot at its beginning, its winches at the speeds that are asked for there."""
+    """Plant at the start, its winches at the required speeds."""
     length = given.state.unstrained_length
     data = drive_data(given.robot, winches, length, with_wind)
     if elements:
@@ -202,7 +202,7 @@ def initial_plant(
 
 
 def checked_damping(damping: Damping | None) -> Damping:
-    """Damping that a motion in time knows; none for None."""
+    """Damping of a simulation in time; none for None."""
     found = optional(damping, Damping, "damping") or Damping()
     if found.modal_damping > 0.0:
         step = "Give loss_time or air_damping, which act on cables; a ratio belongs to a mode."
@@ -233,10 +233,7 @@ def time_step(
     events: Any,
     waves: float = 0.0,
 ) -> float:
-    """The step, by the lightest platform that there will be.
-
-    Units: step [s]; waves [rad/s].
-    """
+    """Checked step [s], by the lightest platform after all events; waves: highest frequency of the cables [rad/s]."""
     robot, lengths = given.robot, given.lengths.value
     platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
     highest = frequency_with_winches(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
@@ -260,7 +257,7 @@ def load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
 
 
 def _every(record: Any, step: float) -> int:
-    """After how many steps one is recorded."""
+    """Number of steps between two records."""
     given = RECORD if record is None else number(record, "record", "s", above=0.0)
     if record is not None and given < 0.999 * step:
         raise InvalidValueError("record", f"{given:g} s", f">= {step:g} s, the step", "Give a longer one, or a step.")

@@ -22,10 +22,8 @@ LONGEST: Final = 1e-3  # s
 
 
 def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
-    """Highest angular frequency of the platform on cables that are all taut [rad/s]: sag only makes them softer.
-
-    Shapes: lengths (K, m) [m].
-    """
+    """Highest angular frequency of the platform on cables that are all taut [rad/s]: sag only makes them softer."""
+    # shapes: lengths (K, m) [m]
     rotation, freedom = poses.matrix, robot.freedom
     levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
     ends = (poses.position + rotation @ robot.center_of_mass)[:, None] + levers
@@ -46,10 +44,7 @@ def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
 def checked_step(
     step: float | None, integrator: int, highest: float, damping: Damping, stride: bool, waves: float = 0.0
 ) -> float:
-    """The step of a run.
-
-    Units: step [s]; highest [rad/s]; waves [rad/s]; returns [s].
-    """
+    """Checked step of a run [s]; highest and waves are angular frequencies [rad/s]."""
     limit = _limit(integrator, max(highest, waves), damping)
     if step is None:
         usual = min(SHARE / LIMIT[integrator] * _limit(integrator, highest, damping), LONGEST)
@@ -76,10 +71,8 @@ def _limit(integrator: int, highest: float, damping: Damping) -> float:
 
 
 def frequency_with_winches(platform: float, kind: int, data: Array, lengths: Array, stiffness: Array) -> float:
-    """Highest angular frequency of a platform and its winches together [rad/s].
-
-    Shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N].
-    """
+    """Highest angular frequency of a platform and its winches together [rad/s]."""
+    # shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N]
     if kind == d.SECOND_ORDER:
         return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
     if kind == d.DRUMS:  # the springs' largest eigenvalue on both masses is at most the sum of those on each

@@ -55,17 +55,14 @@ def winch_kind(winches: Any) -> int:
 
 
 def check_winding(winding: Any, kind: int) -> None:
-    """Refuse what lies on drums where there are none."""
+    """Refuse remembered winding for winches without drums."""
     if choice(winding, "winding", get_args(Winding)) == "remembered" and kind != d.DRUMS:
         step = 'Give winches="robot" too, or leave winding out.'
         raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
 
 
 def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -> Array:
-    """The drives as kernels take them, (DATA_ROWS, m).
-
-    Shapes: length (m,) [m].
-    """
+    """The drives as kernels take them, (DATA_ROWS, m); length (m,) [m]."""
     data = np.zeros((d.DATA_ROWS, robot.cable_count))
     if isinstance(winches, SecondOrder):
         data[d.BANDWIDTH] = 2.0 * np.pi * winches.bandwidth
@@ -117,10 +114,7 @@ class Encoders:
     """
 
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
-        """Look at the drums of a robot that has all that counts need.
-
-        Shapes: wound (m,) [m]; stretch (m,).
-        """
+        """Encoders of a robot whose data of drums are complete; wound (m,) [m]; stretch (m,)."""
         drums, m = drums_of(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
         self.counts = np.empty(m)
@@ -150,10 +144,8 @@ class LoadCells:
     """
 
     def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
-        """Make the load cells of a robot; without winches they read what is there.
-
-        Shapes: tension (m,) [N].
-        """
+        """Make the load cells of a robot; without winches they read what is there."""
+        # shapes: tension (m,) [N]
         m, winch = robot.cable_count, robot.winches
         cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])
         if winch is not None:

@@ -141,7 +141,7 @@ def _with_margin(robot: Robot, margin: float) -> Robot:
 def _fastest_segment(
     robot: Robot, segment: RestToRestSegment, curve: Curve, limits: tuple[float, float]
 ) -> _TimedSegment:
-    """One move, as fast as the robot's limits allow, checked."""
+    """Fastest motion along one segment within the robot's limits."""
     place = np.linspace(0.0, 1.0, _PLACES)
     jet = curve.at(place)
     rest = inverse(robot, jet.pose)
@@ -167,7 +167,7 @@ def _fastest_segment(
 
 
 def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) -> _TimedSegment:
-    """A move that keeps its limits between the places too, if need be a little slower."""
+    """Segment that keeps its limits between the places too, if need be a little slower."""
     for again in range(_TRIES):
         pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
         plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
@@ -237,7 +237,7 @@ def _speed_excess(plan: Plan) -> float:
 def _joined(
     path: Path, segments: Sequence[RestToRestSegment], timed: Sequence[_TimedSegment | None], bounded: bool
 ) -> Path:
-    """The moves one after the other, sampled."""
+    """Path of the timed segments."""
 
     def motion(k: int, time: Array) -> tuple[Pose, Array]:
         one = timed[k]

@@ -92,11 +92,9 @@ class ForceBalance:
         )
 
     def near_motion(self, motion: Array) -> ForceBalance:
-        """Force balance with the sag forces at motions (K, 2), on the border of the limits or a little outside.
-
-        On the border itself tensions are all but fixed, but rounding may leave none: they are those within limits a
-        little wider, the narrowest that have an answer.
-        """
+        """Force balance with the sag forces at motions (K, 2), on the border of the limits or a little outside."""
+        # On the border itself tensions are all but fixed, but rounding may leave none: they are those within limits a
+        # little wider, the narrowest that have an answer
         found, wrench = self, self.wrench(motion)
         for by in _WIDER:
             low, high = np.maximum(self.robot.tension_min - by, 0.0), self.robot.tension_max + by
@@ -114,11 +112,9 @@ class ForceBalance:
 
 
 def _normals(matrix: Array) -> Iterator[Array]:
-    """Both sides of every plane that n - 1 columns of matrices (K, n, m) span, shape (K, 2 S, n), block by block.
-
-    They hold all facets of the body that the columns make with bounded shares; of columns in a plane of less
-    dimensions any normal is taken, which bounds it too.
-    """
+    """Both sides of every plane that n - 1 columns of matrices (K, n, m) span, shape (K, 2 S, n), block by block."""
+    # They hold all facets of the body that the columns make with bounded shares; of columns in a plane of less
+    # dimensions any normal is taken, which bounds it too
     n, m = matrix.shape[1:]
     sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
     step = max(1, _BLOCK // len(sets))
@@ -171,16 +167,10 @@ class Profile:
 
 
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> Profile | None:
-    """The profile from rest to rest that is at each place as fast as any that stays within the bounds.
-
-    Backward, from which squares of the speed the end can be reached; forward, the largest acceleration that stays
-    among them. What holds at both ends of a step holds in it, but for the bounds' curvature.
-
-    Shapes: place (K,).
-
-    Source:
-        Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018.
-    """
+    """The profile from rest to rest that is at each place as fast as any that stays within the bounds; place (K,)."""
+    # Backward, from which squares of the speed the end can be reached; forward, the largest acceleration that stays
+    # among them. What holds at both ends of a step holds in it, but for the bounds' curvature.
+    # source: Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018
     steps, last = np.diff(place), len(place) - 1
     reach = np.zeros((len(place), 2))
     for i in range(last - 1, -1, -1):

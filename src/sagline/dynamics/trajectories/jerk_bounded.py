@@ -59,13 +59,10 @@ def _integration_matrices(pieces: int) -> Array:
 def fastest_jerk_profile(
     curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
 ) -> JerkProfile | None:
-    """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk.
-
-    Linear in the jerk and in the square of the time, but for where the platform is at each share of the time, the
-    square of its speed and the time's third power: those are computed anew in iterations, each a linear program.
-
-    Units: limits [m/s^3]; least [s].
-    """
+    """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk."""
+    # Linear in the jerk and in the square of the time, but for where the platform is at each share of the time, the
+    # square of its speed and the time's third power: those are computed anew in iterations, each a linear program
+    # units: limits [m/s^3]; least [s]
     from scipy.optimize import linprog  # takes longer to load than all the rest of dynamics
 
     course = _first(curve, limits, least)
@@ -124,12 +121,9 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
 
 
 def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
-    """Rows that keep a jerk, R1 s''' + 3 R2 s' s'' + R3 s'^3, within its limit in some directions at all knots.
-
-    Along the way and across, and in its own direction, so that the iterations end with its size within the limit.
-
-    Shapes: rates (3, P + 1, 3).
-    """
+    """Rows that keep a jerk, R1 s''' + 3 R2 s' s'' + R3 s'^3, within its limit in some directions at all knots."""
+    # Along the way and across, and in its own direction, so that the iterations end with its size within the limit
+    # shapes: rates (3, P + 1, 3)
     _, speed, rate = (values[:, None] for values in state @ course.jerk)
     first, second, third = rates
     rest = 3.0 * second * speed * rate + third * speed**3  # as it is now: it changes little from round to round

@@ -29,10 +29,8 @@ class Jet(NamedTuple):
     rates: Array
 
     def twists(self, motion: Array) -> Array:
-        """Twist, its rate and its jerk of a motion along the curve, by the chain rule.
-
-        Shapes: motion (4, N); returns (3, N, 6).
-        """
+        """Twist, its rate and its jerk of a motion along the curve, by the chain rule."""
+        # shapes: motion (4, N); returns (3, N, 6)
         (first, second, third), (_, v, a, j) = self.rates, motion[:, :, None]
         return np.stack((first * v, second * v**2 + first * a, third * v**3 + 3.0 * second * v * a + first * j))
 
@@ -129,10 +127,8 @@ class SplineCurve:
 
 
 def lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
-    """Length of the way at each sample, a radian counted as a meter, with its first two derivatives by time.
-
-    Shapes: time (N,) [s]; twist (N, 6); twist_rate (N, 6); returns (3, N).
-    """
+    """Length of the way at each sample, a radian counted as a meter, with its first two derivatives by time."""
+    # shapes: time (N,) [s]; twist (N, 6); twist_rate (N, 6); returns (3, N)
     speed = np.linalg.norm(twist, axis=1)
     inside = speed[1:-1] <= _STOPPED * speed.max()
     if inside.any():
@@ -157,10 +153,8 @@ def _vector(a: Array, b: Array) -> Array:
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
-    """The piecewise polynomial with given derivatives at both ends of every piece: of 7th degree for four of each.
-
-    Shapes: knots (n,); values (K, n).
-    """
+    """The piecewise polynomial with given derivatives at both ends of every piece: of 7th degree for four of each."""
+    # shapes: knots (n,); values (K, n)
     from scipy.interpolate import PPoly  # takes longer to load than all the rest of motion
 
     step = np.diff(knots)
@@ -209,10 +203,8 @@ class RestToRestSegment:
         return self.end - self.begin
 
     def rates(self, time: Array) -> Array:
-        """Parameter of the curve and its first three derivatives at given times since the begin, shape (4, N).
-
-        Before the begin and after the end it rests. A derivative that jumps is that of the later side.
-        """
+        """Parameter of the curve and its first three derivatives at given times since the begin, shape (4, N)."""
+        # Before the begin and after the end it rests. A derivative that jumps is that of the later side.
         assert self.progress is not None
         held = np.clip(time, 0.0, self.duration)
         values = np.stack([self.progress(held, order) for order in range(4)])
@@ -221,11 +213,9 @@ class RestToRestSegment:
 
 
 def segments_of(path: Path) -> tuple[RestToRestSegment, ...]:
-    """The moves of a path, in order.
-
-    Between rests the parameter runs through the samples with all derivatives that the path knows: a polynomial of
-    7th degree from sample to sample, of 5th without jerk. Paths of `quintic_path` and `septic_path` are that exactly.
-    """
+    """Rest-to-rest segments of a path, in order."""
+    # Between rests the parameter runs through the samples with all derivatives that the path knows: a polynomial of 7th
+    # degree from sample to sample, of 5th without jerk. Paths of `quintic_path` and `septic_path` are that exactly.
     _check_ends(path)
     rests = path.rests if path.rests is not None else _standing(path)
     return tuple(_segment(path, float(first), float(last)) for first, last in pairwise(rests))
@@ -251,7 +241,7 @@ def _speed(twist: Array) -> Array:
 
 
 def _standing(path: Path) -> Array:
-    """Times of the samples that stand, the first and the last among them."""
+    """Times of the samples at rest, the first and the last among them."""
     speed, rate = _speed(path.twist), _speed(path.twist_rate)
     still = (speed <= _STANDING * speed.max()) & (rate <= RESTING * rate.max())
     still[[0, -1]] = True
@@ -260,7 +250,7 @@ def _standing(path: Path) -> Array:
 
 
 def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
-    """The move between two rests; those that are no samples are reached by the polynomials beside them."""
+    """Segment between two rests; rests between samples are reached by the polynomials beside them."""
     near = _SAME_TIME * max(path.duration, abs(begin))
     first, last = np.searchsorted(path.time, (begin - near, end + near))
     part = slice(int(first), int(last))
@@ -324,11 +314,9 @@ def joined_path(
     *,
     with_jerk: bool,
 ) -> Path:
-    """Segments of a path with new durations [s], at its sample rate.
-
-    `motion` takes the number of a segment that moves and times since its begin; it returns poses and twists with their
-    first two derivatives, (3, N, 6).
-    """
+    """Segments of a path with new durations [s], at its sample rate."""
+    # `motion` takes the number of a segment that moves and times since its begin; it returns poses and twists with
+    # their first two derivatives, (3, N, 6)
     ends = np.cumsum(durations)
     rests = np.append(0.0, ends)
     time = time_grid(float(ends[-1]), 1.0 / sample_time(path))

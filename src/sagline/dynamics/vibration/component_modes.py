@@ -136,10 +136,8 @@ class Motions(NamedTuple):
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> Components:
-    """Motions of the cables of one state, right up to a frequency; those above complete what the cables can do.
-
-    Units: up_to [Hz].
-    """
+    """Motions of the cables of one state, right up to a frequency; those above complete what the cables can do."""
+    # units: up_to [Hz]
     omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
     table, axes = np.ascontiguousarray(strings.table[row, taut]), strings.axes[row, taut]
@@ -185,10 +183,8 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
 
 
 def _node_motion(components: Components, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
-    """Motion of the nodes times the roots of their masses: in the planes and normal to them.
-
-    Shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K).
-    """
+    """Motion of the nodes times the roots of their masses: in the planes and normal to them."""
+    # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
     plane, normal = (
         motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
     )
@@ -196,10 +192,7 @@ def _node_motion(components: Components, ends: Array, amplitudes: Array) -> tupl
 
 
 def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: int) -> Array:
-    """Displacements of all cables at equally spaced material points, from frame to platform end.
-
-    Returns (K, m, count, 3).
-    """
+    """Displacements of all cables at equally spaced material points, from frame to platform end, (K, m, count, 3)."""
     mesh = components.mesh
     t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
     values = np.empty((t, count, n))
@@ -219,19 +212,14 @@ def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: 
 
 
 def stretch_energy(components: Components, ends: Array, amplitudes: Array) -> Array:
-    """Twice the energy of stretch in each mode of unit modal mass.
-
-    Returns (t, K) [1/s^2].
-    """
+    """Twice the energy of stretch in each mode of unit modal mass, (t, K) [1/s^2]."""
     plane, _ = _node_motion(components, ends, amplitudes)
     return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
 
 
 def stretch_stiffness(components: Components) -> Array:
-    """Stiffness of stretch between displacements of the platform end at rest and the motions in the plane.
-
-    Returns (t, 2 + k, 2 + k).
-    """
+    """Stiffness of stretch between displacements of the platform end at rest and the motions in the plane."""
+    # returns (t, 2 + k, 2 + k)
     motions = components.plane
     basis = np.concatenate((motions.rest, motions.shape), axis=2)
     return np.asarray(np.swapaxes(basis, -1, -2) @ _stretch_matrices(components.mesh) @ basis)

@@ -108,7 +108,7 @@ def single_state(state: Equilibrium) -> Equilibrium:
 
 
 def check_lengths(state: Equilibrium) -> None:
-    """Refuse a state at which nothing hangs."""
+    """Refuse a state without lengths."""
     if np.isnan(state.unstrained_length).any():
         raise InvalidValueError(
             "state", "one without lengths", "a state that was solved", "See the status of the plan."
@@ -116,7 +116,7 @@ def check_lengths(state: Equilibrium) -> None:
 
 
 def check_model(state: Equilibrium) -> None:
-    """Refuse what has no vibrations of its own: shallow models' forces have no energy, straight cables no stretch."""
+    """Refuse cable models without vibrations: shallow models' forces have no energy, straight cables no stretch."""
     model = state.cables.model
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Solve the pose with Catenary(), the default."
@@ -124,10 +124,8 @@ def check_model(state: Equilibrium) -> None:
 
 
 def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
-    """Dynamic stiffness of the cables of one state, less their stiffness at rest.
-
-    Shapes: frequency (F,) [Hz]; returns (F, m, 3, 3) [N/m].
-    """
+    """Dynamic stiffness of the cables of one state, less their stiffness at rest."""
+    # shapes: frequency (F,) [Hz]; returns (F, m, 3, 3) [N/m]
     waves = waves_of(frequency, damping)
     kind = np.float64 if damping is None else np.complex128
     m = strings.table.shape[1]
@@ -144,10 +142,8 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
 
 
 def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
-    """Refuse a frequency for which a cable has too many elements, or none that does.
-
-    Shapes: counts (1, F, m, 2); frequency (F,) [Hz].
-    """
+    """Refuse a frequency for which a cable has too many elements, or none that does."""
+    # shapes: counts (1, F, m, 2); frequency (F,) [Hz]
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:
         value = f"{frequency[high[0]]:g} Hz, which would cut a cable into more than {collocation.MOST_ELEMENTS:,} waves"
@@ -158,10 +154,8 @@ def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
 
 
 def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
-    """Stiffness in the planes of cables, and normal to them, in the world.
-
-    Shapes: found (F, m, FOUND); axes (m, 3, 3); returns (F, m, 3, 3).
-    """
+    """Stiffness in the planes of cables, and normal to them, in the world."""
+    # shapes: found (F, m, FOUND); axes (m, 3, 3); returns (F, m, 3, 3)
     xx, xz, zz, yy = np.moveaxis(found, -1, 0)[..., None, None]
     level, normal, up = np.moveaxis(axes, 1, 0)
     across = level[:, :, None] * up[:, None, :]
@@ -175,10 +169,8 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
 
 
 def waves_of(frequency: Array, damping: Damping | None) -> Complex:
-    """Frequencies as kernels take them, with what takes energy out.
-
-    Shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS).
-    """
+    """Frequencies and damping as kernels take them."""
+    # shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS)
     omega = 2.0 * np.pi * frequency
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)
     waves[0, :, collocation.OMEGA], waves[0, :, collocation.SQUARE] = omega, omega**2

@@ -52,10 +52,8 @@ class _CatenaryState(NamedTuple):
 
 
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
-    """Derivatives of the flexibility of hanging cables, from where they leave the frame to their platform ends.
-
-    Shapes: force (..., m, 3) [N].
-    """
+    """Derivatives of the flexibility of hanging cables, from where they leave the frame to their platform ends."""
+    # shapes: force (..., m, 3) [N]
     cables = state.cables
     length = cables.unstrained_length
     stiffness = np.broadcast_to(cables.cable.axial_stiffness, length.shape)

@@ -210,11 +210,9 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
 
 
 def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
-    """Loss of the stretch to first order: K(omega) = K + i omega eta K S K, S the part that is stretch.
-
-    Wrenches against the platform's velocity (6, 6) and the rates of the lengths (6, m); tensions at the frame ends by
-    that velocity (m, 6) and by the rate of the cable's own length (m,).
-    """
+    """Loss of the stretch to first order: K(omega) = K + i omega eta K S K, S the part that is stretch."""
+    # Wrenches against the platform's velocity (6, 6) and the rates of the lengths (6, m); tensions at the frame ends by
+    # that velocity (m, 6) and by the rate of the cable's own length (m,)
     m = state.one_robot.cable_count
     if not loss_time:
         return np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m)

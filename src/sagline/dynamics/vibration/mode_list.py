@@ -19,25 +19,17 @@ _TINY = np.finfo(float).tiny
 
 
 def end_displacements(state: Equilibrium, shape: Array) -> Array:
-    """Displacement of the platform ends in motions of the platform.
-
-    Shapes: shape (6, n); returns (m, 3, n).
-    """
+    """Displacement of the platform ends in motions of the platform; shape (6, n); returns (m, 3, n)."""
     robot = state.one_robot
     return motions_of_ends((robot.platform_anchors - robot.center_of_mass) @ state.pose.matrix.T) @ shape
 
 
 def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:
-    """Damping ratio that the loss in the cables' stretch gives each massless mode, to first order.
-
-    Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
-    hanging and behind their exits; the rest is in what they sag and swivel.
-
-    Shapes: loss_time [s]; returns (n,).
-
-    Source:
-        docs/model.md, section 11.
-    """
+    """Damping ratio that the loss in the cables' stretch gives each massless mode, to first order."""
+    # Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
+    # hanging and behind their exits; the rest is in what they sag and swivel
+    # shapes: loss_time [s]; returns (n,)
+    # source: docs/model.md, section 11
     omega = 2.0 * np.pi * platform.frequency
     if loss_time == 0.0:
         return np.zeros_like(omega)
@@ -51,10 +43,8 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
 
 
 def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> Array:
-    """Displacement of the cables that follow their platform ends without inertia, to first order.
-
-    Shapes: ends (m, 3); returns (m, count, 3).
-    """
+    """Displacement of the cables that follow their platform ends without inertia, to first order."""
+    # shapes: ends (m, 3); returns (m, count, 3)
     middles = (np.arange(count - 1) + 0.5) / (count - 1)
     tangent, sag, stretch = _along(state, middles)
     outer = tangent[..., :, None] * tangent[..., None, :]
@@ -75,10 +65,8 @@ def _behind(strings: Strings) -> Array:
 
 
 def _along(state: Equilibrium, place: Array) -> tuple[Array, Array, Array]:
-    """Unit tangents (m, s, 3) at shares of the length (s,), the length over what holds it across, and over EA.
-
-    Across its tangent a cable gives way by L (1/N + 1/EA), along it by L/EA [m/N].
-    """
+    """Unit tangents (m, s, 3) at shares of the length (s,), the length over what holds it across, and over EA."""
+    # Across its tangent a cable gives way by L (1/N + 1/EA), along it by L/EA [m/N]
     cables, robot = state.cables, state.one_robot
     length = cables.unstrained_length[:, None]
     weight = np.zeros_like(length) if cables.model.weightless else cables.cable_weight[:, None]
@@ -144,11 +132,9 @@ def listed_modes(vibration: Vibration) -> list[ListedMode]:
 
 
 def mode_correlation(vibration: Vibration) -> Array:
-    """For each massless mode the share of its motion that is found in each mode with cable mass, shape (n, K).
-
-    A share is the square of the mass-weighted product of both motions of the platform; over all modes, those beyond
-    `up_to` included, the shares of a massless mode sum to less than 1 by what the cables keep.
-    """
+    """For each massless mode the share of its motion that is found in each mode with cable mass, shape (n, K)."""
+    # A share is the square of the mass-weighted product of both motions of the platform; over all modes, those beyond
+    # `up_to` included, the shares of a massless mode sum to less than 1 by what the cables keep
     massless = modes(vibration.state).shape
     mass = np.linalg.pinv(massless @ massless.T)
     return np.asarray((massless.T @ mass @ vibration.shape) ** 2)

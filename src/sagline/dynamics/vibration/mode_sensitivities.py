@@ -98,10 +98,8 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
 
 
 def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
-    """Geometric stiffness of forces on levers against rotations: r T^T - r.T, in its symmetric part.
-
-    Shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g).
-    """
+    """Geometric stiffness of forces on levers against rotations: r T^T - r.T, in its symmetric part."""
+    # shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g)
     along, pulled = levers @ turns, force @ turns
     mixed = along[..., :, None] * pulled[..., None, :]
     pressed = np.sum(levers * force, axis=-1)[..., None, None] * (turns.T @ turns)
@@ -155,10 +153,7 @@ def string_data(rest: StateSlopes) -> tuple[Cable, ...]:
 
 
 def mode_group(rest: StateSlopes, cables: tuple[Cable, ...], frequency: Array) -> ModeGroup:
-    """The modes of some neighboring frequencies that count as one.
-
-    Units: frequency [Hz].
-    """
+    """Modes of neighboring frequencies [Hz] that count as one."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
     omega *= 1.0 + _correction(rest, cables, omega, group)  # leaves CLOSE of the error
     waves = [_waves(cable, omega) for cable in cables]

@@ -31,18 +31,13 @@ class Receptance(NamedTuple):
     damping: Damping  # what takes energy out
 
     def fixed_end_modes(self, up_to: float) -> FixedEndModes:
-        """Fixed-end modes of the cables.
-
-        Units: up_to [Hz].
-        """
+        """Fixed-end modes of the cables up to a frequency [Hz]."""
         components = component_modes(self.model.strings, 0, max(TAKEN * up_to, LOWEST))
         return components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None
 
     def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
-        """The compliance by the modes of the cables, and that on massless cables.
-
-        Shapes: frequency (F,) [Hz]; returns (F, 6, 6).
-        """
+        """The compliance by the modes of the cables, and that on massless cables."""
+        # shapes: frequency (F,) [Hz]; returns (F, 6, 6)
         found = np.empty((2, frequency.size, 6, 6), dtype=np.complex128)
         for part in blocks(frequency.size, BLOCK):
             moving, still = self._moving(*held, 2.0 * np.pi * frequency[part])
@@ -51,10 +46,7 @@ class Receptance(NamedTuple):
         return found[0], found[1]
 
     def exact(self, frequency: Array) -> Complex:
-        """The compliance by the exact stiffness of the cables.
-
-        Shapes: frequency (F,) [Hz]; returns (F, 6, 6).
-        """
+        """The compliance by the exact stiffness of the cables; frequency (F,) [Hz]; returns (F, 6, 6)."""
         strings = self.model.strings
         moving = moving_stiffness(strings, frequency, self.damping)
         moving -= 2j * self.damping.modal_damping * self.cables  # which the whole stiffness has already
@@ -129,10 +121,8 @@ WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # of half a peak, about a mode: where
 
 
 def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
-    """The answer by the modes of a robot all of whose stiffness loses alike, which does not couple them.
-
-    Shapes: rest (3, 3).
-    """
+    """Receptance by the modes of a robot with one loss factor of all stiffness, which does not couple them."""
+    # shapes: rest (3, 3)
     natural = (2.0 * np.pi * found.frequency) ** 2
     products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
     lossy = 1.0 + 2j * ratio
@@ -146,10 +136,7 @@ def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceRecep
 
 
 def coupled_receptance(receptance: Receptance, up_to: float) -> ForceReceptance:
-    """The answer with losses that couple the modes.
-
-    Units: up_to [Hz].
-    """
+    """Receptance with losses that couple the modes, up to a frequency [Hz]."""
     held = receptance.fixed_end_modes(up_to)
     return lambda frequency: receptance.by_modes(frequency, held)[0][:, :3, :3]
 
@@ -157,10 +144,8 @@ def coupled_receptance(receptance: Receptance, up_to: float) -> ForceReceptance:
 def peak_receptance(
     receptance: ForceReceptance, natural: Array, ratios: Array, damping: Damping
 ) -> tuple[float, float]:
-    """Largest displacement for a force in any direction, at rest or near a mode.
-
-    Shapes: natural (K,) [Hz]; ratios (K,); returns [m/N], [Hz].
-    """
+    """Largest displacement for a force in any direction, at rest or near a mode."""
+    # shapes: natural (K,) [Hz]; ratios (K,); returns [m/N], [Hz]
     if damping == Damping():
         return np.inf, float(natural[0])
     around = np.concatenate(([0.0], natural))

@@ -126,10 +126,8 @@ class ResponseCurves(NamedTuple):
 
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """The platform's motion for a force at its center of mass, over frequency, up to where all modes are known.
-
-    Both are of `frequency_response`; air damping, which only swinging cables feel, has no part in the massless one.
-    """
+    """The platform's motion for a force at its center of mass, over frequency, up to where all modes are known."""
+    # Both are of `frequency_response`; air damping, which only swinging cables feel, has no part in the massless one
     state = instance(vibration, Vibration, "vibration").state
     if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
         reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"

@@ -52,10 +52,7 @@ class _ReducedModel(NamedTuple):
     components: Components  # of the cables
 
     def amplitudes(self, vectors: Array) -> Array:
-        """Amplitudes of the components beside their motion at rest.
-
-        Shapes: vectors (n + k, K); returns (T, K).
-        """
+        """Amplitudes of the components beside their motion at rest; vectors (n + k, K); returns (T, K)."""
         n = self.platform.shape[1]
         own = vectors[n:] - self.driven @ vectors[:n]
         found = np.empty((self.kept.size, vectors.shape[1]))
@@ -80,14 +77,10 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
 
 
 def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
-    """The eigenproblem of one state for its modes below a frequency.
-
-    The cables' modes a little above it are its unknowns; what those beyond answer to slow motions of the platform is
-    kept in a few motions of all together, which match the first moments (Krylov). With amplitudes counted from the
-    frame the mass is that of the platform, with what these leave of the cables' mass at rest, and one for each.
-
-    Units: up_to [Hz].
-    """
+    """Eigenproblem of one state for its modes below a frequency [Hz]."""
+    # The cables' modes a little above it are its unknowns; what those beyond answer to slow motions of the platform is
+    # kept in a few motions of all together, which match the first moments (Krylov). With amplitudes counted from the
+    # frame the mass is that of the platform, with what these leave of the cables' mass at rest, and one for each.
     components = component_modes(model.strings, row, KEPT * up_to)
     freedom, ends = model.freedom, model.ends[row]
     drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
@@ -121,10 +114,7 @@ def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
 
 
 def massless_modes(model: VibrationModel, row: int) -> tuple[Array, Array]:
-    """Vibrations of the platform alone, and how it leaves an unstable equilibrium.
-
-    Returns (n,) [Hz], (6, d).
-    """
+    """Vibrations of the platform alone, and how it leaves an unstable equilibrium, (n,) [Hz], (6, d)."""
     freedom = model.freedom
     upper = np.linalg.inv(np.linalg.cholesky(freedom @ model.mass[row] @ freedom.T)).T
     squares, vectors = np.linalg.eigh(upper.T @ freedom @ model.stiffness[row] @ freedom.T @ upper)
@@ -132,10 +122,8 @@ def massless_modes(model: VibrationModel, row: int) -> tuple[Array, Array]:
 
 
 def dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float) -> Array:
-    """D: what a force on the free motions takes for a vibration, exactly.
-
-    Shapes: moving (m, 3, 3) [N/m]; omega [rad/s]; returns (n, n).
-    """
+    """D: what a force on the free motions takes for a vibration, exactly."""
+    # shapes: moving (m, 3, 3) [N/m]; omega [rad/s]; returns (n, n)
     matrix = model.stiffness[row] + _on_platform(moving, model.ends[row]) - omega**2 * model.mass[row]
     return np.asarray(model.freedom @ matrix @ model.freedom.T)
 
@@ -146,13 +134,9 @@ def _on_platform(of_cables: Array, ends: Array) -> Array:
 
 
 def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
-    """Number of modes of the robot with its cables' mass below a frequency.
-
-    By Wittrick and Williams: those that the taut cables have with both ends held, and the negative eigenvalues of what
-    the platform then feels.
-
-    Units: frequency [Hz].
-    """
+    """Number of modes of the robot with its cables' mass below a frequency [Hz]."""
+    # By Wittrick and Williams: those that the taut cables have with both ends held, and the negative eigenvalues of
+    # what the platform then feels
     taut = np.flatnonzero(model.strings.taut[row])
     given = np.array([frequency])
     found = np.empty((1, 1, taut.size, collocation.FOUND))
@@ -198,10 +182,7 @@ class StateModes:
 
 
 def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
-    """Modes of one state below a frequency, as many as the exact count has.
-
-    Units: up_to [Hz].
-    """
+    """Modes of one state below a frequency [Hz], as many as the exact count has."""
     count = modes_below(model, row, up_to)
     check_mode_count(count, up_to, "up_to")
     problem = reduced_model(model, row, up_to)
@@ -219,20 +200,14 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
 
 
 def check_mode_count(count: int, frequency: float, item: str) -> None:
-    """Refuse more modes than somebody wants to wait for.
-
-    Units: frequency [Hz].
-    """
+    """Refuse a frequency [Hz] with too many modes below it."""
     if count > MOST_MODES:
         value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
         raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
 
 
 def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
-    """Share of each mode's kinetic energy that is each cable's.
-
-    Returns (m, K).
-    """
+    """Share of each mode's kinetic energy that is each cable's, (m, K)."""
     parts, ends, own = found.components, found.ends, found.amplitudes
     shares = np.asarray((ends * (parts.still @ ends)).sum(axis=1))
     for motions, end, given in parts.planes(ends, own):
@@ -241,10 +216,8 @@ def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
 
 
 def damping_ratios(density: Array, found: StateModes, shares: Array, damping: Damping) -> Array:
-    """Damping ratio of each mode, to first order: power lost over that of a critically damped one.
-
-    Shapes: density (m,) [kg/m]; returns (K,).
-    """
+    """Damping ratio of each mode, to first order: power lost over that of a critically damped one."""
+    # shapes: density (m,) [kg/m]; returns (K,)
     omega = 2.0 * np.pi * found.frequency
     lost = np.zeros(omega.size)
     if damping.air_damping > 0.0:

@@ -57,10 +57,8 @@ _INSTANTS: Final = 2000  # of a move, where its inertia is taken
 
 
 def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
-    """The frequencies that a path excites most: one, or two where the second is excited a third as much or more.
-
-    Shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz].
-    """
+    """The frequencies that a path excites most: one, or two where the second is excited a third as much or more."""
+    # shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz]
     segments = [segment for segment in segments_of(instance(path, Path, "path")) if segment.curve is not None]
     known = np.flatnonzero(frequency > 0.0)
     if not (segments and known.size):
@@ -76,10 +74,8 @@ def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path
 
 
 def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape: Array) -> Array:
-    """Excitation of each mode by a segment, times the platform's motion in the mode.
-
-    Shapes: frequency (K,) [Hz]; shape (6, K); returns (K,).
-    """
+    """Excitation of each mode by a segment, times the platform's motion in the mode."""
+    # shapes: frequency (K,) [Hz]; shape (6, K); returns (K,)
     time = np.linspace(0.0, segment.duration, _INSTANTS + 1)
     assert segment.curve is not None
     motion = segment.rates(time)
