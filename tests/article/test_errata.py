@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 
-from sagline.article import errata_cable, errata_platform
-from sagline.article.errata import DEMONSTRATIONS, errata
-from sagline.article.erratum import Erratum
+from sagline.article import errata, errata_platform
+from sagline.article.errata import DEMONSTRATIONS, errata_chapter
+from sagline.present.page import Finding
 
 
-def numbers(found: Erratum) -> list[float]:
+def numbers(found: Finding) -> list[float]:
     """The numbers of a demonstration, in the order of the page."""
-    return [quantity.value for quantity in found.numbers]
+    return list(found.numbers.values())
 
 
 def test_there_are_eleven_in_order() -> None:
-    assert [erratum.number for erratum in errata()] == list(range(1, 12))
+    assert [erratum.key for erratum in errata_chapter().findings] == [f"erratum-{k}" for k in range(1, 12)]
     assert len({demonstrate.__name__ for demonstrate in DEMONSTRATIONS}) == 11
 
 
@@ -69,26 +69,26 @@ def test_erratum_4_the_square_of_h_is_singular() -> None:
 
 
 def test_erratum_5_the_stretch_is_off_by_half_the_weight() -> None:
-    error, over_sine, formula, left = numbers(errata_cable.stretch_by_end_tension())
+    error, over_sine, formula, left = numbers(errata.stretch_by_end_tension())
     assert error == pytest.approx(formula, rel=0.01)
     assert over_sine == pytest.approx(1.63, abs=0.02)
     assert abs(left) < 0.01
 
 
 def test_erratum_6_the_sag_constant_is_g_squared_over_24() -> None:
-    _, by_regression, added = numbers(errata_cable.sag_constant())
+    _, by_regression, added = numbers(errata.sag_constant())
     assert by_regression == pytest.approx(9.81**2 / 24.0, rel=5e-4)
     assert added == pytest.approx(9.36, abs=0.01)
 
 
 def test_erratum_7_the_bound_is_positive() -> None:
-    printed, right, exact = numbers(errata_cable.sign_in_bound())
+    printed, right, exact = numbers(errata.sign_in_bound())
     assert printed < 0.0 < right
     assert exact == pytest.approx(right, rel=0.15)
 
 
 def test_erratum_8_vertical_and_level_cables_break_the_formulas() -> None:
-    _, h_at_1_mm, _, h_at_1_um, j_at_1_um, bound, vertical, _ = numbers(errata_cable.vertical_and_level())
+    _, h_at_1_mm, _, h_at_1_um, j_at_1_um, bound, vertical, _ = numbers(errata.vertical_and_level())
     assert h_at_1_um > 500.0 * h_at_1_mm
     assert j_at_1_um < 100.0
     assert bound > 1e6
@@ -96,19 +96,19 @@ def test_erratum_8_vertical_and_level_cables_break_the_formulas() -> None:
 
 
 def test_erratum_9_the_errors_are_distances() -> None:
-    of_distances, of_sums = numbers(errata_cable.error_formula())
+    of_distances, of_sums = numbers(errata.error_formula())
     assert of_distances < 1e-4
     assert of_sums == pytest.approx(7.0 * 44.7884, abs=0.01)
 
 
 def test_erratum_10_the_parameters_are_in_table_1() -> None:
-    poses, _, agree = numbers(errata_cable.table_number())
+    poses, _, agree = numbers(errata.table_number())
     assert poses == 10.0
     assert agree == 1.0
 
 
 def test_erratum_11_the_least_tension_and_the_transpose() -> None:
-    least, formula, printed, misplaced = numbers(errata_cable.printed_formulas())
+    least, formula, printed, misplaced = numbers(errata.printed_formulas())
     assert least == pytest.approx(formula, rel=1e-6)
     assert printed < 0.5 * least
     assert misplaced > 100.0

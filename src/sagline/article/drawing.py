@@ -19,7 +19,7 @@ from sagline.plot.sheet import BLUE, GAP_COLOR, LABEL, TICK, Sheet, cable_look, 
 from sagline.present.page import Panel
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.contour import ContourSet
@@ -154,6 +154,25 @@ def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
     ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
     ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
     legend(ax)
+
+
+def error_panels(
+    names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str, draw: Drawings
+) -> list[Panel]:
+    """Areas of errors at positions (N, 3) in the x-z and y-z planes; of each series label, errors, scale and color."""
+    panels = []
+    for column, name in ((0, "x"), (1, "y")):
+        figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
+        place = position[:, [column, 2]]
+        for label, errors, scale, color in series:
+            ax.scatter(place[:, 0], place[:, 1], s=scale * errors, color=color, alpha=0.3, linewidths=0.0, label=label)
+        for point, at in zip(names, place, strict=True):
+            ax.annotate(point, at, fontsize=TICK, ha="center", va="center")
+        ax.margins(0.16)
+        if len(series) > 1:
+            legend(ax)
+        panels.append(draw.panel(figure, caption.format(name)))
+    return panels
 
 
 class Courses(NamedTuple):

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from sagline import control
-from sagline.article.drawing import Drawings, axes, cables_over_time, legend
+from sagline.article.drawing import Drawings, cables_over_time, error_panels, legend
 from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import plain
-from sagline.plot.sheet import BLUE, TICK, VERMILLION
+from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, Table, Verdict, page, table_of, write_page
 
 NAMES = ("experiment.html", "experiment.json")
@@ -133,22 +133,13 @@ def _courses(result: Experiment, values: Array, label: str, caption: str, draw: 
 
 
 def _space(result: Experiment, draw: Drawings) -> Finding:
-    table, panels = result.table, []
-    scales = AREA / np.array([table.distance.max(), result.distance.max()])
-    for column, name in ((0, "x"), (1, "y")):
-        figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
-        place = table.desired[:, [column, 2]]
-        for who, distance, scale, color in (
-            ("article", table.distance, scales[0], VERMILLION),
-            ("ours", result.distance, scales[1], BLUE),
-        ):
-            text = f"{who}, largest {n(1e3 * distance.max(), '.2g', 'mm')}"
-            ax.scatter(place[:, 0], place[:, 1], s=scale * distance, color=color, alpha=0.3, linewidths=0.0, label=text)
-        for point, (x, z) in zip(table.points, place, strict=True):
-            ax.annotate(point, (x, z), fontsize=TICK, ha="center", va="center")
-        ax.margins(0.16)
-        legend(ax)
-        panels.append(draw.panel(figure, f"The points in the {name}-z plane; areas are errors, each on its own scale."))
+    table = result.table
+    series = [
+        (f"{who}, largest {n(1e3 * errors.max(), '.2g', 'mm')}", errors, AREA / errors.max(), color)
+        for who, errors, color in (("article", table.distance, VERMILLION), ("ours", result.distance, BLUE))
+    ]
+    caption = "The points in the {}-z plane; areas are errors, each on its own scale."
+    panels = error_panels(table.points, table.desired, series, caption, draw)
     height = table.desired[:, 2]
     slopes = [float(np.polyfit(height, 1e3 * error[:, 2], 1)[0]) for error in (table.error, result.error)]
     return Finding(

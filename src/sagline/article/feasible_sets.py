@@ -30,6 +30,11 @@ class End(NamedTuple):
     span: float  # horizontal distance from the frame end [m]
     rise: float  # height above the frame end [m]
 
+    @classmethod
+    def at_angle(cls, chord: float) -> End:
+        """End of a chord [m] at the article's angle."""
+        return cls(chord * float(np.cos(ANGLE)), chord * float(np.sin(ANGLE)))
+
     @property
     def chord(self) -> float:
         """D [m]."""
@@ -97,7 +102,7 @@ def _diamond(points: int) -> Array:
 
 def feasible_chapter() -> Chapter:
     """Tensions that reach a point, with a tolerance and without."""
-    end = End(CHORD * float(np.cos(ANGLE)), CHORD * float(np.sin(ANGLE)))
+    end = End.at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     draw = Drawings("feasible")
     return Chapter(

@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.article.causes import best_explanations, limits_of_ten_points, single_causes
-from sagline.article.drawing import Drawings, axes, cables_over_time, legend
+from sagline.article.drawing import Drawings, axes, cables_over_time, error_panels, legend
+from sagline.article.machine import Parameter
 from sagline.article.sampling import fit_line
 from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.plot.sheet import BLUE, COLORS, TICK
+from sagline.plot.sheet import BLUE, COLORS
 from sagline.present.page import Chapter, Finding, Table, Verdict, table_of
+
+AREA = 2e4  # pt^2 a meter of error
 
 
 def poses_chapter() -> Chapter:
@@ -107,15 +110,9 @@ def _tour(way: Tour, draw: Drawings) -> Finding:
 
 
 def _space(study: TenPoses, draw: Drawings) -> Finding:
-    table, panels = study.table, []
-    for column, name in ((0, "x"), (1, "y")):
-        figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
-        place = table.desired[:, [column, 2]]
-        ax.scatter(place[:, 0], place[:, 1], s=2e4 * table.distance, color=BLUE, alpha=0.35, linewidths=0.0)
-        for point, (x, z) in zip(table.points, place, strict=True):
-            ax.annotate(point, (x, z), fontsize=TICK, ha="center", va="center")
-        ax.margins(0.12)
-        panels.append(draw.panel(figure, f"The poses in the {name}-z plane; the area is the positioning error."))
+    table = study.table
+    caption = "The poses in the {}-z plane; the area is the positioning error."
+    panels = error_panels(table.points, table.desired, [("", table.distance, AREA, BLUE)], caption, draw)
     line, height = study.height_line, table.desired[:, 2]
     figure, ax = axes("$z$ desired [m]", "vertical error [mm]")
     ax.plot(height, 1e3 * table.error[:, 2], "o", color=BLUE, markersize=4.0, label="measured")
@@ -156,22 +153,14 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     for k, trend in enumerate(study.trends):
         axis = ax if k < 5 else bx
         line = fit_line(height, 1e3 * trend.error[:, 2])
-        label = f"{trend.parameter.name} {n(trend.parameter.typical, '+g', trend.parameter.unit)}"
-        axis.plot(fine, line.slope * fine + line.intercept, color=COLORS[k % 5], linewidth=1.2, label=label)
+        course = line.slope * fine + line.intercept
+        axis.plot(fine, course, color=COLORS[k % 5], linewidth=1.2, label=_typical(trend.parameter))
     for axis in (ax, bx):
         axis.set_ylim(-25.0, 85.0)
         legend(axis)
-    rows = [
-        (
-            f"{trend.parameter.name} {n(trend.parameter.typical, '+g', trend.parameter.unit)}",
-            *(n(1e3 * z, ".1f") for z in trend.error[:, 2]),
-            n(trend.height_slope, "+.1f"),
-        )
-        for trend in study.trends
-    ]
-    rows.append(
-        ("measured", *(n(1e3 * z, ".1f") for z in study.table.error[:, 2]), n(1e3 * study.height_line.slope, "+.1f"))
-    )
+    listed = [(_typical(trend.parameter), trend.error, trend.height_slope) for trend in study.trends]
+    listed.append(("measured", study.table.error, float(1e3 * study.height_line.slope)))
+    rows = [(name, *(n(1e3 * z, ".1f") for z in error[:, 2]), n(slope, "+.1f")) for name, error, slope in listed]
     slopes = {trend.parameter.name: trend.height_slope for trend in study.trends}
     falling = [name for name, slope in slopes.items() if slope * study.height_line.slope > 1e-6 * abs(slope)]
     return Finding(
@@ -197,6 +186,11 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
             ),
         ),
     )
+
+
+def _typical(parameter: Parameter) -> str:
+    """A parameter with its typical error."""
+    return f"{parameter.name} {n(parameter.typical, '+g', parameter.unit)}"
 
 
 def _span(values: Array, form: str) -> str:

@@ -36,7 +36,7 @@ DRAWN = (1, 3, 5, 7, 9)  # densities that are drawn
 
 def sag_chapter() -> Chapter:
     """From the adjusting length to k_p."""
-    end = End(CHORD * float(np.cos(ANGLE)), CHORD * float(np.sin(ANGLE)))
+    end = End.at_angle(CHORD)
     stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
     draw = Drawings("sag")
     return Chapter(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
+import attrs
 import numpy as np
-from numpy.typing import ArrayLike
 
 import sagline as sl
 from sagline.core.arrays import Array, checked
+from sagline.core.fields import given, rule
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
 ANGLE = 0.754  # rad, of the article's figure 10
@@ -46,34 +46,24 @@ def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
     return factor
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sampling:
-    """Every combination of four quantities of a cable that is held with its platform end above its frame end."""
+_POSITIVE = {"shape": (None,), "above": 0.0}
 
-    angles: Array  # angle phi of the chord (the article's beta) [rad], shape (a,), between 0 and pi/2
-    chords: Array  # D [m], shape (c,), > 0
-    densities: Array  # rho [kg/m], shape (r,), > 0
-    tensions: Array  # T_x [N], shape (t,), > 0
+
+@attrs.frozen(eq=False)
+class Sampling:
+    """Every combination of four quantities of a cable whose platform end is above its frame end."""
+
+    # angle phi of the chord (the article's beta), between 0 and pi/2
+    angles: Array = attrs.field(converter=given, metadata=rule("rad", shape=(None,)))
+    chords: Array = attrs.field(converter=given, metadata=rule("m", **_POSITIVE))
+    densities: Array = attrs.field(converter=given, metadata=rule("kg/m", **_POSITIVE))
+    tensions: Array = attrs.field(converter=given, metadata=rule("N", **_POSITIVE))  # T_x
     axial_stiffness: float = UNSTRETCHABLE  # EA of all of them [N]
 
-    def __init__(
-        self,
-        angles: ArrayLike,
-        chords: ArrayLike,
-        densities: ArrayLike,
-        tensions: ArrayLike,
-        axial_stiffness: float = UNSTRETCHABLE,
-    ) -> None:
+    def __attrs_post_init__(self) -> None:
         """Check the four."""
-        object.__setattr__(self, "angles", checked(angles, "angles", "rad", shape=(None,)))
-        for name, value, unit in (
-            ("chords", chords, "m"),
-            ("densities", densities, "kg/m"),
-            ("tensions", tensions, "N"),
-        ):
-            object.__setattr__(self, name, checked(value, name, unit, shape=(None,), above=0.0))
-        stiffness = checked(axial_stiffness, "axial_stiffness", "N", shape=(), above=0.0)
-        object.__setattr__(self, "axial_stiffness", float(stiffness))
+        for about in (about for about in attrs.fields(Sampling) if about.metadata):
+            object.__setattr__(self, about.name, checked(getattr(self, about.name), about.name, **about.metadata))
 
     def hang(self) -> sl.CableState:
         """The exact cables."""

@@ -38,7 +38,6 @@ class Trend(NamedTuple):
     error: Array  # predicted actual less desired position [m], shape (10, 3)
     # change of the vertical error with the height of the pose, mm per m; the measured one is negative
     height_slope: float
-    height_correlation: float  # correlation of the vertical error with the height
 
 
 class Tour(NamedTuple):
@@ -125,7 +124,7 @@ def _planned(robot: sl.Robot, positions: Array) -> sl.Plan:
 def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
     height = table.desired[:, 2]
     line = fit_line(height, 1e3 * error[:, 2])
-    return Trend(parameter, error, float(line.slope), float(np.corrcoef(height, error[:, 2])[0, 1]))
+    return Trend(parameter, error, float(line.slope))
 
 
 def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> Limits:

@@ -8,13 +8,13 @@ import numpy as np
 
 import sagline as sl
 from sagline.article.drawing import Drawings, axes, legend
+from sagline.article.simulation import ROBOTS
 from sagline.core.numbers import n
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding, Panel, Verdict, table_of
 from sagline.workspaces.region import Plane, slice_of
 
-ROBOTS = ("article-suspended", "article-mixed")
 CELLS = 24  # along the longest edge of the frame
 HEIGHT = 3.0  # m: half the frame's
 POINTS = 121  # along each side of a slice
