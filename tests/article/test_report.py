@@ -3,6 +3,7 @@
 import json
 import re
 import statistics
+import tomllib
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.article import texts
 from sagline.article.report import PARTS, ArticleReport, selection, write_article
 from sagline.present.page import Verdict
 from tests.article.conftest import Written
@@ -316,3 +318,19 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path: Pa
     (tmp_path / "file").write_text("")
     with refused(kind=sl.FileError, file=tmp_path / "file"):
         write_article(tmp_path / "file", progress=lambda *_: pytest.fail("it began"))
+
+
+def test_every_text_belongs_to_a_finding_or_a_chapter() -> None:
+    folder = Path(texts.__file__).parent
+    source = "".join(file.read_text(encoding="utf-8") for file in folder.glob("*.py"))
+    entries = tomllib.loads((folder / "data" / "report.toml").read_text(encoding="utf-8"))
+    for kind, call in (("findings", "finding"), ("chapters", "chapter")):
+        for key in entries[kind]:
+            assert re.search(rf'{call}\(\s*"{key}"', source), key
+
+
+def test_numbers_of_texts_have_factors_parts_and_units() -> None:
+    known = {"share": 0.25, "errors": [1.0, 2.0], "fit": {"k": 4.385}, "count": 12, "word": "slack"}
+    template = "{100*share:.1f %} {1000*errors[1]:.0f mm} {fit[k]:.2f} {count} {word}"
+    text = texts._Numbers().format(template, **known)
+    assert text.replace("\N{NO-BREAK SPACE}", " ") == "25.0 % 2 m 4.38 12 slack"

@@ -11,9 +11,10 @@ from sagline.article.explanations import Explanation, corrected_aic
 from sagline.article.machine import ANCHORS, DEAD, DENSITY, LOAD, MODULUS, PULLEY, ZERO
 from sagline.article.sampling import fit_line
 from sagline.article.ten_poses import TenPoses, Trend
+from sagline.article.texts import finding
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Finding, Panel, Table, Verdict
+from sagline.present.page import Finding, Panel, Table
 
 COUNTS = ("one parameter", "two parameters", "three parameters")
 SHOWN = 8  # explanations by two, and by three parameters, in the table
@@ -35,25 +36,8 @@ def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
     far = float(np.ceil(10.0 * max(ratios))) / 10.0
     inside = min(found.aicc for found in study.explanations[2] if not found.at_limit.any())
     count = sum(len(group) for group in study.explanations)
-    return Finding(
-        key="explanations",
-        title="what would explain the measured errors",
-        statement="Sources named: the model, the measurement, the cable material, latency, transmission and cumulative "
-        "error.",
-        measured=f"All {count} models of one to three of the ten parameters, alike for all cables, fitted with exact "
-        f"cables on exact pulleys. Of {_left(study.measured_rms)} (root mean square of all coordinates) the best "
-        f"single parameter leaves {_left(one.rms)}: {_values(one)}. Two leave {_left(two.rms)}: {_values(two)}; a pose "
-        f"that is left out of the fit is predicted to {_left(two.left_out)}.\n\nA third parameter tells "
-        f"nothing sure. The best three, {_values(three)}, leave {_left(three.rms)} (left-out pose "
-        f"{_left(three.left_out)}) by running to the limit of what we think plausible: that is our limit, not a "
-        f"finding. Where three stay inside, AICc, which charges for parameters, is {n(inside - two.aicc, '.1f')} "
-        f"higher than for the best two, at least. Beside pulleys and zeros, dead cable fits as "
-        f"{_told(beside[DEAD], DEAD)} and explains nothing; E ({_told(beside[MODULUS], MODULUS)}) and load "
-        f"({_told(beside[LOAD], LOAD)}) stay within {n(far, '.1f')} standard deviations of "
-        f"nominal.\n\nThe pattern is geometric, as pulleys that the plan did not know or a wrong height of the anchors "
-        f"make it: E alone leaves {_left(alone[MODULUS].rms)}, ρ alone {_left(alone[DENSITY].rms)}. The next pair, "
-        f"{_values(second)}, leaves {_left(second.rms)}; its AICc is {n(second.aicc - two.aicc, '.1f')} higher.",
-        verdict=Verdict.OPEN,
+    return finding(
+        "explanations",
         numbers={
             "models": count,
             "measured_rms_mm": 1e3 * study.measured_rms,
@@ -64,6 +48,19 @@ def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
         },
         panels=tuple(_panel(study, study.best(k + 1), name, draw) for k, name in enumerate(COUNTS)),
         data=(_table(study),),
+        one=one,
+        two=two,
+        three=three,
+        second=second,
+        one_values=_values(one),
+        two_values=_values(two),
+        three_values=_values(three),
+        dead_cable=_told(beside[DEAD], DEAD),
+        modulus=_told(beside[MODULUS], MODULUS),
+        load=_told(beside[LOAD], LOAD),
+        modulus_alone=alone[MODULUS],
+        density_alone=alone[DENSITY],
+        second_values=_values(second),
     )
 
 
@@ -72,20 +69,8 @@ def limits_of_ten_points(study: TenPoses) -> Finding:
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {PULLEY, ANCHORS} for found in few)
     zeros = 1e3 * study.limits.single_zero
-    return Finding(
-        key="ten-points",
-        title="what ten points cannot say",
-        statement="",
-        measured=f"Pulley against anchor height: zeros and anchor height together do {_percent(study.limits.imitated)} "
-        f"of what a pulley does at these poses. {'Every' if named else 'Not every'} pair that leaves less than "
-        f"{n(1e3 * FEW, '.0f', 'mm')} ({len(few)} of {len(study.explanations[1])}) has one of the two in it. Only a "
-        "drawing or a caliper decides.\n\nWhich winch: here all eight are alike. If every cable had its own zero, the "
-        f"ten points would tell it to {n(zeros.min(), '.0f')} to {n(zeros.max(), '.0f', 'mm')} (standard deviation), "
-        "more than all that is to be explained.\n\nAnything of wiring and anchors: the article prints no coordinates, "
-        f"both are our assumption. And nothing below {_left(PRINTING)}: positions are printed in whole millimeters. "
-        f"What the best pair leaves is {n(study.best(2).rms / PRINTING, '.0f')} times that, so it is not the whole "
-        "truth either.",
-        verdict=Verdict.OURS,
+    return finding(
+        "ten-points",
         numbers={
             "printing_rms_mm": 1e3 * PRINTING,
             "pulley_imitated_by_zero_and_anchor_height": study.limits.imitated,
@@ -103,6 +88,9 @@ def limits_of_ten_points(study: TenPoses) -> Finding:
                 [("its own zero [mm]", *(n(x, ".0f") for x in zeros))],
             ),
         ),
+        every="Every" if named else "Not every",
+        least_zero=zeros.min(),
+        largest_zero=zeros.max(),
     )
 
 
@@ -172,14 +160,6 @@ def _ratio(found: Explanation, name: str) -> float:
     return float(abs(found.values[k]) / found.deviation[k])
 
 
-def _left(length: float) -> str:
-    return n(1e3 * length, ".1f", "mm")
-
-
-def _percent(share: float) -> str:
-    return n(100.0 * share, ".1f", "%")
-
-
 def single_causes(study: TenPoses) -> Finding:
     """Every class alone: an example of it, its best value, what that leaves, and why."""
     ranked = study.explanations[0]
@@ -191,23 +171,8 @@ def single_causes(study: TenPoses) -> Finding:
     pair, low, high = study.best(2), study.table.points.index(LOWEST), study.table.points.index(HIGHEST)
     dead, error = 1e3 * study.dead_meter[:, 2], 1e3 * study.table.error[:, 2]
     names = " and ".join(sorted(parameter.name for parameter in pair.parameters))
-    return Finding(
-        key="classes",
-        title="what each imperfection does, and which fits",
-        statement="",
-        measured=f"The platform sits too high, most of all where it is low: {n(study.measured_rms * 1e3, '.1f', 'mm')} "
-        f"in the root mean square of all coordinates, and {n(-measured, '.1f', 'mm')} less with every meter up. What "
-        "explains that must lift the platform, and lift it most near the floor.\n\n"
-        f"Alone, only {_listed(falling)} has that slope, but leaves {n(1e3 * alone[PULLEY].rms, '.1f', 'mm')}: it does "
-        "nothing at home, where the encoders are set, and lowers the platform above it. "
-        f"{ANCHORS.capitalize()} leaves least, {n(1e3 * alone[ANCHORS].rms, '.1f', 'mm')}, but lifts every pose alike. "
-        f"Two together do better: {names} leave {n(1e3 * pair.rms, '.1f', 'mm')}.\n\n"
-        f"Nothing is explained by {_listed(none)}. Dead cable, which seems likely behind a winch, is refuted: a meter "
-        f"of it moves {HIGHEST} by {n(dead[high], '+.0f', 'mm')} where {n(error[high], '+.0f', 'mm')} were measured, "
-        f"and {LOWEST} by {n(dead[low], '+.0f', 'mm')} where {n(error[low], '+.0f', 'mm')} were.\n\n"
-        "No tension loop mends any of them: it can change only such lengths as leave the platform where it is. "
-        "“sagline experiment article --true” drives a machine that is off, and shows it; a calibration mends them.",
-        verdict=Verdict.OURS,
+    return finding(
+        "classes",
         numbers={
             "measured_rms_mm": 1e3 * study.measured_rms,
             "measured_slope_mm_per_m": measured,
@@ -220,6 +185,13 @@ def single_causes(study: TenPoses) -> Finding:
             "fall_as_measured": falling,
         },
         data=(_table_of_classes(study, alone, slopes),),
+        fall=-measured,
+        falling=_listed(falling),
+        pulley=alone[PULLEY],
+        anchors_name=ANCHORS.capitalize(),
+        anchors=alone[ANCHORS],
+        names=names,
+        no_cause=_listed(none),
     )
 
 

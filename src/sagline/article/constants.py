@@ -19,10 +19,11 @@ from sagline.article.regressions import (
     intercept_studies,
     published_sampling,
 )
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, PURPLE, VERMILLION
-from sagline.present.page import Chapter, Finding, Verdict, table_of
+from sagline.present.page import Chapter, Finding, table_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,15 +39,10 @@ def intercept_chapter() -> Chapter:
     sampling = published_sampling()
     platform, frame = intercept_studies(sampling)
     draw = Drawings("intercept")
-    return Chapter(
+    return chapter(
         "intercept",
-        "The intercept of π",
-        f"Lines T_z(T_x) fitted to exact cables: chords {n(sampling.chords[0])} to "
-        f"{n(sampling.chords[-1], unit='m')}, ρ up to "
-        f"{n(sampling.densities[-1], unit='kg/m')}, T_x from {n(sampling.tensions[0], '.3g', 'N')} to "
-        f"{n(sampling.tensions[-1], '.3g', 'N')}, the range in which the article's constants come out "
-        "(see below). Each at both ends of the cable.",
         (_over_chord(platform, frame, draw), _over_density(platform, frame, draw)),
+        **{name: getattr(sampling, name)[[0, -1]] for name in ("chords", "densities", "tensions")},
     )
 
 
@@ -54,12 +50,7 @@ def constants_chapter() -> Chapter:
     """Dependence of k_h and k_p on the sampled tensions."""
     study = constants_study(published_sampling(), LOWEST, HIGHEST, FACTORS)
     draw = Drawings("constants")
-    return Chapter(
-        "constants",
-        "What the constants depend on",
-        "The article does not print the tensions it sampled. They decide what the regressions give.",
-        (_range(study, draw), _limit(study, draw)),
-    )
+    return chapter("constants", (_range(study, draw), _limit(study, draw)))
 
 
 def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings) -> Finding:
@@ -73,15 +64,8 @@ def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings)
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     legend(ax, r"$\rho$ [kg/m]")
     bent = [_bend(sampling.chords[:, None], study.intercept, study.h_b[:, None, :]) for study in (platform, frame)]
-    return Finding(
-        key="b-over-chord",
-        figures=(6,),
-        title="b_π is proportional to D",
-        statement="(27): b_π = h_b(ρ) D.",
-        measured=f"So it is: away from the proportion by at most {n(100 * bent[0], '.2g', '%')} of the largest b_π at "
-        "the "
-        f"platform end and {n(100 * bent[1], '.2g', '%')} at the frame end.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "b-over-chord",
         numbers={"nonproportional_share_platform": bent[0], "nonproportional_share_frame": bent[1]},
         panels=(
             draw.panel(figure, "b_π at φ = 0.754 rad: platform end (circles, solid), frame end (squares, dashed)."),
@@ -103,17 +87,8 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
     ax.axhline(0.0, color="0.6", linewidth=0.6)
     legend(ax, r"$\varphi$ [rad]")
     spread = np.ptp(frame.k_h_of_angle) / abs(frame.k_h)
-    return Finding(
-        key="h-over-density",
-        figures=(7,),
-        title="h_b is proportional to ρ, and k_h",
-        statement="h_b is linearly decreasing in ρ and does not depend on β; h_b = k_h ρ with |k_h| ≈ 4.845, "
-        "approximately half of g; (28): h_b = −ρg/2.",
-        measured=f"k_h = {n(frame.k_h, '.4f', 'm/s²')} at the frame end, {n(platform.k_h, '+.4f', 'm/s²')} at the "
-        "platform "
-        f"end; g/2 = {n(SHALLOW_K_H)}. The decreasing h_b of the article's figure is the frame end's; the force on the "
-        f"platform needs the other, rising one. Over the angles k_h varies by {n(100 * spread, '.2g', '%')}.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "h-over-density",
         numbers={
             "k_h_frame": frame.k_h,
             "k_h_platform": platform.k_h,
@@ -142,17 +117,8 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
     _logarithmic(bx, (500, 2000, 10_000, 40_000))
     legend(bx)
     all_k_p = [c.k_p for c in study.over_lowest]
-    return Finding(
-        key="published-range",
-        title="the range of tensions that gives the published constants",
-        statement="“Based on our taken data” k_h ≈ 4.845; “based on the non-linear regression method” k_p ≈ 4.385. "
-        "The tensions are not given.",
-        measured=f"With T_x evenly spaced from {n(found.lowest, '.1f', 'N')} to {n(found.highest, '.2f', 'N')} the "
-        f"article's regressions give both: |k_h| = {n(abs(found.k_h_frame), '.4f')} at the frame end and k_p = "
-        f"{n(found.k_p, '.4f')}. With other lower ends k_p runs from {n(min(all_k_p), '.3g')} to "
-        f"{n(max(all_k_p), '.3g')}: the least squares of d = a_d/T_x² hear the slackest cables alone. This is one "
-        "range that fits, for our choice of chords, angles and densities, not proof that it was theirs.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "published-range",
         numbers={
             "published_range": found._asdict(),
             "over_lowest": [c._asdict() for c in study.over_lowest],
@@ -162,6 +128,9 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
             draw.panel(figure, f"k_p over the lowest tension, up to {n(found.highest, '.3g', 'N')}."),
             draw.panel(second, f"|k_h| over the highest tension, from {n(found.lowest, '.3g', 'N')}."),
         ),
+        k_h=abs(found.k_h_frame),
+        least_k_p=min(all_k_p),
+        largest_k_p=max(all_k_p),
     )
 
 
@@ -175,15 +144,8 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
         ax.semilogy(FACTORS, away, color=color, marker="o", markersize=3.0, linewidth=1.1, label=labels[name])
     _logarithmic(ax, tuple(FACTORS.astype(int)))
     legend(ax)
-    return Finding(
-        key="taut-limit",
-        title="taut cables: g/2 and g²/24",
-        statement="k_h is “approximately equal to half of gravitational acceleration”; k_p cannot be "
-        "formulated exactly.",
-        measured=f"As tensions grow, |k_h| tends to g/2 at both ends and k_p to g²/24: at {n(FACTORS[-1])} times the "
-        f"range they are {n(last.k_h_platform, '.4f')}, {n(last.k_h_frame, '.4f')} and {n(last.k_p, '.4f')}. Both "
-        "follow from the exact equations to first order in sag.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "taut-limit",
         numbers={"scaled": [c._asdict() for c in study.scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},
         panels=(draw.panel(figure, "How far the constants are from g/2 and g²/24."),),
         data=(
@@ -197,6 +159,8 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
                 ("k_p [m²/s⁴]", [*(c.k_p for c in study.scaled), SHALLOW_K_P], ".5f"),
             ),
         ),
+        factor=FACTORS[-1],
+        last=last,
     )
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from sagline import control
 from sagline.article.drawing import Drawings, cables_over_time, error_panels, legend
 from sagline.article.experiment import SPEED, STOP, Experiment
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import plain
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Chapter, Finding, Panel, Table, Verdict, page, table_of, write_page
+from sagline.present.page import Chapter, Finding, Panel, Table, page, table_of, write_page
 
 NAMES = ("experiment.html", "experiment.json")
 TITLE = "The experiment, done again"
@@ -39,27 +40,18 @@ def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
 def experiment_chapter(result: Experiment, how: str) -> Chapter:
     """Chapter of an experiment."""
     draw = Drawings("experiment")
-    return Chapter(
+    return chapter(
         "experiment",
-        "Home, ten points, home",
-        how,
         (_stops(result), _cells(result, draw), _lengths(result, draw), _space(result, draw), _run(result)),
+        how=how,
     )
 
 
 def _stops(result: Experiment) -> Finding:
     table = result.table
     worst, ours, theirs = int(np.argmax(result.distance)), 1e3 * result.distance, 1e3 * table.distance
-    return Finding(
-        key="stops",
-        tables=(2,),
-        title="ours beside the article's",
-        statement=f"Errors from {n(theirs.min(), '.1f')} to {n(theirs.max(), '.1f', 'mm')}, "
-        f"{n(theirs.mean(), '.1f', 'mm')} in the mean.",
-        measured=f"Ours: {n(ours.mean(), '.4f')} mm in the mean, {n(ours.max(), '.4f')} mm at most, at "
-        f"{table.points[worst]}. Back at home the platform is {n(1e3 * np.linalg.norm(result.back), '.4f')} mm from "
-        "where it began.",
-        verdict=Verdict.OURS,
+    return finding(
+        "stops",
         numbers={
             "error_mm": 1e3 * result.error,
             "distance_mm": ours,
@@ -83,23 +75,18 @@ def _stops(result: Experiment) -> Finding:
                 ("null-space error [N]", [*result.null_error, ""], ".1f"),
             ),
         ),
+        article_least=theirs.min(),
+        article_largest=theirs.max(),
+        article_mean=theirs.mean(),
+        worst_point=table.points[worst],
     )
 
 
 def _cells(result: Experiment, draw: Drawings) -> Finding:
     off, cells, early = result.cells - result.planned, result.cells, result.time < JERK
     at_stops = result.tension - result.planned_tension
-    return Finding(
-        key="load-cells",
-        figures=(25,),
-        title="what the load cells read",
-        statement="Amplified signals, without numbers. The torque fluctuates most when the platform starts, from the "
-        "overshoot of the PID controller; this jerk lasts about 2 s.",
-        measured=f"From {n(cells.min(), '.0f')} to {n(cells.max(), '.0f', 'N')} under way, at most "
-        f"{n(np.abs(off).max(), '.1f', 'N')} off the plan; in the first two seconds "
-        f"{n(np.abs(off[early]).max(), '.1f', 'N')}. At the stops, in the mean of a second, they are at most "
-        f"{n(np.abs(at_stops).max(), '.1f', 'N')} off.",
-        verdict=Verdict.OURS,
+    return finding(
+        "load-cells",
         numbers={
             "least_N": cells.min(),
             "largest_N": cells.max(),
@@ -114,13 +101,8 @@ def _cells(result: Experiment, draw: Drawings) -> Finding:
 def _lengths(result: Experiment, draw: Drawings) -> Finding:
     lengths = result.lengths
     caption = "Lengths by the encoders, less those at home; dashed: the ten stops, left out."
-    return Finding(
-        key="encoders",
-        figures=(26,),
-        title="how the lengths differ from those at home",
-        statement="Differences of cable length from the encoders, without numbers.",
-        measured=f"From {n(lengths.min(), '.3g')} to {n(lengths.max(), '.3g', 'm')}.",
-        verdict=Verdict.OURS,
+    return finding(
+        "encoders",
         numbers={"least_m": lengths.min(), "largest_m": lengths.max()},
         panels=(_courses(result, 1e3 * lengths, "$L - L_{home}$ [mm]", caption, draw),),
     )
@@ -142,17 +124,7 @@ def _space(result: Experiment, draw: Drawings) -> Finding:
     panels = error_panels(table.points, table.desired, series, caption, draw)
     height = table.desired[:, 2]
     slopes = [float(np.polyfit(height, 1e3 * error[:, 2], 1)[0]) for error in (table.error, result.error)]
-    return Finding(
-        key="space",
-        figures=(27,),
-        title="where the errors are",
-        statement="The lower the platform, the larger the error: the vertical error changes by "
-        f"{n(slopes[0], '+.1f', 'mm')} with every meter of height.",
-        measured=f"Ours changes by {n(slopes[1], '+.3g', 'mm')} with every meter.",
-        verdict=Verdict.OURS,
-        numbers={"article_slope_mm_per_m": slopes[0], "slope_mm_per_m": slopes[1]},
-        panels=tuple(panels),
-    )
+    return finding("space", numbers={"article_slope_mm_per_m": slopes[0], "slope_mm_per_m": slopes[1]}, panels=panels)
 
 
 def _run(result: Experiment) -> Finding:
@@ -172,12 +144,8 @@ def _run(result: Experiment) -> Finding:
         ("lengths it had changed at the stops, at most", "", n(1e3 * np.abs(result.correction).max(), ".2f", "mm")),
         ("faults and notes", "", "; ".join(event.text for event in told) or "none"),
     ]
-    return Finding(
-        key="run",
-        title="how it went",
-        statement="“The test was done in about 14 min with 100 samples/s.”",
-        measured=f"{n(result.duration / 60.0, '.1f')} minutes, {len(told) or 'no'} faults or notes.",
-        verdict=Verdict.OURS,
+    return finding(
+        "run",
         numbers={
             "duration_min": result.duration / 60.0,
             "winch_speed_mm_per_s": 1e3 * result.winch_speed,
@@ -188,6 +156,7 @@ def _run(result: Experiment) -> Finding:
             "faults_and_notes": len(told),
         },
         data=(Table("The run", ("", "article", "ours"), rows),),
+        notes=len(told) or "no",
     )
 
 

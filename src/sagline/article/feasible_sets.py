@@ -10,10 +10,11 @@ import numpy as np
 import sagline as sl
 from sagline.article.drawing import Drawings, axes, legend, shades
 from sagline.article.sampling import ANGLE, GRAVITY, Line, fit_line, simulated_cable
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Chapter, Finding, Verdict
+from sagline.present.page import Chapter, Finding
 
 CORNERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)])  # of |x| + |z| = 1
 CHORD = 10.0  # m
@@ -105,14 +106,11 @@ def feasible_chapter() -> Chapter:
     end = End.at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     draw = Drawings("feasible")
-    return Chapter(
+    return chapter(
         "feasible-sets",
-        "Feasible tensions of one cable",
-        f"Simulation's cable (Table 1), its platform end {n(CHORD, unit='m')} away at φ = {n(ANGLE, unit='rad')}; our "
-        "choice, the "
-        "article gives none. The map from (T, L) to B is one to one at a given L, so the sets are computed exactly, as "
-        "images of the tolerance, without a search.",
         (_psi(studies, draw), _curve(studies[0], draw), _line(studies[0], draw)),
+        chord=CHORD,
+        angle=ANGLE,
     )
 
 
@@ -133,16 +131,8 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
     bx.set_ylim(-0.2, 0.3)
     legend(bx, r"tolerance $\epsilon_{max}$")
     ratio = extents[:-1] / extents[1:]
-    return Finding(
-        key="psi",
-        figures=(3,),
-        title="the set ψ of tensions that reach B_d with one length",
-        statement="Statement 1: for a given L, if ε_max → 0, then |ψ| → 1: the set has a unique tension.",
-        measured=f"With L = {n(length, '.5g', 'm')} the set spans "
-        + ", ".join(f"{n(x, '.3g', 'N')} at {n(1e3 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
-        + f": it shrinks {n(ratio[0], '.3g')} and {n(ratio[1], '.3g')} times when the tolerance does 10 times, to a "
-        "point. It is a sliver along the chord: 1 mm of position is many newtons of a taut cable.",
-        verdict=Verdict.HOLDS,
+    return finding(
+        "psi",
         numbers={
             "unstrained_length_m": length,
             "tolerance_m": list(TOLERANCES),
@@ -152,6 +142,9 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
         panels=(
             draw.panel(figure, f"ψ for L = {n(length, '.5g', 'm')} and three tolerances."),
             draw.panel(second, "The same sets from their middle, along and across the chord: mind the scales."),
+        ),
+        extents=", ".join(
+            (f"{n(x, '.3g', 'N')} at {n(1000.0 * e, unit='mm')}" for x, e in zip(extents, TOLERANCES, strict=True))
         ),
     )
 
@@ -165,16 +158,8 @@ def _curve(study: _FeasibleSets, draw: Drawings) -> Finding:
         ax.plot([outline[:, 0].min(), outline[:, 0].max()], height, color=VERMILLION, linewidth=2.2, label=label)
     ax.set_xlim(0.0, TENSIONS[-1])
     legend(ax)
-    return Finding(
-        key="psi-curve",
-        figures=(4,),
-        title="the set Ψ of all solutions, a curve over L",
-        statement="Collecting all ψ over L gives Ψ; for ε_max → 0 it is a spatial curve.",
-        measured=f"L determines T: d falls from {n(1e3 * (study.lengths[0] - CHORD), '.3g', 'mm')} at "
-        f"{n(TENSIONS[0], '.3g', 'N')} to {n(1e3 * (study.lengths[-1] - CHORD), '.3g', 'mm')} at "
-        f"{n(TENSIONS[-1], '.3g', 'N')}, "
-        "strictly.",
-        verdict=Verdict.HOLDS,
+    return finding(
+        "psi-curve",
         numbers={
             "tension_first_N": TENSIONS[0],
             "tension_last_N": TENSIONS[-1],
@@ -202,20 +187,8 @@ def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
     bx.plot(study.tensions, from_article, color=VERMILLION, linewidth=1.3, label=r"$\tan\varphi\, T_x + wD/2$")
     bx.axhline(0.0, color="0.6", linewidth=0.6)
     legend(bx)
-    return Finding(
-        key="line-pi",
-        figures=(5,),
-        title="the projection of Ψ is the line π",
-        statement="Statement 2, (21): T_z = a_π T_x + b_π, an affine line; (26): a_π = tan β; the nonlinear part is at "
-        "low T_x.",
-        measured=f"R² = {n(line.r_squared, '.8f')}; slope {n(line.slope, '.5f')} against tan φ = "
-        f"{n(study.tangent, '.5f')}; intercept {n(line.intercept, '.4f', 'N')} against wD/2 = "
-        f"{n(study.half_weight, '.4f', 'N')}. Largest distance from the fitted line {n(line.deviation, '.2g', 'N')}. "
-        "With "
-        f"tan φ and wD/2 it is {n(_largest(from_article), '.2g', 'N')} in all and "
-        f"{n(_largest(from_article[taut]), '.2g', 'N')} from {n(LOW_PART, unit='N')} on. Nearly a line, and never "
-        "exactly one.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "line-pi",
         numbers={
             "r_squared": line.r_squared,
             "slope": line.slope,

@@ -9,9 +9,10 @@ from sagline.article.drawing import Drawings, axes, draw_errors, legend, map_axe
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
 from sagline.article.sampling import simulated_cable
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
-from sagline.present.page import Chapter, Finding, Table, Verdict, table_of
+from sagline.present.page import Chapter, Finding, Table, table_of
 
 SPANS = np.linspace(1.0, 13.0, 13)  # m: the working range of the simulated robots
 RISES = np.linspace(-5.0, 4.0, 10)  # m
@@ -34,14 +35,7 @@ def identify_chapter() -> Chapter:
     """identify_empirical on the simulation's cable, identify_cable on made-up measurements of it."""
     fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
     draw = Drawings("identify")
-    return Chapter(
-        "identify",
-        "Identification for a cable of one's own",
-        "What the article did for its cables, in two calls: sagline.identify_empirical finds the empirical model for a "
-        "known cable and a working range; sagline.identify_cable, and the command sagline identify, find the cable "
-        "from measured lengths and tensions. Here for the simulation's cable.",
-        (_constants(fit, draw), _limits(fit, draw), _measured()),
-    )
+    return chapter("identify", (_constants(fit, draw), _limits(fit, draw), _measured()))
 
 
 def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
@@ -51,16 +45,8 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
         (name, n(estimate.value, ".4f"), f"{n(estimate.low, '.4f')} to {n(estimate.high, '.4f')}", unit)
         for name, estimate, unit in (("k_h", fit.k_h, "m/s²"), ("k_p", fit.k_p, "m²/s⁴"))
     ]
-    return Finding(
-        key="empirical-fit",
-        title="constants for a working range",
-        statement="",
-        measured=f"Spans {n(SPANS[0])} to {n(SPANS[-1], unit='m')}, rises {n(RISES[0])} to "
-        f"{n(RISES[-1], unit='m')}, T_x {n(TENSIONS[0])} to {n(TENSIONS[-1], unit='N')}: k_h = "
-        f"{n(fit.k_h.value, '.4f')}, k_p = {n(fit.k_p.value, '.4f')}. "
-        "k_h is below g/2 because a stretched cable is lighter. The interval says how far a constant moves within the "
-        "range; it is no measuring error.",
-        verdict=Verdict.OURS,
+    return finding(
+        "empirical-fit",
         numbers={
             "spans_m": SPANS,
             "rises_m": RISES,
@@ -77,6 +63,9 @@ def _constants(fit: EmpiricalFit, draw: Drawings) -> Finding:
             ),
         ),
         data=(Table("The constants", ("constant", "value", "95 % interval", "unit"), rows),),
+        spans_last=SPANS[-1],
+        rises_last=RISES[-1],
+        tensions_last=TENSIONS[-1],
     )
 
 
@@ -91,14 +80,8 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
         {"tolerance_m": each, "tension_min_N": fit.tension_min(each), "weight_max_N": fit.weight_max(each)}
         for each in TOLERANCES
     ]
-    return Finding(
-        key="validity-limits",
-        title="the validity limits w_max and T_x,min",
-        statement="Section 3: ρgL < w_max and T_x > T_x,min must be satisfied. Neither has a value in the article.",
-        measured=f"For 5 mm: T_x,min = {n(limits[2]['tension_min_N'], '.3g', 'N')} with the heaviest cable of the "
-        "range, "
-        f"or wL ≤ {n(limits[2]['weight_max_N'], '.2f', 'N')} with every tension of it. A dash: not within this range.",
-        verdict=Verdict.OPEN,
+    return finding(
+        "validity-limits",
         numbers={"limits": limits},
         panels=(draw.panel(figure, "Heaviest cable over the lowest tension, for four tolerances."),),
         data=(
@@ -139,17 +122,8 @@ def _measured() -> Finding:
                 "warnings": fit.warnings,
             }
         )
-    return Finding(
-        key="cable-fit",
-        title="density and stiffness from measurements",
-        statement="",
-        measured=f"Four sets of {SAMPLES} made-up measurements of a cable of {n(cable.linear_density, unit='kg/m')} "
-        "and EA = "
-        f"{n(cable.axial_stiffness, unit='N')}, with scatter of {n(1e3 * LENGTH_ERROR, unit='mm')} and "
-        f"{n(TENSION_ERROR, unit='N')} at the frame end. Loose cables tell the density, taut ones the stiffness; an "
-        "unknown zero of the encoder "
-        "makes the stiffness less certain.",
-        verdict=Verdict.OURS,
+    return finding(
+        "cable-fit",
         numbers={
             "measurements": SAMPLES,
             "linear_density_kg_per_m": cable.linear_density,

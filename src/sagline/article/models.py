@@ -15,10 +15,11 @@ import sagline as sl
 from sagline.article.drawing import Drawings, axes, draw_errors, legend, logarithmic_with_floor, map_axes
 from sagline.article.identify import position_error
 from sagline.article.sampling import GRAVITY, simulated_cable
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array, checked
 from sagline.core.numbers import n
 from sagline.plot.sheet import COLORS, TICK
-from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
+from sagline.present.page import Chapter, Finding, Panel, Table
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,14 +98,11 @@ def models_chapter() -> Chapter:
     """The page an engineer opens to decide which model a controller needs."""
     cable = simulated_cable()
     draw = Drawings("models")
-    return Chapter(
+    return chapter(
         "models",
-        "How good each model is, and where",
-        f"Lengths by the five cable models against the exact one, at the same horizontal tension. EA = "
-        f"{n(cable.axial_stiffness, unit='N')} (simulation), cables that hang down from the frame end. Where not "
-        f"varied: chord {n(REFERENCE['chord'], unit='m')}, 30° below level, {n(REFERENCE['density'], unit='kg/m')}, "
-        f"chord tension {n(REFERENCE['tension'], unit='N')}.",
         (_maps(draw), _sufficient(draw), _slices(draw), _examples()),
+        axial_stiffness=cable.axial_stiffness,
+        reference=REFERENCE,
     )
 
 
@@ -124,16 +122,11 @@ def _maps(draw: Drawings) -> Finding:
     drawn = _study(chord=FINE_CHORDS, tension=FINE_TENSIONS).length_error[:-1, :, 0, 0, :]
     names = [_name(model) for model in study.models[:-1]]
     within = {name: float(np.mean(error <= TOLERANCE)) for name, error in zip(names, errors, strict=True)}
-    return Finding(
-        key="length-error-maps",
-        title="length error over chord and tension",
-        statement="",
-        measured="Within 1 mm of the exact length, of the points of this map: "
-        + ", ".join(f"{name} {n(100 * share, '.3g', '%')}" for name, share in within.items())
-        + ". Where the straight cable seems good for a moment, stretch and sag cancel.",
-        verdict=Verdict.OURS,
+    return finding(
+        "length-error-maps",
         numbers={"share_within_1_mm": within},
         panels=tuple(_map(error, f"{name}: length error.", draw) for name, error in zip(names, drawn, strict=True)),
+        shares=", ".join(f"{name} {n(100 * share, '.3g', '%')}" for name, share in within.items()),
     )
 
 
@@ -153,14 +146,8 @@ def _sufficient(draw: Drawings) -> Finding:
     )
     names = [_name(model) for model in MODELS]
     shares = {name: float(np.mean(over_chord == k)) for k, name in enumerate(names)}
-    return Finding(
-        key="sufficient-model",
-        title="the coarsest model that is good to a millimeter",
-        statement="",
-        measured="The straight cable never knows its stretch; the elastic one fails where cables are long, heavy or "
-        "loose; the empirical and the parabolic one fill the gap to the exact model, which "
-        f"{n(100 * shares['Catenary'], '.2g', '%')} of the first map needs for 1 mm.",
-        verdict=Verdict.OURS,
+    return finding(
+        "sufficient-model",
         numbers={"share_of_map": shares},
         panels=(
             _choice("chord [m]", FINE_CHORDS, fine[0], "Over chord and tension.", draw),
@@ -220,18 +207,12 @@ def _slices(draw: Drawings) -> Finding:
         legend(ax)
         panels.append(draw.panel(figure, f"Over the {names[quantity].split(' [')[0]}."))
         worst[quantity] = {_name(model): float(row.max()) for model, row in zip(study.models[:-1], error, strict=False)}
-    return Finding(
-        key="length-error-slices",
-        title="length error over each quantity alone",
-        statement="",
-        measured="Along these lines the largest errors of the empirical model are "
-        + ", ".join(f"{n(worst[q]['Empirical'], '.2g', 'mm')} over the {q}" for q in worst)
-        + "; of the parabolic one "
-        + ", ".join(n(worst[q]["Parabolic"], ".2g", "mm") for q in worst)
-        + ". The exact model is the zero they are measured from.",
-        verdict=Verdict.OURS,
+    return finding(
+        "length-error-slices",
         numbers={"largest_error_mm": worst},
-        panels=tuple(panels),
+        panels=panels,
+        empirical=", ".join(f"{n(worst[q]['Empirical'], '.2g', 'mm')} over the {q}" for q in worst),
+        parabolic=", ".join(n(worst[q]["Parabolic"], ".2g", "mm") for q in worst),
     )
 
 
@@ -257,14 +238,8 @@ def _examples() -> Finding:
             }
         )
     names = [_name(model) for model in study.models[:-1]]
-    return Finding(
-        key="model-examples",
-        title="five cables as examples",
-        statement="",
-        measured="Errors in length at the same horizontal tension; "
-        f"{n(-np.degrees(REFERENCE['angle']), unit='°')} below level. As a rule wD/τ decides: the "
-        "sag term is D (wD cos φ/τ)²/24, what the shallow models leave out is smaller by that square again.",
-        verdict=Verdict.OURS,
+    return finding(
+        "model-examples",
         numbers={"angle_below_level_deg": -np.degrees(REFERENCE["angle"]), "examples": numbers},
         data=(Table("Length less the exact one", ("cable", *names), rows),),
     )

@@ -9,10 +9,11 @@ from sagline.article.drawing import Drawings, axes, cables_over_time, error_pane
 from sagline.article.machine import Parameter
 from sagline.article.sampling import fit_line
 from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS
-from sagline.present.page import Chapter, Finding, Table, Verdict, table_of
+from sagline.present.page import Chapter, Finding, Table, table_of
 
 AREA = 2e4  # pt^2 a meter of error
 
@@ -21,12 +22,8 @@ def poses_chapter() -> Chapter:
     """The ten poses of the prototype, and what could be wrong with it."""
     study, way = ten_poses(), tour()
     draw = Drawings("poses")
-    return Chapter(
+    return chapter(
         "poses",
-        "The experiment: ten poses",
-        "The prototype of Table 1 (anchors ours: frame and platform corners, crossed as the suspended robot), planned "
-        "with the article's empirical model and the least norm of T_x, then set on exact cables with something other "
-        "than planned.",
         (
             _table(study),
             single_causes(study),
@@ -43,16 +40,8 @@ def _table(study: TenPoses) -> Finding:
     table, plan = study.table, study.plan
     difference = np.abs(table.distance - table.printed_error).max()
     model = np.linalg.norm(study.model_error, axis=1).max()
-    return Finding(
-        key="table-2",
-        tables=(2,),
-        title="errors recomputed, lengths and tensions planned",
-        statement="Table 2: errors from 1.7 to 44.8 mm, “obtained by applying Equation (56)”.",
-        measured="The printed errors are the distances of the printed positions to "
-        f"{n(1e3 * difference, '.2g', 'mm')}, "
-        "not what (56) says (erratum 9). The empirical model itself puts the platform at most "
-        f"{n(1e3 * model, '.2g', 'mm')} off at these poses: it is not the cause.",
-        verdict=Verdict.HOLDS,
+    return finding(
+        "table-2",
         numbers={
             "largest_difference_mm": 1e3 * difference,
             "model_error_max_mm": 1e3 * model,
@@ -91,21 +80,15 @@ def _tour(way: Tour, draw: Drawings) -> Finding:
         figure, _ = cables_over_time(path.time, values, label, 0.9, stops=way.stops.tolist())
         panels.append(draw.panel(figure, caption))
     tension = cables.frame_end_tension
-    return Finding(
-        key="tour",
-        figures=(25, 26),
-        title="what load cells and encoders should have shown",
-        statement="Amplified load cell signals and differences of cable length while the platform visits the ten "
-        "points from (0, 0, 1.5) and returns; no numbers in the text.",
-        measured=f"Planned along straight lines: tensions at the winch from {n(tension.min(), '.3g')} to "
-        f"{n(tension.max(), '.3g', 'N')}, all poses feasible: {'yes' if way.plan.feasible.all() else 'no'}.",
-        verdict=Verdict.OPEN,
+    return finding(
+        "tour",
         numbers={
             "frame_end_tension_min_N": tension.min(),
             "frame_end_tension_max_N": tension.max(),
             "feasible_share": float(np.mean(way.plan.feasible)),
         },
-        panels=tuple(panels),
+        panels=panels,
+        feasible="yes" if way.plan.feasible.all() else "no",
     )
 
 
@@ -122,24 +105,16 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
     panels.append(draw.panel(figure, "Actual less desired height."))
     tension = study.plan.horizontal_tension.mean(axis=1)
     against = float(np.corrcoef(tension, table.distance)[0, 1])
-    return Finding(
-        key="error-in-space",
-        figures=(27,),
-        title="the error grows as the platform sinks",
-        statement="Tensions are smaller at low altitude; “the larger the cable tensions, the smaller the positioning "
-        "error”. P2, P8, P6 are low and worse; P7, P5, P4 are high and better.",
-        measured="So it is measured: every platform sits too high, by a height that falls "
-        f"{n(-1e3 * line.slope, '.3g', 'mm')} with every meter up (R² {n(line.r_squared, '.2f')}). Correlation of the "
-        f"error with the mean planned T_x: {n(against, '.2f')}. That the tension is the cause does not follow: see "
-        "what a wrong E would do.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "error-in-space",
         numbers={
             "slope_mm_per_m": 1e3 * line.slope,
             "r_squared": line.r_squared,
             "correlation_with_tension": against,
             "lowest_vertical_error_mm": 1e3 * table.error[:, 2].min(),
         },
-        panels=tuple(panels),
+        panels=panels,
+        fall=-1e3 * line.slope,
     )
 
 
@@ -163,16 +138,8 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
     rows = [(name, *(n(1e3 * z, ".1f") for z in error[:, 2]), n(slope, "+.1f")) for name, error, slope in listed]
     slopes = {trend.parameter.name: trend.height_slope for trend in study.trends}
     falling = [name for name, slope in slopes.items() if slope * study.height_line.slope > 1e-6 * abs(slope)]
-    return Finding(
-        key="one-parameter-off",
-        title="one parameter off at a time",
-        statement="“The larger the cable tensions, the smaller the positioning error”; the relation “can be "
-        "interpreted easily”.",
-        measured="A stiffer cable than planned (E too low in the plan) lifts the platform most where tensions are "
-        f"high: {n(slopes[study.trends[0].parameter.name], '+.3g', 'mm')} per meter, the opposite of the measured "
-        f"{n(1e3 * study.height_line.slope, '+.3g')}. With the signs shown, an error that falls with height comes "
-        "from: " + ", ".join(falling) + ".",
-        verdict=Verdict.FAILS,
+    return finding(
+        "one-parameter-off",
         numbers={"height_slope_mm_per_m": slopes, "measured_slope_mm_per_m": 1e3 * study.height_line.slope},
         panels=(
             draw.panel(figure, "Trends of the vertical error over height, and the measured errors."),
@@ -185,6 +152,8 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
                 rows,
             ),
         ),
+        stiffer=slopes[study.trends[0].parameter.name],
+        falling=", ".join(falling),
     )
 
 

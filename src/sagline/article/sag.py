@@ -22,10 +22,11 @@ from sagline.article.regressions import (
     stretch_study,
 )
 from sagline.article.sampling import ANGLE, simulated_cable
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, GREEN, VERMILLION
-from sagline.present.page import Chapter, Finding, Verdict
+from sagline.present.page import Chapter, Finding
 
 CHORD = 10.0  # m
 TENSIONS = np.linspace(10.0, 500.0, 150)  # N
@@ -39,12 +40,8 @@ def sag_chapter() -> Chapter:
     end = End.at_angle(CHORD)
     stretch, sag = stretch_study(simulated_cable(), end, TENSIONS), sag_study(published_sampling())
     draw = Drawings("sag")
-    return Chapter(
+    return chapter(
         "sag",
-        "The adjusting length and k_p",
-        f"Figures 8 and 9 with the simulation's cable at D = {n(CHORD, unit='m')}; figures 10 to 15 with cables that "
-        "do not "
-        "stretch, sampled as above.",
         (
             _with_stretch(stretch, draw),
             _relieved(stretch, draw),
@@ -53,6 +50,7 @@ def sag_chapter() -> Chapter:
             _angle(sag, draw),
             _density(sag, draw),
         ),
+        chord=CHORD,
     )
 
 
@@ -68,19 +66,7 @@ def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
         "last_stretchable_m": study.stretchable[-1],
         "share_of_hooke": -study.stretchable[-1] / hooke,
     }
-    return Finding(
-        key="d-over-tension",
-        figures=(8,),
-        title="d of stretchable and unstretchable cables",
-        statement="Unstretchable: d ≥ 0 with d = 0 as asymptote. Stretchable: negative d, an inclined asymptote by "
-        "Hooke's law.",
-        measured=f"The least d of the unstretchable cable is {n(1e3 * numbers['least_unstretchable_m'], '.2g', 'mm')}; "
-        f"with stretch d reaches {n(1e3 * numbers['last_stretchable_m'], '.3g', 'mm')}, "
-        f"{n(numbers['share_of_hooke'], '.3f')} of |T|D/EA.",
-        verdict=Verdict.HOLDS,
-        numbers=numbers,
-        panels=(draw.panel(figure, "Adjusting length over T_x."),),
-    )
+    return finding("d-over-tension", numbers=numbers, panels=(draw.panel(figure, "Adjusting length over T_x."),))
 
 
 def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
@@ -96,16 +82,8 @@ def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
     bx.plot(study.magnitude, printed, color=VERMILLION, linewidth=1.3, label="(36), (38)")
     bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="with the mean tension")
     legend(bx)
-    return Finding(
-        key="stretch-removed",
-        figures=(9,),
-        title="d with the elongation taken out",
-        statement="(38): d = d_e + Δl with Δl = |T|L/EA of (36); red and blue dots coincide.",
-        measured=f"They do to the eye at low tension, but (36) is {n(numbers['error_of_36_mm'], '.2g', 'mm')} too "
-        "long: "
-        "it stretches the cable with the tension at its upper end. With the mean tension "
-        f"{n(numbers['error_with_mean_tension_mm'], '.2g', 'mm')} are left (erratum 5).",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "stretch-removed",
         numbers=numbers,
         panels=(
             draw.panel(figure, "d over |T|: unstretchable, and stretchable with (38)."),
@@ -124,17 +102,8 @@ def _tension(study: SagStudy, draw: Drawings) -> Finding:
     Courses(tensions, d, tensions, fits, _named(study.sampling.chords[[*PICKED]], "g")).draw(ax, "$D$ [m]")
     share = study.adjusting_length / study.fitted_length
     numbers = {"exact_over_fit_min": share.min(), "exact_over_fit_max": share.max()}
-    return Finding(
-        key="d-model",
-        figures=(10,),
-        title="d = a_d/T_x²",
-        statement="(41): d = a_d/T_x², “the fittest and simplest”.",
-        measured=f"The exact d divided by its fit is between {n(numbers['exact_over_fit_min'], '.3f')} and "
-        f"{n(numbers['exact_over_fit_max'], '.3f')} over all sampled cables: the form is right for taut ones and bends "
-        "for slack and steep ones.",
-        verdict=Verdict.HOLDS_WITHIN,
-        numbers=numbers,
-        panels=(draw.panel(figure, f"d {_middle_and_dense(study)}, with fits."),),
+    return finding(
+        "d-model", numbers=numbers, panels=(draw.panel(figure, f"d {_middle_and_dense(study)}, with fits."),)
     )
 
 
@@ -148,14 +117,8 @@ def _chord(study: SagStudy, draw: Drawings) -> Finding:
         "The same at five angles (figure 12).",
     )
     away = _away(study.fitted_a_d, study.a_d)
-    return Finding(
-        key="a-over-chord",
-        figures=(11, 12),
-        title="a_d is cubic in D",
-        statement="(43): a_d = q_a(β) D³, the fittest; at every β.",
-        measured=f"The cubic misses a_d by at most {n(100 * away, '.2g', '%')} of the largest a_d of its angle "
-        "and density.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "a-over-chord",
         numbers={"cubic_away_share": away},
         panels=courses.panels(("$D$ [m]", "$a_d$ [m N²]", r"$\varphi$ [rad]"), MIDDLE, captions, draw),
     )
@@ -172,14 +135,8 @@ def _angle(study: SagStudy, draw: Drawings) -> Finding:
         "The same at five densities (figure 14).",
     )
     away = _away(study.fitted_q_a, study.q_a)
-    return Finding(
-        key="q-over-angle",
-        figures=(13, 14),
-        title="q_a goes with cos⁴ of the angle",
-        statement="(44): q_a = p_q(ρ) cos⁴ β, chosen “experimentally”.",
-        measured=f"cos⁴ misses q_a by at most {n(100 * away, '.2g', '%')} of the largest q_a of its density. It is no "
-        "guess: d = D (wD cos φ)²/(24 τ²) of a shallow cable, with τ = T_x/cos φ.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "q-over-angle",
         numbers={"cos4_away_share": away},
         panels=courses.panels((r"$\varphi$ [rad]", "$q_a$ [N²/m²]", r"$\rho$ [kg/m]"), DENSE, captions, draw),
     )
@@ -196,15 +153,8 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
     legend(bx)
-    return Finding(
-        key="p-over-density",
-        figures=(15,),
-        title="p_q is quadratic in ρ, and k_p",
-        statement="(45): p_q = k_p ρ² with k_p ≈ 4.385.",
-        measured=f"k_p = {n(study.k_p, '.4f')} with these tensions. Density by density it rises from "
-        f"{n(each[0], '.3f')} (g²/24 = {n(SHALLOW_K_P, '.3f')}) to {n(each[-1], '.3f')}: the heaviest, slackest cables "
-        "make the published value.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "p-over-density",
         numbers={
             "k_p": study.k_p,
             "shallow_k_p": SHALLOW_K_P,
@@ -215,6 +165,7 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
             draw.panel(figure, "p_q with its parabola."),
             draw.panel(second, "p_q over ρ² should not depend on ρ."),
         ),
+        heaviest=each[-1],
     )
 
 

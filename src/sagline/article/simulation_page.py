@@ -7,6 +7,7 @@ import numpy as np
 import sagline as sl
 from sagline.article.drawing import WIDTH, Drawings, axes, cables_over_time, legend, logarithmic_with_floor, thinning
 from sagline.article.simulation import ERROR_BAND, Figures, LowTension, Simulation, figures, low_tension_study, simulate
+from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.plot.plan import path as draw_path
@@ -26,13 +27,8 @@ def simulation_chapter() -> Chapter:
     """Both robots along the path."""
     study, low = simulate(), low_tension_study(LIMITS)
     draw = Drawings("simulation")
-    return Chapter(
+    return chapter(
         "simulation",
-        "The simulation",
-        "Both robots of Table 1 along a planar rest-to-rest path at z = 1.5 m. The article prints no anchor "
-        "coordinates and no numbers of its path: ours are chosen and stated with the presets. Tensions are the least "
-        "norm of T_x within the limits of the presets. Position errors are those of exact elastic cables wound to "
-        "the planned lengths, inertia included.",
         (
             _robots(study, draw),
             _path(study.path, draw),
@@ -54,18 +50,7 @@ def _robots(study: Simulation, draw: Drawings) -> Finding:
         draw_robot(run.plan.state.one_robot, sl.Pose.from_euler(CORNER, 0.0, 0.0, 0.0), ax)
         ax.set_title("")
         panels.append(draw.panel(figure, caption))
-    return Finding(
-        key="robots",
-        figures=(17,),
-        title="the two configurations",
-        statement="(a) all eight cables from the top, as CoGiRo; (b) four from the top, four from the bottom, as "
-        "IPAnema 1.",
-        measured="Frame corners and platform corners of Table 1's sizes; which is joined to which is our choice, "
-        "crossed for the first, straight for the second.",
-        verdict=Verdict.OPEN,
-        numbers={},
-        panels=tuple(panels),
-    )
+    return finding("robots", panels=panels)
 
 
 def _path(path: sl.Path, draw: Drawings) -> Finding:
@@ -79,14 +64,8 @@ def _path(path: sl.Path, draw: Drawings) -> Finding:
     legend(bx)
     speed = np.linalg.norm(path.twist[:, :3], axis=1)
     acceleration = np.linalg.norm(path.twist_rate[:, :3], axis=1)
-    return Finding(
-        key="path",
-        figures=(18, 19),
-        title="path and velocity",
-        statement="z_P = 1.5 m, all angles 0; 5th order polynomials. No numbers are given.",
-        measured=f"Ours: {n(path.duration, unit='s')}, {len(path)} samples, up to {n(speed.max(), '.3g', 'm/s')} and "
-        f"{n(acceleration.max(), '.2g', 'm/s²')}, at rest at the corners, the center and both ends.",
-        verdict=Verdict.OPEN,
+    return finding(
+        "path",
         numbers={
             "duration_s": path.duration,
             "samples": len(path),
@@ -117,18 +96,7 @@ def _courses(study: Simulation, draw: Drawings) -> Finding:
             f"{n(found.slope_max, '.2g', 'N/s')} "
             f"by at most {n(found.slope_jump, '.2g', 'N/s')}"
         )
-    return Finding(
-        key="courses",
-        figures=(20, 21),
-        title="lengths, adjusting lengths and tensions",
-        statement="“Our proposed model produces a continuous and smooth set of tension.”",
-        measured="Continuous, with mild corners.\n\n"
-        + ".\n\n".join(texts)
-        + ".\n\nThe slope jumps where the 5th order polynomials begin and end, and where a cable reaches its limit.",
-        verdict=Verdict.HOLDS_WITHIN,
-        numbers=numbers,
-        panels=tuple(panels),
-    )
+    return finding("courses", numbers=numbers, panels=panels, courses=".\n\n".join(texts))
 
 
 def _cables(plan: sl.Plan, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
@@ -146,25 +114,19 @@ def _error(study: Simulation, draw: Drawings) -> Finding:
         found[robot] = figures(run)
         panels.append(_error_panel(run, study.path, f"{robot.capitalize()}: empirical model.", draw))
     inside = all(f.axis_error_max <= ERROR_BAND for f in found.values())
-    return Finding(
-        key="position-error",
-        figures=(22,),
-        title="position error of the empirical model",
-        statement="The model keeps the positioning error around (−6, 6) mm.",
-        measured="On our path the largest error along an axis is "
-        + ", ".join(f"{n(1e3 * f.axis_error_max, '.2f', 'mm')} ({robot})" for robot, f in found.items())
-        + "; distance "
-        + ", ".join(
-            f"{n(1e3 * f.error_max, '.2f', 'mm')} at most and {n(1e3 * f.error_mean, '.2f', 'mm')} in the mean"
-            for f in found.values()
-        )
-        + ". Better than the article says, with our path and limits; worse where cables are looser, see below.",
-        verdict=Verdict.HOLDS if inside else Verdict.FAILS,
+    return finding(
+        "position-error",
         numbers={
             robot: {"axis_mm": 1e3 * f.axis_error_max, "max_mm": 1e3 * f.error_max, "mean_mm": 1e3 * f.error_mean}
             for robot, f in found.items()
         },
-        panels=tuple(panels),
+        verdict=Verdict.HOLDS if inside else Verdict.FAILS,
+        panels=panels,
+        axis_errors=", ".join(f"{n(1e3 * f.axis_error_max, '.2f', 'mm')} ({robot})" for robot, f in found.items()),
+        distances=", ".join(
+            f"{n(1000.0 * f.error_max, '.2f', 'mm')} at most and {n(1000.0 * f.error_mean, '.2f', 'mm')} in the mean"
+            for f in found.values()
+        ),
     )
 
 
@@ -195,14 +157,8 @@ def _comparison(study: Simulation) -> Finding:
             ("feasible poses [%]", "feasible", 100.0, ".4g"),
         )
     ]
-    return Finding(
-        key="configurations",
-        title="the two configurations compared",
-        statement="T_x of the lower cables is small, but valid; the highest load of the second configuration is "
-        "approximately twice that of the first.",
-        measured=f"The ratio of the highest T_x is {n(study.tension_ratio, '.2f')}. The lower cables are within "
-        f"{n(100 * (NEAR - 1), unit='%')} of their lower limit {n(100 * near, '.3g', '%')} of the time.",
-        verdict=Verdict.HOLDS,
+    return finding(
+        "configurations",
         numbers={
             "tension_ratio": study.tension_ratio,
             "near_limit_share": NEAR - 1.0,
@@ -240,21 +196,14 @@ def _models(study: Simulation, draw: Drawings) -> Finding:
         legend(ax)
         panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact one is the zero."))
     shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]
-    return Finding(
-        key="five-models",
-        title="all five cable models on the same path",
-        statement="",
-        measured=f"The exact model comes back to within {n(_worst(study.of(sl.Catenary)), '.2g', 'm')}, which is "
-        "rounding. The "
-        f"parabolic one, as cheap as the article's, is within {n(max(shallow), '.2g', 'm')}: the published "
-        "constants and the stretch by one end's tension make up nearly all of the empirical model's error.",
-        verdict=Verdict.OURS,
+    return finding(
+        "five-models",
         numbers={
             "largest_error": numbers,
             "exact_largest_error_pm": 1e12 * _worst(study.of(sl.Catenary)),
             "longest_length_m": max(figures(run).length_max for run in study.of(sl.Catenary)),
         },
-        panels=tuple(panels),
+        panels=panels,
         data=(
             Table(
                 "Distance from the plan [mm], highest T_x [N], and poses held in a stable equilibrium [%]",
@@ -272,6 +221,8 @@ def _models(study: Simulation, draw: Drawings) -> Finding:
                 rows,
             ),
         ),
+        exact=_worst(study.of(sl.Catenary)),
+        parabolic=max(shallow),
     )
 
 
@@ -284,17 +235,8 @@ def _low_tension(low: LowTension, draw: Drawings) -> Finding:
     legend(ax)
     bound: tuple[Figures, Figures] = (low.suspended_bound, low.mixed_bound)
     good = low.tension_min[np.maximum(low.suspended, low.mixed) <= ERROR_BAND]
-    return Finding(
-        key="low-tension",
-        title="position error where cables are loose",
-        statement="(54) bounds T_x from below, and T_adj > 0 is added “to maintain the accuracy”.",
-        measured=f"The error stays within ±{n(1e3 * ERROR_BAND, unit='mm')} for lower limits from "
-        f"{n(good.min(), '.3g', 'N')} on "
-        "and grows fast below, where the mixed robot's lower cables hang slack. With the bound (54) alone, T_adj = 0, "
-        f"it is {n(1e3 * bound[0].axis_error_max, '.2f')} and {n(1e3 * bound[1].axis_error_max, '.2f', 'mm')}, the "
-        "lowest "
-        f"T_x {n(bound[0].tension_min, '.3g')} and {n(bound[1].tension_min, '.3g', 'N')}.",
-        verdict=Verdict.HOLDS_WITHIN,
+    return finding(
+        "low-tension",
         numbers={
             "band_mm": 1e3 * ERROR_BAND,
             "limits_N": low.tension_min,
@@ -304,6 +246,7 @@ def _low_tension(low: LowTension, draw: Drawings) -> Finding:
             "bound_54_lowest_N": [f.tension_min for f in bound],
         },
         panels=(draw.panel(figure, "Empirical model, over the lowest tension that the load sharing may use."),),
+        good_from=good.min(),
     )
 
 

@@ -9,10 +9,11 @@ import numpy as np
 import sagline as sl
 from sagline.article.drawing import Drawings, axes, legend
 from sagline.article.simulation import ROBOTS
+from sagline.article.texts import chapter, finding
 from sagline.core.numbers import n
 from sagline.plot.labels import PLACE
 from sagline.plot.sheet import BLUE, VERMILLION
-from sagline.present.page import Chapter, Finding, Panel, Verdict, table_of
+from sagline.present.page import Chapter, Finding, Panel, table_of
 from sagline.workspaces.region import Plane, slice_of
 
 CELLS = 24  # along the longest edge of the frame
@@ -31,14 +32,7 @@ def workspace_chapter() -> Chapter:
     """Volume and boundary of both simulated robots."""
     pairs = {name: _pair(name) for name in ROBOTS}
     draw = Drawings("workspace")
-    return Chapter(
-        "workspace",
-        "Where the robots can work",
-        "Both simulated robots within their frames, level, bearing their own weight within the tension limits: all "
-        "positions, not a path. The boundary is found on the exact cables, each corner of it to rounding; the volume "
-        "has the error of what bulges between the corners.",
-        (_volumes(pairs), _boundaries(pairs, draw)),
-    )
+    return chapter("workspace", (_volumes(pairs), _boundaries(pairs, draw)))
 
 
 def _pair(name: str) -> Pair:
@@ -48,18 +42,13 @@ def _pair(name: str) -> Pair:
 
 def _volumes(pairs: dict[str, Pair]) -> Finding:
     change = {name: pair.exact.volume / pair.straight.volume - 1.0 for name, pair in pairs.items()}
-    told = "; ".join(
+    volumes = "; ".join(
         f"{name}: {n(pair.exact.volume, '.1f')} m³ with sag, {n(pair.straight.volume, '.1f')} m³ on straight cables, "
         f"{n(100.0 * change[name], '+.2f', '%')}"
         for name, pair in pairs.items()
     )
-    return Finding(
-        key="volume",
-        title="how much of its frame each robot reaches",
-        statement="Future work: “the boundary of the wrench-feasible workspace” of cables that sag.",
-        measured=f"{told}.\n\nSag moves the boundary both ways: the weight of the cables tightens a robot whose cables "
-        "all come from above, and loads one that is also pulled down.",
-        verdict=Verdict.OURS,
+    return finding(
+        "volume",
         numbers={
             name: {
                 "volume_m3": pair.exact.volume,
@@ -80,6 +69,7 @@ def _volumes(pairs: dict[str, Pair]) -> Finding:
                 ("change [%]", [100.0 * each for each in change.values()], "+.2f"),
             ),
         ),
+        volumes=volumes,
     )
 
 
@@ -90,16 +80,9 @@ def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
         for pair in pairs.values()
         for normal, at in ((2, HEIGHT), (1, 0.0))
     )  # fmt: skip
-    told = ", ".join(f"{name} {n(value, '.2g', 'm')}" for name, value in apart.items())
-    return Finding(
-        key="boundary",
-        title="where sag moves the boundary",
-        statement="Future work, as above.",
-        measured=f"Seen along the axes through the middle of the frame, {n(HEIGHT, unit='m')} high, the boundaries "
-        f"with sag and without are at most so far apart: {told}.",
-        verdict=Verdict.OURS,
-        numbers={"height_m": HEIGHT, "farthest_apart_m": apart},
-        panels=panels,
+    distances = ", ".join(f"{name} {n(value, '.2g', 'm')}" for name, value in apart.items())
+    return finding(
+        "boundary", numbers={"height_m": HEIGHT, "farthest_apart_m": apart}, panels=panels, distances=distances
     )
 
 
