@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sagline.article import errata, errata_platform
+from sagline.article import errata
 from sagline.article.errata import DEMONSTRATIONS, errata_chapter
 from sagline.present.page import Finding
 
@@ -19,7 +19,7 @@ def test_there_are_eleven_in_order() -> None:
 
 
 def test_erratum_1_the_intercept_is_positive_at_the_platform_end() -> None:
-    platform, frame, suspended, suspended_printed, _, mixed_printed = numbers(errata_platform.sign_of_intercept())
+    platform, frame, suspended, suspended_printed, _, mixed_printed = numbers(errata.sign_of_intercept())
     assert platform == pytest.approx(1.0, abs=1e-3)
     assert frame == pytest.approx(-1.0, abs=1e-3)
     assert suspended == pytest.approx(1.71, abs=0.01)
@@ -28,7 +28,7 @@ def test_erratum_1_the_intercept_is_positive_at_the_platform_end() -> None:
 
 
 def test_erratum_2_gravity_cancels_or_doubles() -> None:
-    _, once, literal_down, literal_up = numbers(errata_platform.gravity_twice())
+    _, once, literal_down, literal_up = numbers(errata.gravity_twice())
     weight = 50.0 * 9.81
     assert once == pytest.approx(weight)
     assert literal_down == pytest.approx(0.0, abs=1e-9)
@@ -36,7 +36,7 @@ def test_erratum_2_gravity_cancels_or_doubles() -> None:
 
 
 def test_erratum_3_euler_rates_are_no_angular_velocity() -> None:
-    rate_error, _, moment_error, moment, force, constant = numbers(errata_platform.euler_rates())
+    rate_error, _, moment_error, moment, force, constant = numbers(errata.euler_rates())
     assert rate_error > 0.1
     assert moment_error > 0.3 * moment
     assert constant == 0.0
@@ -56,13 +56,13 @@ def test_erratum_3_angular_velocity_against_differences() -> None:
         h = 1e-5
         return np.asarray((turned(t + h) * turned(t - h).inv()).as_rotvec()) / (2.0 * h)
 
-    omega, omega_rate = errata_platform._angular(angles, rates, curvatures)
+    omega, omega_rate = errata._angular(angles, rates, curvatures)
     np.testing.assert_allclose(omega, spin(0.0), atol=1e-8)
     np.testing.assert_allclose(omega_rate, (spin(1e-3) - spin(-1e-3)) / 2e-3, atol=1e-5)
 
 
 def test_erratum_4_the_square_of_h_is_singular() -> None:
-    rows, rank, singular, _, residual = numbers(errata_platform.rank_of_h())
+    rows, rank, singular, _, residual = numbers(errata.rank_of_h())
     assert (rows, rank) == (8.0, 6.0)
     assert singular < 1e-15
     assert residual < 1e-10
