@@ -16,7 +16,7 @@ import sagline as sl
 from sagline import SaglineError
 from sagline.core.errors import printable
 from sagline.files.measurements import load_counts, load_lengths
-from sagline.files.pose_text import pose_of
+from sagline.files.pose_text import pose_of_text
 from tests.effort import least_seconds
 
 SECONDS: Final = 2.0  # of the processor of an ordinary machine
@@ -180,7 +180,7 @@ READERS: Final = (
     Reader(
         "pose.txt",
         "1.5,-0.25,2,10,20,30",
-        lambda file: pose_of(file.read_bytes().decode("utf-8", "surrogateescape")),
+        lambda file: pose_of_text(file.read_bytes().decode("utf-8", "surrogateescape")),
     ),
 )
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 import sagline as sl
-from sagline.article.drawing import axes, draw_errors, legend, logarithmic_with_floor, map_axes
+from sagline.article.drawing import axes, draw_errors, legend_above, logarithmic_with_floor, map_axes
 from tests.article.conftest import Written
 from tests.tiers import extended
 
@@ -59,7 +59,7 @@ def test_a_legend_leaves_the_axes_as_large_as_they_were() -> None:
     before = ax.get_position().height * figure.get_figheight()
     for k in range(7):
         ax.plot([0.0, 1.0], [0.0, k], label=f"course {k}")
-    legend(ax, "a title")
+    legend_above(ax, "a title")
     assert ax.get_position().height * figure.get_figheight() == pytest.approx(before, rel=1e-12)
 
 

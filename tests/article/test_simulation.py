@@ -6,16 +6,16 @@ import pytest
 
 import sagline as sl
 from sagline.article.models import MODELS, model_errors
-from sagline.article.simulation import ERROR_BAND, Simulation, figures, low_tension_study, simulate
+from sagline.article.simulation import ERROR_BAND, PathStudy, figures, low_tension_study, path_study
 from tests.article.hanging import length_and_force
 
 
 @pytest.fixture(scope="module")
-def study() -> Simulation:
-    return simulate(rate=20.0)
+def study() -> PathStudy:
+    return path_study(rate=20.0)
 
 
-def test_the_mixed_robot_pulls_about_twice_as_hard(study: Simulation) -> None:
+def test_the_mixed_robot_pulls_about_twice_as_hard(study: PathStudy) -> None:
     assert study.tension_ratio == pytest.approx(2.0755, abs=0.002)
 
 
@@ -29,7 +29,7 @@ def test_the_mixed_robot_pulls_about_twice_as_hard(study: Simulation) -> None:
     ],
 )
 def test_each_models_position_error_in_millimeters(
-    study: Simulation, kind: type[sl.CableModel], suspended: float, mixed: float
+    study: PathStudy, kind: type[sl.CableModel], suspended: float, mixed: float
 ) -> None:
     for run, expected in zip(study.of(kind), (suspended, mixed), strict=True):
         found = figures(run)
@@ -38,11 +38,11 @@ def test_each_models_position_error_in_millimeters(
         assert found.error_mean < found.error_max
 
 
-def test_the_exact_model_makes_no_error(study: Simulation) -> None:
+def test_the_exact_model_makes_no_error(study: PathStudy) -> None:
     assert max(figures(run).error_max for run in study.of(sl.Catenary)) < 1e-11
 
 
-def test_the_empirical_model_stays_within_the_articles_band(study: Simulation) -> None:
+def test_the_empirical_model_stays_within_the_articles_band(study: PathStudy) -> None:
     for run in study.of(sl.Empirical):
         found = figures(run)
         assert found.axis_error_max < ERROR_BAND / 4.0
@@ -50,13 +50,13 @@ def test_the_empirical_model_stays_within_the_articles_band(study: Simulation) -
 
 
 def test_tensions_are_continuous_with_corners_that_do_not_grow() -> None:
-    coarse, fine = (simulate(rate=rate, models=[sl.Empirical()]) for rate in (25.0, 100.0))
+    coarse, fine = (path_study(rate=rate, models=[sl.Empirical()]) for rate in (25.0, 100.0))
     for slow, fast in zip(coarse.of(sl.Empirical), fine.of(sl.Empirical), strict=True):
         assert figures(fast).step_max < 0.3 * figures(slow).step_max
         assert figures(fast).slope_jump < figures(slow).slope_jump * 1.05
 
 
-def test_steps_slopes_and_corners_by_hand(study: Simulation) -> None:
+def test_steps_slopes_and_corners_by_hand(study: PathStudy) -> None:
     for run in study.of(sl.Empirical):
         time, tension = study.path.time, run.plan.horizontal_tension
         steps, slopes, corners = [], [], []

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from sagline import InvalidValueError
-from sagline.files.pose_text import pose_of
+from sagline.files.pose_text import pose_of_text
 from tests.refusal import refused
 
 
 def test_meters_and_degrees() -> None:
-    pose = pose_of(" 1, -0.5 ,1.5e0")
+    pose = pose_of_text(" 1, -0.5 ,1.5e0")
     assert pose.position.tolist() == [1.0, -0.5, 1.5]
     assert pose.quaternion.tolist() == [0.0, 0.0, 0.0, 1.0]
-    np.testing.assert_allclose(pose_of("1,0,010,90,0,0").matrix, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
-    assert pose_of("1,0,010").position[2] == 10.0
+    np.testing.assert_allclose(pose_of_text("1,0,010,90,0,0").matrix, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+    assert pose_of_text("1,0,010").position[2] == 10.0
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_meters_and_degrees() -> None:
 )  # fmt: skip
 def test_what_is_no_pose(text: str) -> None:
     with refused("--pose", kind=InvalidValueError) as caught:
-        pose_of(text)
+        pose_of_text(text)
     assert re.match("(three|decimal)", caught.value.allowed)
     assert len(str(caught.value)) < 300
     assert "\x1b" not in str(caught.value)

@@ -4,7 +4,7 @@ import pytest
 from syrupy.assertion import SnapshotAssertion
 
 from sagline import FileError, InvalidValueError
-from sagline.files.robot_xml import number, numbers, read_xml
+from sagline.files.robot_xml import number_of_text, numbers_of_text, read_xml
 from tests.files.wording import wording
 from tests.refusal import refused
 
@@ -18,7 +18,7 @@ def written(folder: Path, text: bytes) -> Path:
 def test_a_document_type_is_skipped_and_not_opened(tmp_path: Path) -> None:
     text = b'<!DOCTYPE cables SYSTEM "no_folder/cables.dtd" [<!ATTLIST a id ID #REQUIRED>]><cables><a>7</a></cables>'
     root = read_xml(written(tmp_path, text))
-    assert number(root.findtext("a"), "a", "m") == 7.0
+    assert number_of_text(root.findtext("a"), "a", "m") == 7.0
 
 
 @pytest.mark.parametrize(
@@ -61,4 +61,4 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
 )
 def test_numbers_that_are_none(text: str | None, shown: str) -> None:
     with refused("place", shown, "3 numbers between blanks in m", kind=InvalidValueError):
-        numbers(text, 3, "place", "m")
+        numbers_of_text(text, 3, "place", "m")

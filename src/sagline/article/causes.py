@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sagline.article.drawing import Drawings, axes, legend
+from sagline.article.drawing import Drawings, axes, legend_above
 from sagline.article.explanations import Explanation, corrected_aic
 from sagline.article.machine import ANCHORS, DEAD, DENSITY, LOAD, MODULUS, PULLEY, ZERO
 from sagline.article.sampling import fit_line
@@ -124,7 +124,7 @@ def _panel(study: TenPoses, found: Explanation, count: str, draw: Drawings) -> P
             markerfacecolor="none",
             label=f"{name} explained",
         )
-    legend(ax)
+    legend_above(ax)
     return draw.panel(figure, f"Best explanation by {count}: {_values(found)}.")
 
 

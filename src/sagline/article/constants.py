@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sagline.article.drawing import Drawings, axes, legend, shades
+from sagline.article.drawing import Drawings, axes, legend_above, shades
 from sagline.article.regressions import (
     PUBLISHED_K_H,
     PUBLISHED_K_P,
@@ -62,7 +62,7 @@ def _over_chord(platform: InterceptStudy, frame: InterceptStudy, draw: Drawings)
         ax.plot(sampling.chords, platform.intercept[MIDDLE, :, k], color=color, marker="o", markersize=3.0, label=label)
         ax.plot(sampling.chords, frame.intercept[MIDDLE, :, k], color=color, marker="s", markersize=3.0, linestyle="--")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend(ax, r"$\rho$ [kg/m]")
+    legend_above(ax, r"$\rho$ [kg/m]")
     bent = [_bend(sampling.chords[:, None], study.intercept, study.h_b[:, None, :]) for study in (platform, frame)]
     return finding(
         "b-over-chord",
@@ -85,7 +85,7 @@ def _over_density(platform: InterceptStudy, frame: InterceptStudy, draw: Drawing
             sampling.densities, frame.h_b[k], color=color, marker="s", markersize=2.6, linewidth=0.9, linestyle="--"
         )
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend(ax, r"$\varphi$ [rad]")
+    legend_above(ax, r"$\varphi$ [rad]")
     spread = np.ptp(frame.k_h_of_angle) / abs(frame.k_h)
     return finding(
         "h-over-density",
@@ -108,14 +108,14 @@ def _range(study: ConstantsStudy, draw: Drawings) -> Finding:
     ax.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     ax.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
     _logarithmic(ax, (50, 100, 200, 500))
-    legend(ax)
+    legend_above(ax)
     second, bx = axes("highest sampled $T_x$ [N]", "$|k_h|$ [m/s²]")
     _course(bx, study.over_highest, "highest", "k_h_frame", BLUE, "frame end")
     _course(bx, study.over_highest, "highest", "k_h_platform", PURPLE, "platform end")
     bx.axhline(PUBLISHED_K_H, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_H, color="0.4", linewidth=0.9, linestyle=":", label="$g/2$")
     _logarithmic(bx, (500, 2000, 10_000, 40_000))
-    legend(bx)
+    legend_above(bx)
     all_k_p = [c.k_p for c in study.over_lowest]
     return finding(
         "published-range",
@@ -143,7 +143,7 @@ def _limit(study: ConstantsStudy, draw: Drawings) -> Finding:
         away = [100.0 * abs(abs(getattr(c, name)) / limit - 1.0) for c in study.scaled]
         ax.semilogy(FACTORS, away, color=color, marker="o", markersize=3.0, linewidth=1.1, label=labels[name])
     _logarithmic(ax, tuple(FACTORS.astype(int)))
-    legend(ax)
+    legend_above(ax)
     return finding(
         "taut-limit",
         numbers={"scaled": [c._asdict() for c in study.scaled], "factors": FACTORS, "g_squared_over_24": SHALLOW_K_P},

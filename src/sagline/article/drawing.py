@@ -62,7 +62,7 @@ def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
     return figure, ax
 
 
-def legend(ax: Axes, title: str = "") -> None:
+def legend_above(ax: Axes, title: str = "") -> None:
     """A legend above the axes, off the curves, in as many columns as fit; the figure grows by its height."""
     figure = cast(Sheet, ax.get_figure(root=True))
     handles, labels = ax.get_legend_handles_labels()
@@ -153,7 +153,7 @@ def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
     """Draw one course, sampled at x, with its fit."""
     ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
     ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
-    legend(ax)
+    legend_above(ax)
 
 
 def error_panels(
@@ -170,7 +170,7 @@ def error_panels(
             ax.annotate(point, at, fontsize=TICK, ha="center", va="center")
         ax.margins(0.16)
         if len(series) > 1:
-            legend(ax)
+            legend_above(ax)
         panels.append(draw.panel(figure, caption.format(name)))
     return panels
 
@@ -189,7 +189,7 @@ class Courses(NamedTuple):
         for row, fit, name, color in zip(self.rows, self.fits, self.names, shades(len(self.names)), strict=True):
             ax.plot(self.x, row, "o", color=color, markersize=2.6, label=name)
             ax.plot(self.fine, fit, color=color, linewidth=0.9)
-        legend(ax, title)
+        legend_above(ax, title)
 
     def panels(
         self, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings

@@ -37,7 +37,7 @@ Where = Callable[[], Array]  # the true position of the platform's origin [m], s
 Tell = Callable[[float], None]  # share of the experiment that is over
 
 
-class Watch:
+class StopObserver:
     """Observer of stops, and of the courses between them; used as a `sagline.control.Recorder`."""
 
     def __init__(self, where: Where, tell: Tell | None = None) -> None:
@@ -174,11 +174,11 @@ def in_process(
     planned = sl.load_robot(PROTOTYPE) if nominal is None else nominal
     real = with_cells(planned if true is None else true)
     twin = sl.twin.Machine(real, nominal=planned, start=level_poses(HOME), seed=seed)
-    watch = Watch(lambda: twin.reading.position, tell)
+    watch = StopObserver(lambda: twin.reading.position, tell)
     return experiment(control.Controller(planned, twin.link(), loop=loop, record=watch, seed=seed), watch)
 
 
-def experiment(controller: control.Controller, watch: Watch) -> Experiment:
+def experiment(controller: control.Controller, watch: StopObserver) -> Experiment:
     """Run the experiment; RefusedError if it cannot be connected or homed, or ends on the way."""
     legs = _legs(controller.period)
     controller.connect()
@@ -229,7 +229,7 @@ def _ended(controller: control.Controller, where: str) -> control.RefusedError:
 
 def _result(
     controller: control.Controller,
-    watch: Watch,
+    watch: StopObserver,
     stops: Sequence[tuple[Array, ...]],
     plans: Sequence[sl.Plan],
     ends: Array,

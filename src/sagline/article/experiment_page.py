@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sagline import control
-from sagline.article.drawing import Drawings, cables_over_time, error_panels, legend
+from sagline.article.drawing import Drawings, cables_over_time, error_panels, legend_above
 from sagline.article.experiment import SPEED, STOP, Experiment
 from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
@@ -110,7 +110,7 @@ def _lengths(result: Experiment, draw: Drawings) -> Finding:
 
 def _courses(result: Experiment, values: Array, label: str, caption: str, draw: Drawings) -> Panel:
     figure, ax = cables_over_time(result.time, values, label, 0.9, "cable {}", result.stops.tolist())
-    legend(ax)
+    legend_above(ax)
     return draw.panel(figure, caption)
 
 

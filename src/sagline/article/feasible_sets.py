@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, legend, shades
-from sagline.article.sampling import ANGLE, GRAVITY, Line, fit_line, simulated_cable
+from sagline.article.drawing import Drawings, axes, legend_above, shades
+from sagline.article.sampling import ANGLE, GRAVITY, FittedLine, fit_line, simulated_cable
 from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -54,7 +54,7 @@ class _FeasibleSets:
     tensions: Array  # T_x along the curve Psi [N], shape (t,)
     vertical: Array  # T_z along it [N], shape (t,)
     lengths: Array  # L along it [m], shape (t,)
-    line: Line  # the line pi of least squares through (T_x, T_z): slope a_pi, intercept b_pi [N]
+    line: FittedLine  # the line pi of least squares through (T_x, T_z): slope a_pi, intercept b_pi [N]
 
     @property
     def tangent(self) -> float:
@@ -121,7 +121,7 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
     for study, color in zip(studies, shades(len(studies)), strict=True):
         outline = study.psi[SHOWN]
         ax.plot(outline[:, 0], outline[:, 1], color=color, linewidth=1.3, label=n(1e3 * study.tolerance, unit="mm"))
-    legend(ax, r"tolerance $\epsilon_{max}$")
+    legend_above(ax, r"tolerance $\epsilon_{max}$")
     along = np.array(studies[0].end) / CHORD
     second, bx = axes("along the chord [N]", "across it [N]")
     middle = studies[-1].psi[SHOWN].mean(axis=0)
@@ -129,7 +129,7 @@ def _psi(studies: list[_FeasibleSets], draw: Drawings) -> Finding:
         away, label = study.psi[SHOWN] - middle, n(1e3 * study.tolerance, unit="mm")
         bx.plot(away @ along, away @ (-along[1], along[0]), color=color, linewidth=1.3, label=label)
     bx.set_ylim(-0.2, 0.3)
-    legend(bx, r"tolerance $\epsilon_{max}$")
+    legend_above(bx, r"tolerance $\epsilon_{max}$")
     ratio = extents[:-1] / extents[1:]
     return finding(
         "psi",
@@ -157,7 +157,7 @@ def _curve(study: _FeasibleSets, draw: Drawings) -> Finding:
         label = rf"$\psi$, $\epsilon_{{max}}$ = {n(1e3 * study.tolerance, unit='mm')}" if k == 0 else "_"
         ax.plot([outline[:, 0].min(), outline[:, 0].max()], height, color=VERMILLION, linewidth=2.2, label=label)
     ax.set_xlim(0.0, TENSIONS[-1])
-    legend(ax)
+    legend_above(ax)
     return finding(
         "psi-curve",
         numbers={
@@ -181,12 +181,12 @@ def _line(study: _FeasibleSets, draw: Drawings) -> Finding:
     ax.plot(
         study.tensions, line.slope * study.tensions + line.intercept, color="black", linewidth=0.9, label=r"line $\pi$"
     )
-    legend(ax)
+    legend_above(ax)
     second, bx = axes("$T_x$ [N]", "away from the line [N]")
     bx.plot(study.tensions, rest, color=BLUE, linewidth=1.3, label=r"fitted line")
     bx.plot(study.tensions, from_article, color=VERMILLION, linewidth=1.3, label=r"$\tan\varphi\, T_x + wD/2$")
     bx.axhline(0.0, color="0.6", linewidth=0.6)
-    legend(bx)
+    legend_above(bx)
     return finding(
         "line-pi",
         numbers={

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, draw_errors, legend, map_axes, shades
+from sagline.article.drawing import Drawings, axes, draw_errors, legend_above, map_axes, shades
 from sagline.article.identify import EmpiricalFit, identify_empirical
 from sagline.article.identify_cable import CableFit, identify_cable
 from sagline.article.sampling import simulated_cable
@@ -75,7 +75,7 @@ def _limits(fit: EmpiricalFit, draw: Drawings) -> Finding:
     for tolerance, color in zip(TOLERANCES, shades(len(TOLERANCES)), strict=True):
         frontier[tolerance] = np.array([fit.weight_max(tolerance, tension) for tension in fit.tensions])
         ax.plot(fit.tensions, frontier[tolerance], color=color, linewidth=1.3, label=n(1e3 * tolerance, unit="mm"))
-    legend(ax, "position error")
+    legend_above(ax, "position error")
     limits = [
         {"tolerance_m": each, "tension_min_N": fit.tension_min(each), "weight_max_N": fit.weight_max(each)}
         for each in TOLERANCES

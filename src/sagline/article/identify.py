@@ -171,12 +171,12 @@ def identify_empirical(
         tensions=axes[2],
         force_residual=found.vertical_force - exact.vertical_force,
         length_residual=found.unstrained_length - exact.unstrained_length,
-        position_error=position_error(found),
+        position_error=end_position_error(found),
         cable_weight=exact.cable_weight,
     )
 
 
-def position_error(state: CableState) -> Array:
+def end_position_error(state: CableState) -> Array:
     """The article's (20): how far from B_d exact cables of a state's forces and lengths end, |dx| + |dz| [m]."""
     # state: of any model, shape (...)
     # returns shape (...)

@@ -12,8 +12,8 @@ from matplotlib.patches import Rectangle
 from numpy.typing import ArrayLike
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, draw_errors, legend, logarithmic_with_floor, map_axes
-from sagline.article.identify import position_error
+from sagline.article.drawing import Drawings, axes, draw_errors, legend_above, logarithmic_with_floor, map_axes
+from sagline.article.identify import end_position_error
 from sagline.article.sampling import GRAVITY, simulated_cable
 from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array, checked
@@ -90,7 +90,7 @@ def model_errors(
         *axes,
         length_error=np.stack([state.unstrained_length - exact.unstrained_length for state in states]),
         force_error=np.stack([state.vertical_force - exact.vertical_force for state in states]),
-        position_error=np.stack([position_error(state) for state in states]),
+        position_error=np.stack([end_position_error(state) for state in states]),
     )
 
 
@@ -204,7 +204,7 @@ def _slices(draw: Drawings) -> Finding:
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
         if quantity != "angle":
             ax.set_xscale("log")
-        legend(ax)
+        legend_above(ax)
         panels.append(draw.panel(figure, f"Over the {names[quantity].split(' [')[0]}."))
         worst[quantity] = {_name(model): float(row.max()) for model, row in zip(study.models[:-1], error, strict=False)}
     return finding(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sagline.article.causes import best_explanations, limits_of_ten_points, single_causes
-from sagline.article.drawing import Drawings, axes, cables_over_time, error_panels, legend
+from sagline.article.drawing import Drawings, axes, cables_over_time, error_panels, legend_above
 from sagline.article.machine import Parameter
 from sagline.article.sampling import fit_line
 from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
@@ -101,7 +101,7 @@ def _space(study: TenPoses, draw: Drawings) -> Finding:
     ax.plot(height, 1e3 * table.error[:, 2], "o", color=BLUE, markersize=4.0, label="measured")
     ends = np.array([height.min(), height.max()])
     ax.plot(ends, 1e3 * (line.slope * ends + line.intercept), color="black", linewidth=0.9, label="line")
-    legend(ax)
+    legend_above(ax)
     panels.append(draw.panel(figure, "Actual less desired height."))
     tension = study.plan.horizontal_tension.mean(axis=1)
     against = float(np.corrcoef(tension, table.distance)[0, 1])
@@ -132,7 +132,7 @@ def _trends(study: TenPoses, draw: Drawings) -> Finding:
         axis.plot(fine, course, color=COLORS[k % 5], linewidth=1.2, label=_typical(trend.parameter))
     for axis in (ax, bx):
         axis.set_ylim(-25.0, 85.0)
-        legend(axis)
+        legend_above(axis)
     listed = [(_typical(trend.parameter), trend.error, trend.height_slope) for trend in study.trends]
     listed.append(("measured", study.table.error, float(1e3 * study.height_line.slope)))
     rows = [(name, *(n(1e3 * z, ".1f") for z in error[:, 2]), n(slope, "+.1f")) for name, error, slope in listed]

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from matplotlib.ticker import FixedLocator, NullLocator
 
 import sagline as sl
-from sagline.article.drawing import NAME_SIZE, Drawings, axes, legend
+from sagline.article.drawing import NAME_SIZE, Drawings, axes, legend_above
 from sagline.article.simulation import ERROR_BAND
 from sagline.core.numbers import n
 from sagline.files.writing import check_files, plain
@@ -68,7 +68,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
     return ArticleReport(*write_page(folder, NAMES, text, numbers), tuple(chapters), numbers)
 
 
-class Part(NamedTuple):
+class _Part(NamedTuple):
     """A chapter that can be selected."""
 
     key: str  # its name
@@ -84,16 +84,16 @@ class Part(NamedTuple):
 
 
 PARTS = (
-    Part("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
-    Part("intercept", (6, 7), (), "constants", "intercept_chapter"),
-    Part("sag", tuple(range(8, 16)), (), "sag", "sag_chapter"),
-    Part("constants", (), (), "constants", "constants_chapter"),
-    Part("identify", (), (), "identification", "identify_chapter"),
-    Part("models", (), (), "models", "models_chapter"),
-    Part("simulation", tuple(range(17, 23)), (), "simulation_page", "simulation_chapter"),
-    Part("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
-    Part("workspace", (), (), "workspace", "workspace_chapter"),
-    Part("errata", (), (), "errata", "errata_chapter"),
+    _Part("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
+    _Part("intercept", (6, 7), (), "constants", "intercept_chapter"),
+    _Part("sag", tuple(range(8, 16)), (), "sag", "sag_chapter"),
+    _Part("constants", (), (), "constants", "constants_chapter"),
+    _Part("identify", (), (), "identification", "identify_chapter"),
+    _Part("models", (), (), "models", "models_chapter"),
+    _Part("simulation", tuple(range(17, 23)), (), "simulation_page", "simulation_chapter"),
+    _Part("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
+    _Part("workspace", (), (), "workspace", "workspace_chapter"),
+    _Part("errata", (), (), "errata", "errata_chapter"),
 )
 
 
@@ -106,7 +106,7 @@ class _Selection:
     tables: frozenset[int]  # numbers of tables that are wanted
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[_Part, ...]:
         """The chapters that have something to build."""
         return tuple(
             p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables}
@@ -182,7 +182,7 @@ def _picture(chapters: Sequence[Chapter]) -> Panel | None:
     ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yticks(range(len(models)), labels=list(models))
     ax.set_ylim(len(models) - 0.5, -0.5)
-    legend(ax)
+    legend_above(ax)
     return Drawings("result").panel(
         figure, "Lengths planned with each cable model, wound onto exact cables along the article's path."
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sagline.article.drawing import Courses, Drawings, axes, legend, with_fit
+from sagline.article.drawing import Courses, Drawings, axes, legend_above, with_fit
 from sagline.article.feasible_sets import End
 from sagline.article.regressions import (
     PUBLISHED_K_P,
@@ -59,7 +59,7 @@ def _with_stretch(study: StretchStudy, draw: Drawings) -> Finding:
     ax.plot(study.tensions, 1e3 * study.unstretchable, color=BLUE, linewidth=1.3, label="does not stretch")
     ax.plot(study.tensions, 1e3 * study.stretchable, color=VERMILLION, linewidth=1.3, label="stretches")
     ax.axhline(0.0, color="0.6", linewidth=0.6)
-    legend(ax)
+    legend_above(ax)
     hooke = study.magnitude[-1] * CHORD / float(study.cable.axial_stiffness)
     numbers = {
         "least_unstretchable_m": study.unstretchable.min(),
@@ -77,11 +77,11 @@ def _relieved(study: StretchStudy, draw: Drawings) -> Finding:
     ax.plot(study.magnitude, 1e3 * study.unstretchable, color=BLUE, linewidth=2.4, alpha=0.5, label="does not stretch")
     ax.plot(study.magnitude, 1e3 * study.relieved, color=VERMILLION, linewidth=1.1, label="stretch taken out, (38)")
     ax.set_yscale("log")
-    legend(ax)
+    legend_above(ax)
     second, bx = axes("$|T|$ [N]", "error of $d$ [mm]")
     bx.plot(study.magnitude, printed, color=VERMILLION, linewidth=1.3, label="(36), (38)")
     bx.plot(study.magnitude, mended, color=GREEN, linewidth=1.3, label="with the mean tension")
-    legend(bx)
+    legend_above(bx)
     return finding(
         "stretch-removed",
         numbers=numbers,
@@ -152,7 +152,7 @@ def _density(study: SagStudy, draw: Drawings) -> Finding:
     bx.plot(densities, each, "o-", color=BLUE, markersize=3.0, linewidth=1.1, label="density by density")
     bx.axhline(PUBLISHED_K_P, color=VERMILLION, linewidth=0.9, linestyle="--", label="published")
     bx.axhline(SHALLOW_K_P, color="0.4", linewidth=0.9, linestyle=":", label="$g^2/24$")
-    legend(bx)
+    legend_above(bx)
     return finding(
         "p-over-density",
         numbers={

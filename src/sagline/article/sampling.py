@@ -16,7 +16,7 @@ ANGLE = 0.754  # rad, of the article's figure 10
 UNSTRETCHABLE = 1e20  # N: strains below the rounding of a length
 
 
-class Line(NamedTuple):
+class FittedLine(NamedTuple):
     """Lines y = slope x + intercept fitted along the last axis."""
 
     slope: Array  # shape (...)
@@ -25,7 +25,7 @@ class Line(NamedTuple):
     deviation: Array  # largest distance of a sample from the line, in the unit of y, shape (...)
 
 
-def fit_line(x: Array, y: Array) -> Line:
+def fit_line(x: Array, y: Array) -> FittedLine:
     """The line of least squares through samples along the last axis."""
     x, y = np.broadcast_arrays(x, y)
     away_x = x - x.mean(axis=-1, keepdims=True)
@@ -34,7 +34,7 @@ def fit_line(x: Array, y: Array) -> Line:
     rest = away_y - slope[..., None] * away_x
     explained = 1.0 - np.sum(rest**2, axis=-1) / np.sum(away_y**2, axis=-1)
     intercept = y.mean(axis=-1) - slope * x.mean(axis=-1)
-    return Line(slope, intercept, explained, np.abs(rest).max(axis=-1))
+    return FittedLine(slope, intercept, explained, np.abs(rest).max(axis=-1))
 
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:

@@ -42,7 +42,7 @@ class Figures(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Simulation:
+class PathStudy:
     """Both robots along one path.
 
     Attributes:
@@ -80,7 +80,7 @@ class LowTension:
     mixed_bound: Figures  # the same of the second configuration
 
 
-def simulate(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> Simulation:
+def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
     """Plan both robots along the article's path and wind the lengths onto exact cables.
 
     The article's "simple controller", tensions in and lengths out, is the plan; where the platform then is, is the
@@ -92,7 +92,7 @@ def simulate(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> S
     path = sl.article_path(rate)
     runs = [tuple(_run(sl.load_robot(name), path, model, METHOD) for model in models) for name in ROBOTS]
     suspended, mixed = runs
-    return Simulation(path, tuple(models), suspended, mixed)
+    return PathStudy(path, tuple(models), suspended, mixed)
 
 
 def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:

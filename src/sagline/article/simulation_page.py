@@ -5,8 +5,24 @@ from __future__ import annotations
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import WIDTH, Drawings, axes, cables_over_time, legend, logarithmic_with_floor, thinning
-from sagline.article.simulation import ERROR_BAND, Figures, LowTension, Simulation, figures, low_tension_study, simulate
+from sagline.article.drawing import (
+    WIDTH,
+    Drawings,
+    axes,
+    cables_over_time,
+    legend_above,
+    logarithmic_with_floor,
+    thinning,
+)
+from sagline.article.simulation import (
+    ERROR_BAND,
+    Figures,
+    LowTension,
+    PathStudy,
+    figures,
+    low_tension_study,
+    path_study,
+)
 from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -25,7 +41,7 @@ NEAR = 1.05  # times the lower limit: what counts as near the minimum
 
 def simulation_chapter() -> Chapter:
     """Both robots along the path."""
-    study, low = simulate(), low_tension_study(LIMITS)
+    study, low = path_study(), low_tension_study(LIMITS)
     draw = Drawings("simulation")
     return chapter(
         "simulation",
@@ -41,7 +57,7 @@ def simulation_chapter() -> Chapter:
     )
 
 
-def _robots(study: Simulation, draw: Drawings) -> Finding:
+def _robots(study: PathStudy, draw: Drawings) -> Finding:
     panels = []
     for run, caption in zip(study.of(sl.Catenary), ("First configuration: suspended.", "Second: mixed."), strict=True):
         figure = Sheet(figsize=(WIDTH, 3.4))
@@ -61,7 +77,7 @@ def _path(path: sl.Path, draw: Drawings) -> Finding:
     part = thinning(len(path))
     for name, course, color in zip("xy", path.twist.T[:2], COLORS, strict=False):
         bx.plot(path.time[part], course[part], color=color, linewidth=1.3, label=f"$v_{name}$")
-    legend(bx)
+    legend_above(bx)
     speed = np.linalg.norm(path.twist[:, :3], axis=1)
     acceleration = np.linalg.norm(path.twist_rate[:, :3], axis=1)
     return finding(
@@ -76,7 +92,7 @@ def _path(path: sl.Path, draw: Drawings) -> Finding:
     )
 
 
-def _courses(study: Simulation, draw: Drawings) -> Finding:
+def _courses(study: PathStudy, draw: Drawings) -> Finding:
     panels, numbers, texts = [], {}, []
     for run, robot, figure in zip(study.of(sl.Empirical), ("suspended", "mixed"), (20, 21), strict=True):
         cables, numbers[robot] = run.plan.state.cables, figures(run)._asdict()
@@ -104,11 +120,11 @@ def _cables(plan: sl.Plan, values: Array, label: str, caption: str, draw: Drawin
     assert path is not None
     figure, ax = cables_over_time(path.time, values, label, 1.0, "{}")
     ax.set_xlim(path.time[0], path.time[-1])
-    legend(ax, "cable")
+    legend_above(ax, "cable")
     return draw.panel(figure, caption)
 
 
-def _error(study: Simulation, draw: Drawings) -> Finding:
+def _error(study: PathStudy, draw: Drawings) -> Finding:
     panels, found = [], {}
     for run, robot in zip(study.of(sl.Empirical), ("suspended", "mixed"), strict=True):
         found[robot] = figures(run)
@@ -136,11 +152,11 @@ def _error_panel(run: sl.Confirmation, path: sl.Path, caption: str, draw: Drawin
     for name, course, color in zip("xyz", 1e3 * run.position_error[part].T, COLORS, strict=False):
         ax.plot(path.time[part], course, color=color, linewidth=1.1, label=f"${name}$")
     ax.set_xlim(path.time[0], path.time[-1])
-    legend(ax)
+    legend_above(ax)
     return draw.panel(figure, caption)
 
 
-def _comparison(study: Simulation) -> Finding:
+def _comparison(study: PathStudy) -> Finding:
     suspended, mixed = study.of(sl.Empirical)
     robot = mixed.plan.state.one_robot
     lower = robot.frame_anchors[:, 2] < robot.frame_anchors[:, 2].mean()
@@ -168,7 +184,7 @@ def _comparison(study: Simulation) -> Finding:
     )
 
 
-def _models(study: Simulation, draw: Drawings) -> Finding:
+def _models(study: PathStudy, draw: Drawings) -> Finding:
     rows, numbers = [], {}
     for model, first, second in zip(study.models, study.suspended, study.mixed, strict=True):
         pair, name = (figures(first), figures(second)), type(model).__name__
@@ -193,7 +209,7 @@ def _models(study: Simulation, draw: Drawings) -> Finding:
             distance = 1e3 * np.linalg.norm(run.position_error[part], axis=1)
             ax.plot(study.path.time[part], distance, color=color, linewidth=1.1, label=type(model).__name__)
         logarithmic_with_floor(ax, 1e3 * FLOOR, f"below {n(FLOOR, '.3g', 'm')}")
-        legend(ax)
+        legend_above(ax)
         panels.append(draw.panel(figure, f"Position error of four models, {robot}; the exact one is the zero."))
     shallow = [figures(run).error_max for run in study.of(sl.Parabolic)]
     return finding(
@@ -232,7 +248,7 @@ def _low_tension(low: LowTension, draw: Drawings) -> Finding:
     ax.plot(low.tension_min, 1e3 * low.mixed, color=VERMILLION, marker="o", markersize=3.0, label="mixed")
     ax.axhline(1e3 * ERROR_BAND, color="0.5", linewidth=0.8, linestyle=":", label="the article's 6 mm")
     ax.set_yscale("log")
-    legend(ax)
+    legend_above(ax)
     bound: tuple[Figures, Figures] = (low.suspended_bound, low.mixed_bound)
     good = low.tension_min[np.maximum(low.suspended, low.mixed) <= ERROR_BAND]
     return finding(

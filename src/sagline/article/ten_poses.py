@@ -21,7 +21,7 @@ from sagline.article.machine import (
     rest_positions,
     robot_with_errors,
 )
-from sagline.article.sampling import Line, fit_line
+from sagline.article.sampling import FittedLine, fit_line
 from sagline.article.table2 import Table2, table2
 from sagline.core.arrays import Array, locked
 from sagline.motion.segments import QUINTIC
@@ -64,7 +64,7 @@ class TenPoses:
     plan: sl.Plan  # the prototype's plan for them, with the empirical model
     home: sl.Plan  # the plan of its home pose
     model_error: Array  # error that the empirical model itself makes at the ten poses [m], shape (10, 3)
-    height_line: Line  # line of least squares of the measured vertical error over the height of the pose
+    height_line: FittedLine  # line of least squares of the measured vertical error over the height of the pose
     trends: tuple[Trend, ...]  # one parameter off at a time
     # all explanations by one, by two and by three parameters, those that leave least first within each
     explanations: tuple[tuple[Explanation, ...], ...]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 import sagline as sl
-from sagline.article.drawing import Drawings, axes, legend
+from sagline.article.drawing import Drawings, axes, legend_above
 from sagline.article.simulation import ROBOTS
 from sagline.article.texts import chapter, finding
 from sagline.core.numbers import n
@@ -21,7 +21,7 @@ HEIGHT = 3.0  # m: half the frame's
 POINTS = 121  # along each side of a slice
 
 
-class Pair(NamedTuple):
+class _Workspaces(NamedTuple):
     """One robot's workspace with sag and without."""
 
     exact: sl.Workspace  # on exact catenaries
@@ -35,12 +35,12 @@ def workspace_chapter() -> Chapter:
     return chapter("workspace", (_volumes(pairs), _boundaries(pairs, draw)))
 
 
-def _pair(name: str) -> Pair:
+def _pair(name: str) -> _Workspaces:
     robot = sl.load_robot(name)
-    return Pair(*(sl.workspace(robot, model=model, cells=CELLS) for model in (sl.Catenary(), sl.Straight())))
+    return _Workspaces(*(sl.workspace(robot, model=model, cells=CELLS) for model in (sl.Catenary(), sl.Straight())))
 
 
-def _volumes(pairs: dict[str, Pair]) -> Finding:
+def _volumes(pairs: dict[str, _Workspaces]) -> Finding:
     change = {name: pair.exact.volume / pair.straight.volume - 1.0 for name, pair in pairs.items()}
     volumes = "; ".join(
         f"{name}: {n(pair.exact.volume, '.1f')} m³ with sag, {n(pair.straight.volume, '.1f')} m³ on straight cables, "
@@ -73,7 +73,7 @@ def _volumes(pairs: dict[str, Pair]) -> Finding:
     )
 
 
-def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
+def _boundaries(pairs: dict[str, _Workspaces], draw: Drawings) -> Finding:
     apart = {name: _farthest(pair) for name, pair in pairs.items()}
     panels = tuple(
         _panel(pair, normal, at, draw)
@@ -86,7 +86,7 @@ def _boundaries(pairs: dict[str, Pair], draw: Drawings) -> Finding:
     )
 
 
-def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
+def _panel(pair: _Workspaces, normal: int, at: float, draw: Drawings) -> Panel:
     """Both boundaries in a plane."""
     plane, box = Plane(normal, at), pair.exact.box
     first, second = plane.axes
@@ -97,11 +97,11 @@ def _panel(pair: Pair, normal: int, at: float, draw: Drawings) -> Panel:
         ax.contour(cut.across, cut.up, cut.level, levels=[0.0], colors=color, linestyles=style, linewidths=1.3)
         ax.plot([], [], color=color, linestyle=style, label=label)
     ax.set(xlim=(box.low[first], box.high[first]), ylim=(box.low[second], box.high[second]))
-    legend(ax)
+    legend_above(ax)
     return draw.panel(figure, f"{pair.exact.robot.name}: the boundary in the plane {plane}; the frame is the border.")
 
 
-def _farthest(pair: Pair) -> float:
+def _farthest(pair: _Workspaces) -> float:
     """Largest distance of both boundaries along rays from the middle of the frame [m]."""
     middle = np.array([0.0, 0.0, HEIGHT])
     ways = np.vstack((np.eye(3), -np.eye(3)))

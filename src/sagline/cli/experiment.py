@@ -87,7 +87,7 @@ def experiment(
 
 def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experiment:
     """Drive a twin in another process, over S7, in real time."""
-    from sagline.article.experiment import Watch, level_poses, with_cells
+    from sagline.article.experiment import StopObserver, level_poses, with_cells
     from sagline.article.experiment import experiment as driven
     from sagline.article.ten_poses import HOME
     from sagline.control.controller import Controller
@@ -99,7 +99,7 @@ def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experim
         machine_in_process(with_cells(true), nominal, level_poses(HOME), seed=seed) as twin,
         closing(S7Link(twin.addresses, nominal)) as link,
     ):
-        watch = Watch(twin.position, tell)
+        watch = StopObserver(twin.position, tell)
         return driven(Controller(nominal, link, pace=Pace(), record=watch), watch)
 
 

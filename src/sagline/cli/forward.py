@@ -25,7 +25,7 @@ from sagline.cli.terminal import note, show, show_json, working
 from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
-    from sagline.files.measurements import Lengths
+    from sagline.files.measurements import LengthSamples
     from sagline.kinematics.forward_rows import ForwardSolution
     from sagline.robot.robot import Robot
 
@@ -88,21 +88,21 @@ def forward(
     return OUTSIDE
 
 
-def _measured(file: Path, robot: Robot) -> Lengths:
+def _measured(file: Path, robot: Robot) -> LengthSamples:
     from sagline.files.measurements import load_lengths
 
     return load_lengths(file, robot.cable_count, float(np.linalg.norm(np.ptp(robot.frame_anchors, axis=0))))
 
 
-def _counted(file: Path, robot: Robot) -> Lengths:
-    from sagline.files.measurements import Lengths, load_counts
+def _counted(file: Path, robot: Robot) -> LengthSamples:
+    from sagline.files.measurements import LengthSamples, load_counts
     from sagline.kinematics.winches import lengths_from_counts
 
     read = load_counts(file, robot.cable_count)
-    return Lengths(read.time, lengths_from_counts(robot, read.counts))
+    return LengthSamples(read.time, lengths_from_counts(robot, read.counts))
 
 
-def _rows(lengths: Lengths, found: ForwardSolution) -> list[list[Cell]]:
+def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
     """Header and one row a sample; with the time if the file has it."""
     from sagline.kinematics.status import ForwardStatus
 

@@ -19,7 +19,7 @@ from sagline.control.recording import Event, EventKind
 from sagline.control.states import State
 from sagline.core.errors import InvalidValueError, SaglineError, nearest
 from sagline.files.path_file import load_path
-from sagline.files.pose_text import pose_of
+from sagline.files.pose_text import pose_of_text
 from sagline.robot.pose import Pose
 
 EVERY: Final = 0.2  # s between two updates of the status line
@@ -300,7 +300,7 @@ class Session:
 def _pose(item: str, text: str) -> Pose:
     if not text:
         raise InvalidValueError(item, "without a pose", "X,Y,Z or X,Y,Z,A,B,C", f"Say {item} 0.2,-0.4,1.4.")
-    return pose_of(text, item, f"Give meters, and degrees about z, y and x: {item} 0.2,-0.4,1.4.")
+    return pose_of_text(text, item, f"Give meters, and degrees about z, y and x: {item} 0.2,-0.4,1.4.")
 
 
 def _nothing(text: str) -> None:

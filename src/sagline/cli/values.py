@@ -10,8 +10,7 @@ import numpy as np
 
 from sagline.core.arrays import checked
 from sagline.core.errors import InvalidValueError
-from sagline.files.pose_text import FARTHEST, wrench_of
-from sagline.files.pose_text import pose_of as pose_of
+from sagline.files.pose_text import FARTHEST, wrench_of_text
 from sagline.files.quantity import in_si
 from sagline.robot.inertia import with_mass
 from sagline.robot.pose import Pose, PoseBox
@@ -84,7 +83,7 @@ def wrenches_of(text: str, item: str) -> WrenchSet:
     if len(text) > _LONGEST or not _SIGN.match(text):
         if "±" in text or len(text) > _LONGEST:
             raise InvalidValueError(item, repr(text), "each with ±, or none", _STEP)
-        return WrenchPolytope([cast(Any, wrench_of(text, item))])
+        return WrenchPolytope([cast(Any, wrench_of_text(text, item))])
     found: dict[str, list[float]] = {kind: [] for kind in _KINDS}
     for part in text.split(","):
         kind, size = _load_of(part, item)

@@ -30,7 +30,7 @@ from sagline.files.variables import (
     fields_of,
     record_variables,
     records_of,
-    variables_of,
+    variables_of_result,
 )
 from sagline.kernels.calibration.kinds import KIND_ROWS
 from sagline.robot.pose import Pose
@@ -183,17 +183,17 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
     return FORMAT.load(file)
 
 
-def pack(found: Calibration) -> Dataset:
+def _pack(found: Calibration) -> Dataset:
     """Data set of a calibration."""
-    variables = variables_of(found, FOUND) | variables_of(found.parameters, PARAMETERS)
+    variables = variables_of_result(found, FOUND) | variables_of_result(found.parameters, PARAMETERS)
     dimensions, units, attributes = variables["parameter_unit"]
     variables["parameter_unit"] = dimensions, np.where(units == "", "1", units).astype(object), attributes
     deviations = {name: getattr(found.sensors, name) for name in SENSORS}
     sensors = [_sensor(name, np.ndim(value)) for name, value in deviations.items() if value is not None]
-    variables |= variables_of(found.sensors, (*PLACED, *sensors)) | record_variables(found.outliers, OUTLIERS)
+    variables |= variables_of_result(found.sensors, (*PLACED, *sensors)) | record_variables(found.outliers, OUTLIERS)
     for group, columns in DIRECTIONS.items():
         variables |= record_variables(getattr(found, group), columns, len(found.values))
-    variables |= variables_of(found.cross_validation, CROSS_VALIDATION)
+    variables |= variables_of_result(found.cross_validation, CROSS_VALIDATION)
     omitted = np.array([(row, reason) for reason, rows in found.left_out.items() for row in rows], dtype=np.int64)
     for one, values in zip(LEFT_OUT, omitted.reshape(-1, 2).T, strict=True):
         variables[one.name] = one.parts, values.astype(one.type), one.attributes
@@ -220,7 +220,7 @@ def _attributes(found: Calibration) -> dict[str, Any]:
     }
 
 
-def unpack(path: Path, data: Dataset) -> Calibration:
+def _unpack(path: Path, data: Dataset) -> Calibration:
     """The calibration of a data set; its path is for messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
@@ -261,7 +261,7 @@ FORMAT: Final = Format(
     again="Save the calibration again, or take the file from where it came.",
     key="sagline_calibration_format",
     version=1,
-    pack=pack,
-    unpack=unpack,
+    pack=_pack,
+    unpack=_unpack,
 )
 save = FORMAT.save

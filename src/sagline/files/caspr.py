@@ -17,8 +17,8 @@ from sagline.files.reading import exists
 from sagline.files.robot_xml import (
     Imported,
     cables_of_file,
-    number,
-    numbers,
+    number_of_text,
+    numbers_of_text,
     only_child,
     read_xml,
     vertical_axis,
@@ -138,8 +138,8 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
     if joint not in _JOINTS:
         raise InvalidValueError("joint type", repr(joint), ", ".join(_JOINTS), "sagline's platform moves freely.")
     physical = only_child(link, "physical", "link_rigid")
-    mass = number(physical.findtext("mass"), "mass", "kg")
-    center = numbers(physical.findtext("com_location"), 3, "com_location", "m")
+    mass = number_of_text(physical.findtext("mass"), "mass", "kg")
+    center = numbers_of_text(physical.findtext("com_location"), 3, "com_location", "m")
     inertia = _inertia(only_child(physical, "inertia", "physical"), mass, center)
     fields: dict[str, Any] = {"mass": mass, "inertia": inertia, "center_of_mass": center}
     return fields | dict(zip(("motion_pattern", "plane_normal"), _JOINTS[joint], strict=True)), _lost_of_link(
@@ -150,7 +150,7 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
 def _inertia(element: Element, mass: float, center: Array) -> Array:
     """Inertia about the center of mass; CASPR gives it about that or about the joint, the platform's origin."""
     xx, yy, zz, xy, xz, yz = (
-        number(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+        number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
     )
     matrix = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     reference = element.get("ref", "")
@@ -164,13 +164,13 @@ def _inertia(element: Element, mass: float, center: Array) -> Array:
 def _lost_of_link(root: Element, link: Element) -> list[str]:
     lost = []
     location = link.findtext("parent/location", "0 0 0")
-    if numbers(location, 3, "parent: location", "m").any():
+    if numbers_of_text(location, 3, "parent: location", "m").any():
         lost.append(
             f"The joint's place in the base ({location.strip()} m): add it to CASPR's joint position to get the "
             "position of sagline's platform."
         )
     end = link.findtext("physical/end_location", "0 0 0")
-    if numbers(end, 3, "end_location", "m").any():
+    if numbers_of_text(end, 3, "end_location", "m").any():
         lost.append(f"The end location ({end.strip()} m).")
     joint = only_child(link, "joint", "link_rigid")
     limits = [key for key in ("q_min", "q_max", "q_initial") if joint.get(key)]
@@ -215,7 +215,7 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
     for end in ends:
         link = (end.findtext("link") or "0").strip()
         place = end.findtext("location") or end.findtext("fixed_location")
-        points[link] = numbers(place, 3, f"{item}: location on link {link}", "m")
+        points[link] = numbers_of_text(place, 3, f"{item}: location on link {link}", "m")
         if end.tag != "attachment":
             pulley = _pulley(end, link, item, lost)
     if set(points) != {"0", "1"}:
@@ -223,11 +223,12 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
     if element.get("attachment_reference") == "com":
         points["1"] = points["1"] + center
     low, high = (
-        number(element.findtext(f"properties/{key}"), f"{item}: {key}", "N") for key in ("force_min", "force_max")
+        number_of_text(element.findtext(f"properties/{key}"), f"{item}: {key}", "N")
+        for key in ("force_min", "force_max")
     )
     # CASPR divides K by the cable's length: it is an axial stiffness in N
     stiffness = element.findtext("properties/K") if element.tag == "cable_linear_spring" else None
-    known = None if stiffness is None else number(stiffness, f"{item}: K", "N")
+    known = None if stiffness is None else number_of_text(stiffness, f"{item}: K", "N")
     return points["0"], points["1"], low, high, known, *pulley
 
 
@@ -238,8 +239,8 @@ def _pulley(end: Element, link: str, item: str, lost: list[str]) -> tuple[float,
     elif end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:
         unlike = "without pulley_radius and cable_entry_vector"
     else:
-        radius = number(end.findtext("pulley_radius"), f"{item}: pulley_radius", "m")
-        entry = numbers(end.findtext("cable_entry_vector"), 3, f"{item}: cable_entry_vector", "")
+        radius = number_of_text(end.findtext("pulley_radius"), f"{item}: pulley_radius", "m")
+        entry = numbers_of_text(end.findtext("cable_entry_vector"), 3, f"{item}: cable_entry_vector", "")
         axis = vertical_axis(float(np.hypot(entry[0], entry[1])), float(entry[2]))
         if axis is not None:
             return radius, axis

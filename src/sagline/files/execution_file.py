@@ -18,11 +18,11 @@ from sagline.core.arrays import locked
 from sagline.core.errors import FileError, InvalidValueError, SaglineWarning
 from sagline.files.format import Format
 from sagline.files.mcap_layout import CABLE, CYCLES, EVENTS, EVERY, ROWS, SMALL, TIME, columns_of
-from sagline.files.mcap_reader import AGAIN, Ending, Log, read_log
+from sagline.files.mcap_reader import AGAIN, Ending, RecordedLog, read_log
 from sagline.files.mcap_writer import BLOCK, McapFile, check_packages
 from sagline.files.netcdf import index_coordinate, labeled_dataset, write_dataset
 from sagline.files.packed import unpack_dataset
-from sagline.files.plan_file import plan_dataset, plan_of
+from sagline.files.plan_file import plan_dataset, plan_of_dataset
 from sagline.files.robot_file import dump_robot
 from sagline.files.variables import NONE, PARTS, Quantity
 from sagline.files.writing import atomic_file
@@ -66,7 +66,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
     return execution_of_log(log, plan)
 
 
-def execution_of_log(log: Log, plan: int | None = None) -> Execution:
+def execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
     """Execution of a log."""
     count = len(log.plans)
     chosen = None if plan is None else integer(plan)
@@ -86,7 +86,7 @@ def execution_of_log(log: Log, plan: int | None = None) -> Execution:
         raise FileError(log.path, f"does not hold what it says ({error})", AGAIN) from None
 
 
-def _execution(log: Log, robot: Robot, blocks: list[dict[str, NDArray[Any]]], number: int | None) -> Execution:
+def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[Any]]], number: int | None) -> Execution:
     columns = {quantity.name: _column(quantity, blocks) for quantity in EVERY}
     _check_shapes(columns, robot)
     found = {quantity.place: locked(columns[quantity.name]) for quantity in EVERY}
@@ -109,10 +109,10 @@ def _execution(log: Log, robot: Robot, blocks: list[dict[str, NDArray[Any]]], nu
     )
 
 
-def plan_of_log(log: Log, number: int) -> Plan:
+def plan_of_log(log: RecordedLog, number: int) -> Plan:
     """A plan of a log."""
     data = unpack_dataset(log.plans[number])
-    return plan_of(log.path, data, f"robot of plan {number}")
+    return plan_of_dataset(log.path, data, f"robot of plan {number}")
 
 
 def _column(quantity: Quantity, blocks: list[dict[str, NDArray[Any]]]) -> NDArray[Any]:

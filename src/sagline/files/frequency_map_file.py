@@ -9,7 +9,7 @@ from sagline.dynamics.vibration.vibration import VibrationStatus
 from sagline.files.format import Format
 from sagline.files.netcdf import attributes_with_units, labeled_dataset
 from sagline.files.robot_file import dump_robot
-from sagline.files.variables import SOMEWHERE, Quantity, variables_of
+from sagline.files.variables import SOMEWHERE, Quantity, variables_of_result
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -26,9 +26,9 @@ QUANTITIES: Final = (
 )
 
 
-def pack(found: FrequencyMap) -> Dataset:
+def _pack(found: FrequencyMap) -> Dataset:
     """Data set of a frequency map."""
-    variables = variables_of(found, QUANTITIES, ("pose",))
+    variables = variables_of_result(found, QUANTITIES, ("pose",))
     attributes = {
         **FORMAT.attributes(f"Frequencies of {found.robot.name} over poses"),
         **attributes_with_units(found, {"up_to": "Hz"}),
@@ -46,6 +46,6 @@ FORMAT: Final = Format(
     again="Make the map again, or take the file from where it came.",
     key="sagline_frequency_map_format",
     version=1,
-    pack=pack,
+    pack=_pack,
 )
 save = FORMAT.save

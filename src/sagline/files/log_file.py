@@ -19,9 +19,9 @@ from sagline.files.path_file import EULER, QUATERNION
 from sagline.files.pose_text import QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
-from sagline.files.table import TABLE_LIMIT, Table, line_error
+from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
 from sagline.files.writing import write_text
-from sagline.files.yaml_text import Entry, parse_mapping, validate
+from sagline.files.yaml_text import YamlEntry, parse_mapping, validate
 from sagline.robot.pose import Pose
 
 DEVIATIONS: Final = {
@@ -41,7 +41,7 @@ _NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:
 USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # what a sensor may be off
 
 
-class _Sensors(Entry):
+class _Sensors(YamlEntry):
     """Keys of the comments above the columns."""
 
     length_deviation: Any = None
@@ -105,7 +105,7 @@ def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
         yield f"# target: {sensors.target.tolist()}"
 
 
-def _read(path: Path, text: str) -> tuple[Table, int]:
+def _read(path: Path, text: str) -> tuple[CsvTable, int]:
     """The table, and of how many cables it is."""
     header = next((line for line in text.split("\n") if line.strip()), "")
     found = [_NUMBERED.fullmatch(cell) for cell in header.replace('"', "").split(",")]
@@ -117,7 +117,7 @@ def _read(path: Path, text: str) -> tuple[Table, int]:
     units = {"time": "s", **readings, **optional_units, **commanded}
     strangers = {f"C{k}": f"counts are called count_{k}" for k in range(cables)}
     strangers |= {f"L{k}": f"lengths are called length_{k}" for k in range(cables)}
-    table = Table.read(path, text, units, strangers, frozenset((*readings, *optional_units)))
+    table = CsvTable.read(path, text, units, strangers, frozenset((*readings, *optional_units)))
     kinds = [kind for kind in ("count", "length") if any(name in table.columns for name in _names(kind, cables))]
     if len(kinds) != 1:
         what = "columns of counts and of lengths" if kinds else "neither columns count_0, ... nor length_0, ..."
@@ -133,7 +133,7 @@ def _names(kind: str, cables: int) -> list[str]:
     return [f"{kind}_{k}" for k in range(cables)]
 
 
-def _fields(table: Table, cables: int) -> dict[str, Any]:
+def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
     """Fields of the log but for its sensors."""
     columns = table.columns
     for name in _names("length", cables):
@@ -151,7 +151,7 @@ def _fields(table: Table, cables: int) -> dict[str, Any]:
     }
 
 
-def _stack_columns(table: Table, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
+def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool = True) -> Array | None:
     """Columns side by side, NaN for those that are missing; None where all are."""
     names = list(names)
     found = [name for name in names if name in table.columns]
@@ -163,7 +163,7 @@ def _stack_columns(table: Table, names: Iterable[str], *, all_of_them: bool = Tr
     return locked(np.stack([table.columns.get(name, none) for name in names], axis=-1))
 
 
-def _rotation(table: Table, suffix: str) -> Array | None:
+def _rotation(table: CsvTable, suffix: str) -> Array | None:
     """Rotations as unit quaternions, rows of NaN where there is none."""
     angles = _stack_columns(table, [name + suffix for name in EULER])
     quaternion = _stack_columns(table, [name + suffix for name in QUATERNION])
@@ -189,7 +189,7 @@ def _rotation(table: Table, suffix: str) -> Array | None:
     return found
 
 
-def _commanded(table: Table) -> Pose | None:
+def _commanded(table: CsvTable) -> Pose | None:
     position = _stack_columns(table, [name + COMMANDED for name in XYZ])
     rotation = _rotation(table, COMMANDED)
     if position is None:

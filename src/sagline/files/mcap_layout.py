@@ -181,7 +181,7 @@ def cycle_texts(columns: dict[str, NDArray[Any]]) -> Iterator[bytes]:
         yield _text({name: value for name, value in zip(names, row, strict=True) if value is not None})
 
 
-def event_text(event: Event) -> bytes:
+def event_message(event: Event) -> bytes:
     """Message of an event, without loss."""
     return _text({**event._asdict(), "kind": event.kind.value, "state": event.state.name})
 

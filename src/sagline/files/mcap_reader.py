@@ -52,7 +52,7 @@ class Truth(NamedTuple):
 
 
 @dataclass(slots=True)
-class Log:
+class RecordedLog:
     """Content of a log as far as it has been read."""
 
     path: Path  # the file
@@ -76,7 +76,7 @@ class LogReader:
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
         """Name the file; `more` reads it."""
-        self.log = Log(file_path(file))
+        self.log = RecordedLog(file_path(file))
         check_packages()
         self._offset = self._digest = 0
         self._topics: dict[int, str] = {}
@@ -216,7 +216,7 @@ class LogReader:
         return FileError(self.log.path, f"is damaged at byte {self._offset:,}", AGAIN)
 
 
-def read_log(file: os.PathLike[str] | str) -> Log:
+def read_log(file: os.PathLike[str] | str) -> RecordedLog:
     """Content of a log, also of one that was cut off."""
     reader = LogReader(file)
     reader.more()

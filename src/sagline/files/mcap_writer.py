@@ -130,7 +130,7 @@ class McapFile:
 
     def event(self, event: Event) -> None:
         """Write an event."""
-        self._message(mcap_layout.EVENT, self.stamp(event.time), mcap_layout.event_text(event))
+        self._message(mcap_layout.EVENT, self.stamp(event.time), mcap_layout.event_message(event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
         """Write the true pose of the platform at a time [s]."""

@@ -11,28 +11,28 @@ import numpy as np
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array, locked
 from sagline.files.reading import read_text
-from sagline.files.table import TABLE_LIMIT, Table
+from sagline.files.table import TABLE_LIMIT, CsvTable
 
 # of each kind of column the other one, and what to do where a file has that
 _OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
 
-class Lengths(NamedTuple):
+class LengthSamples(NamedTuple):
     """N samples of the unstrained lengths of m cables."""
 
     time: Array | None  # [s], shape (N,); None where the file has none
     unstrained_length: Array  # [m], shape (N, m)
 
 
-class Counts(NamedTuple):
+class CountSamples(NamedTuple):
     """N samples of the counts of m encoders."""
 
     time: Array | None  # [s], shape (N,); None where the file has none
     counts: Array  # shape (N, m)
 
 
-def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> Lengths:
+def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> LengthSamples:
     """Read a CSV file with a column for each cable, L0, L1, ..., and perhaps the time."""
     # Units stand in brackets, `time [s],L0 [mm],L1 [mm]`; without, they are s and m
     # cable_count: number of cables m of the robot
@@ -41,22 +41,22 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
     for name in names:
         table.refuse(table.columns[name] <= 0.0, name, table.columns[name], "m", "> 0 m")
         table.refuse_millimeters(name, size, f"the robot's {size:.3g} m")
-    return Lengths(*_samples(table, names))
+    return LengthSamples(*_samples(table, names))
 
 
-def load_counts(file: os.PathLike[str] | str, cable_count: int) -> Counts:
+def load_counts(file: os.PathLike[str] | str, cable_count: int) -> CountSamples:
     """Read a CSV file with a column for each encoder, C0, C1, ..., and perhaps the time."""
     # returns times [s], if there are any, and counts
-    return Counts(*_samples(*_read(file, "C", "", cable_count)))
+    return CountSamples(*_samples(*_read(file, "C", "", cable_count)))
 
 
-def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[Table, list[str]]:
+def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[CsvTable, list[str]]:
     """A table with a column for each cable, and their names."""
     path = Path(file)
     names = _columns(letter, cable_count)
     other, hint = _OTHERS[letter]
     units, strangers = {"time": "s", **dict.fromkeys(names, unit)}, dict.fromkeys(_columns(other, cable_count), hint)
-    table = Table.read(path, read_text(path, TABLE_LIMIT), units, strangers)
+    table = CsvTable.read(path, read_text(path, TABLE_LIMIT), units, strangers)
     table.check_columns(names, f"; the robot has {cable_count} cables")
     table.check_rows()
     return table, names
@@ -66,7 +66,7 @@ def _columns(letter: str, cable_count: int) -> list[str]:
     return [f"{letter}{k}" for k in range(cable_count)]
 
 
-def _samples(table: Table, names: list[str]) -> tuple[Array | None, Array]:
+def _samples(table: CsvTable, names: list[str]) -> tuple[Array | None, Array]:
     """Times, and a row a sample."""
     time = table.columns.get("time")
     if time is not None:
@@ -103,7 +103,7 @@ def load_measurements(file: os.PathLike[str] | str) -> Measurements:
         >>> sl.load_measurements("cable.csv")  # doctest: +SKIP
     """
     path = file_path(file)
-    table = Table.read(path, read_text(path, TABLE_LIMIT), UNITS)
+    table = CsvTable.read(path, read_text(path, TABLE_LIMIT), UNITS)
     table.check_columns(UNITS, f"; found: {', '.join(table.columns)}")
     for name, unit in UNITS.items():
         if name != "rise":

@@ -13,8 +13,8 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.pose_text import FARTHEST, QUATERNION_TOLERANCE, PoseEntry, pose_of_entry
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
-from sagline.files.table import TABLE_LIMIT, Table, line_error
-from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validate
+from sagline.files.table import TABLE_LIMIT, CsvTable, line_error
+from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
 from sagline.motion.path import Path
 from sagline.motion.rest_to_rest import quintic_path, septic_path
 from sagline.motion.sampled import path_from_samples
@@ -38,7 +38,7 @@ PROFILES = {"quintic": quintic_path, "septic": septic_path}
 
 def _path_from_table(path: FilePath, text: str) -> Path:
     """The path of a CSV text."""
-    table = Table.read(path, text, UNITS)
+    table = CsvTable.read(path, text, UNITS)
     _check_columns(table)
     time, *place = (table.columns[name] for name in PLACE)
     late = np.diff(time, prepend=-np.inf) < _LEAST_STEP
@@ -61,7 +61,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
     return path_from_samples(time, Pose.from_quaternion(position, quaternion / length[:, np.newaxis]))
 
 
-def _check_columns(table: Table) -> None:
+def _check_columns(table: CsvTable) -> None:
     """Refuse a table that gives no position, or an orientation in half or in two ways."""
     orientation = table.columns.keys() & set(EULER + QUATERNION)
     wanted = PLACE + next((way for way in (EULER, QUATERNION) if orientation & set(way)), ())
@@ -132,7 +132,7 @@ class _Waypoint(PoseEntry):
     counts: Any = None
 
 
-class _Waypoints(Entry):
+class _Waypoints(YamlEntry):
     rate: Any = 100.0
     durations: Any = None
     speed: Any = None

@@ -23,7 +23,7 @@ from sagline.files.variables import (
     check_variables,
     fields_of,
     values_of,
-    variables_of,
+    variables_of_result,
 )
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
@@ -252,8 +252,8 @@ def plan_dataset(plan: Plan) -> Dataset:
     rows = ("pose",) * len(plan.state.pose.shape)
     cables = plan.state.one_robot.cable_count
     machine = () if plan.state.contact is None else MACHINE
-    variables = variables_of(plan, (*QUANTITIES, *machine, WINDING, *PROOF, *MOTION, JERK), rows)
-    coordinates = {"cable": index_coordinate("cable", cables), **variables_of(plan, (TIME,), rows)}
+    variables = variables_of_result(plan, (*QUANTITIES, *machine, WINDING, *PROOF, *MOTION, JERK), rows)
+    coordinates = {"cable": index_coordinate("cable", cables), **variables_of_result(plan, (TIME,), rows)}
     if plan.path is not None and plan.path.rests is not None:
         variables[RESTS] = (("rest",), plan.path.rests, {"units": "s", "long_name": "when the platform stands"})
     data = labeled_dataset(variables, _attributes(plan), coordinates)
@@ -270,7 +270,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
     }
 
 
-def plan_of(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
+def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     """Plan of a data set that `plan_dataset` made; file and name of the robot are for messages."""
     robot = robot_of(path, data, item)
     _check_plan(data, robot.cable_count)
@@ -312,7 +312,7 @@ FORMAT: Final = Format(
     key="sagline_format",
     version=2,  # 2: with a digest
     pack=plan_dataset,
-    unpack=plan_of,
+    unpack=plan_of_dataset,
     sealed_from=2,
 )
 save = FORMAT.save

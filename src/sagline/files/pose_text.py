@@ -10,7 +10,7 @@ import numpy as np
 from sagline.core.arrays import Array, checked
 from sagline.core.errors import InvalidValueError
 from sagline.files.quantity import in_si, plain_number
-from sagline.files.yaml_text import Entry
+from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
 FARTHEST, STRONGEST = 1e6, 1e12  # m; N and N m: beyond all machines, far below what overflows
@@ -33,13 +33,13 @@ def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) 
     return found
 
 
-def pose_of(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose:
+def pose_of_text(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose:
     """A pose from X,Y,Z in meters, or X,Y,Z,A,B,C with the angles about z, y and x in degrees."""
     place = _three_or_six(text, item, "m or degrees", FARTHEST, step)
     return Pose.from_euler(place[:3], *np.radians(place[3:]))
 
 
-def wrench_of(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
+def wrench_of_text(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
     """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none."""
     return None if text is None else np.array(_three_or_six(text, item, "N or N m", STRONGEST, step))
 
@@ -53,13 +53,13 @@ def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) ->
     return whole + [0.0] * (6 - len(whole))
 
 
-class _Euler(Entry):
+class _Euler(YamlEntry):
     alpha: Any = 0.0
     beta: Any = 0.0
     gamma: Any = 0.0
 
 
-class PoseEntry(Entry):
+class PoseEntry(YamlEntry):
     """Pose in a file."""
 
     position: Any
@@ -69,18 +69,18 @@ class PoseEntry(Entry):
 
 def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
     """Pose of an entry of a file; InvalidValueError if it is none, or farther away than any machine."""
-    position = numbers_of(entry.position, 3, "m", f"{item}.position")
+    position = si_numbers(entry.position, 3, "m", f"{item}.position")
     if (far := float(np.abs(position).max())) > FARTHEST:
         raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)
     if entry.quaternion is None:
         euler = entry.euler or _Euler()
         angles = [in_si(angle, "rad", f"{item}.euler.{name}") for name, angle in euler]
-        return Pose.from_euler(position, *numbers_of(angles, 3, "rad", f"{item}.euler"))
+        return Pose.from_euler(position, *si_numbers(angles, 3, "rad", f"{item}.euler"))
     if entry.euler is not None:
         raise InvalidValueError(
             item, "given with euler and quaternion", "one of the two, or none", "Leave one of them out."
         )
-    quaternion = numbers_of(entry.quaternion, 4, "", f"{item}.quaternion")
+    quaternion = si_numbers(entry.quaternion, 4, "", f"{item}.quaternion")
     length = float(np.linalg.norm(quaternion))
     if abs(length - 1.0) > QUATERNION_TOLERANCE:
         raise InvalidValueError(
@@ -89,7 +89,7 @@ def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
     return Pose.from_quaternion(position, quaternion / length)
 
 
-def numbers_of(value: Any, count: int, unit: str, item: str) -> Array:
+def si_numbers(value: Any, count: int, unit: str, item: str) -> Array:
     """Numbers in SI, shape (count,), from a value of a file."""
     numbers = checked(in_si(value, unit, item), item, unit)
     if numbers.shape != (count,):

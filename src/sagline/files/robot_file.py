@@ -12,7 +12,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.mesh_file import load_mesh
 from sagline.files.reading import exists, read_text
-from sagline.files.robot_schema import SWIVEL_AXES, Place, RobotEntry
+from sagline.files.robot_schema import SWIVEL_AXES, ObstacleEntry, RobotEntry
 from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validate
 from sagline.interference.pairs import Obstacle
 from sagline.robot.catalogue import preset_text, robot_names
@@ -198,7 +198,7 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
     return tuple(_obstacle(place, f"scene[{k}]", path) for k, place in enumerate(entry.scene))
 
 
-def _obstacle(place: Place, item: str, path: Path) -> Obstacle:
+def _obstacle(place: ObstacleEntry, item: str, path: Path) -> Obstacle:
     """Obstacle of an entry in the scene of a robot file; a mesh is loaded from beside that file."""
     try:
         solid = place.solid(item)

@@ -16,7 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import units
 from sagline.files.mesh_file import meters
 from sagline.files.quantity import in_si, plain_number
-from sagline.files.yaml_text import Entry
+from sagline.files.yaml_text import YamlEntry
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose import Pose, PoseBox
@@ -60,7 +60,7 @@ _UNITS: Final = {
 SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
 
 
-class Place(Entry):
+class ObstacleEntry(YamlEntry):
     """Obstacle around the robot; which keys go together is said by `_KINDS`."""
 
     name: str
@@ -117,7 +117,7 @@ class Place(Entry):
         return np.zeros(3) if value is None else exactly(in_si(value, "m", place), place, "m", (3,))
 
 
-class _RobotPart(Entry):
+class _RobotPart(YamlEntry):
     """A mapping in a robot file."""
 
     def given(self, key: str, within: str = "") -> Any:
@@ -322,7 +322,7 @@ class RobotEntry(_RobotPart):
     notes: str = ""
     tolerances: _Deviations | None = None
     calibration: _Calibration | None = None
-    scene: list[Place] = Field(default_factory=list)  # the file's, not the robot's: sagline.files.robot_file
+    scene: list[ObstacleEntry] = Field(default_factory=list)  # the file's, not the robot's: sagline.files.robot_file
 
     def robot(self) -> Robot:
         """The robot the file describes."""

@@ -51,7 +51,7 @@ def read_xml(path: Path) -> Element:
     return builder.close()
 
 
-def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
+def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array:
     """So many numbers between blanks, shape (count,); InvalidValueError names the item and the unit."""
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
     values = [number for number in found if number is not None and within_reach(number)]
@@ -62,9 +62,9 @@ def numbers(text: str | None, count: int, item: str, unit: str) -> Array:
     return locked(np.array(values))
 
 
-def number(text: str | None, item: str, unit: str) -> float:
+def number_of_text(text: str | None, item: str, unit: str) -> float:
     """One finite number; InvalidValueError names the item and the unit."""
-    return float(numbers(text, 1, item, unit)[0])
+    return float(numbers_of_text(text, 1, item, unit)[0])
 
 
 def only_child(parent: Element, tag: str, item: str) -> Element:

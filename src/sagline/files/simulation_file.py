@@ -26,7 +26,7 @@ from sagline.files.variables import (
     fields_of,
     record_variables,
     records_of,
-    variables_of,
+    variables_of_result,
 )
 from sagline.robot.pose import Pose
 
@@ -200,13 +200,15 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
     return FORMAT.load(file)
 
 
-def pack(simulation: Simulation) -> Dataset:
+def _pack(simulation: Simulation) -> Dataset:
     """Data set of a simulation, with the dimensions time, cable, node (cables with mass) and event."""
-    variables = variables_of(simulation, (*SAMPLES, NODES), (ROWS,)) | variables_of(simulation, (LARGEST,))
+    variables = variables_of_result(simulation, (*SAMPLES, NODES), (ROWS,)) | variables_of_result(
+        simulation, (LARGEST,)
+    )
     if simulation.events:
         variables |= record_variables(simulation.events, EVENTS)
     cables = simulation.robot.cable_count
-    coordinates = {"cable": index_coordinate("cable", cables), **variables_of(simulation, (TIME,), (ROWS,))}
+    coordinates = {"cable": index_coordinate("cable", cables), **variables_of_result(simulation, (TIME,), (ROWS,))}
     data = labeled_dataset(variables, _attributes(simulation), coordinates)
     _check_simulation(data, cables)
     return data
@@ -227,7 +229,7 @@ def _attributes(simulation: Simulation) -> dict[str, Any]:
     }
 
 
-def unpack(path: FilePath, data: Dataset) -> Simulation:
+def _unpack(path: FilePath, data: Dataset) -> Simulation:
     """Simulation of a data set; its path is for messages."""
     robot = robot_of(path, data)
     _check_simulation(data, robot.cable_count)
@@ -257,7 +259,7 @@ FORMAT: Final = Format(
     again="Save the simulation again, or take the file from where it came.",
     key="sagline_simulation_format",
     version=1,
-    pack=pack,
-    unpack=unpack,
+    pack=_pack,
+    unpack=_unpack,
 )
 save = FORMAT.save

@@ -31,7 +31,7 @@ _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Table:
+class CsvTable:
     """Columns of numbers in SI."""
 
     path: FilePath  # the file, for messages
@@ -48,7 +48,7 @@ class Table:
         units: Mapping[str, str],
         strangers: Mapping[str, str] = _NONE,
         gaps: Collection[str] = (),
-    ) -> Table:
+    ) -> CsvTable:
         """Read a CSV text whose first row names its columns, `name` or `name [unit]`."""
         reader = csv.reader(io.StringIO(text), strict=True)
         found: dict[str, float | None] = {}

@@ -84,7 +84,7 @@ class Quantity(NamedTuple):
         return found
 
 
-def variables_of(result: Any, quantities: Iterable[Quantity], rows: tuple[str, ...] = ()) -> dict[str, Any]:
+def variables_of_result(result: Any, quantities: Iterable[Quantity], rows: tuple[str, ...] = ()) -> dict[str, Any]:
     """Dimensions, values and attributes of each quantity that a result has, by name."""
     found: dict[str, Any] = {}
     for one in quantities:

@@ -17,7 +17,7 @@ from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.robot_xml import (
     Imported,
     cables_of_file,
-    number,
+    number_of_text,
     only_child,
     read_xml,
     vertical_axis,
@@ -121,11 +121,11 @@ def _optional(element: Element | None, key: str, item: str, unit: str) -> float 
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
         return None
-    return number(text, f"{item}: {key}", unit)
+    return number_of_text(text, f"{item}: {key}", unit)
 
 
 def _required(element: Element, key: str, item: str, unit: str) -> float:
-    return number(element.get(key), f"{item}: {key}", unit)
+    return number_of_text(element.get(key), f"{item}: {key}", unit)
 
 
 def _point(chain: Element, tag: str, k: int) -> list[float]:

@@ -18,7 +18,7 @@ from sagline.core.arrays import locked, number
 from sagline.files.format import Format
 from sagline.files.netcdf import choice_attributes, choice_of, labeled_dataset
 from sagline.files.robot_file import dump_robot, parse_robot
-from sagline.files.variables import Quantity, check_indices, check_variables, fields_of, variables_of
+from sagline.files.variables import Quantity, check_indices, check_variables, fields_of, variables_of_result
 from sagline.interference.mesh import Mesh
 from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.pose import Pose, PoseBox
@@ -179,10 +179,10 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
     return FORMAT.load(file)
 
 
-def pack(space: Workspace) -> Dataset:
+def _pack(space: Workspace) -> Dataset:
     """Data set of a workspace."""
     attributes, obstacles = _criteria_attributes(space.criteria)
-    return labeled_dataset(variables_of(space, QUANTITIES) | obstacles, _attributes(space) | attributes)
+    return labeled_dataset(variables_of_result(space, QUANTITIES) | obstacles, _attributes(space) | attributes)
 
 
 def _attributes(space: Workspace) -> dict[str, Any]:
@@ -208,7 +208,7 @@ def _attributes(space: Workspace) -> dict[str, Any]:
     return attributes
 
 
-def unpack(path: FilePath, data: Dataset) -> Workspace:
+def _unpack(path: FilePath, data: Dataset) -> Workspace:
     """Workspace of a data set; its path is for messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     _check_workspace(data, robot.cable_count)
@@ -269,7 +269,7 @@ FORMAT: Final = Format(
     again="Save the workspace again, or take the file from where it came.",
     key="sagline_workspace_format",
     version=1,
-    pack=pack,
-    unpack=unpack,
+    pack=_pack,
+    unpack=_unpack,
 )
 save = FORMAT.save

@@ -30,13 +30,13 @@ _WORDS: Final = {
 }
 
 
-class Entry(BaseModel):
+class YamlEntry(BaseModel):
     """A mapping in a file: the listed keys and no others, values of the type they are written in."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-Schema = TypeVar("Schema", bound=Entry)
+Schema = TypeVar("Schema", bound=YamlEntry)
 
 
 def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) -> Schema:
@@ -53,7 +53,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
     raise refused
 
 
-def _explain(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str, str, str]:
+def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, str, str]:
     """The key, its value, what is allowed and the next step."""
     where = mistake["loc"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).removeprefix(".")
@@ -76,11 +76,11 @@ def _explain(mistake: ErrorDetails, schema: type[Entry]) -> tuple[str, str, str,
             return key, found, wanted, f"Correct {key}."
 
 
-def _at(schema: type[Entry], where: tuple[int | str, ...]) -> type[Entry]:
+def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry]:
     """The schema of a mapping inside the file; list indices on the way do not matter."""
     for part in (part for part in where if isinstance(part, str)):
         kind = schema.model_fields[part].annotation
-        schema = next(k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, Entry))
+        schema = next(k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, YamlEntry))
     return schema
 
 

@@ -14,7 +14,7 @@ from sagline.core.arguments import choice, file_path
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
-from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validate
+from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
 from sagline.optimization.candidates import AnchorErrors
 from sagline.optimization.free import CableChoice, Free, FreeCable, FreeLimit
 from sagline.optimization.free_anchors import FreeAnchors
@@ -81,7 +81,7 @@ def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
         raise FileError.of(path, error) from None
 
 
-class _Part(Entry):
+class _Part(YamlEntry):
     """A mapping in a design file."""
 
     def si(self, key: str, unit: str) -> Any:

@@ -20,7 +20,7 @@ from sagline.files.path_file import load_path
 from sagline.files.quantity import in_si
 from sagline.files.reading import read_text
 from sagline.files.robot_file import load_robot
-from sagline.files.yaml_text import YAML_LIMIT, Entry, parse_mapping, validate
+from sagline.files.yaml_text import YAML_LIMIT, YamlEntry, parse_mapping, validate
 from sagline.robot.catalogue import robot_names
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
@@ -34,7 +34,7 @@ MOST: Final = 1_000_000  # points along an axis
 _POINT_BYTES: Final = 400.0  # of a point of a grid, while poses are made of them
 
 
-class _Grid(Entry):
+class _Grid(YamlEntry):
     """A grid of poses: each coordinate one value, or an axis."""
 
     x: Any
@@ -45,12 +45,12 @@ class _Grid(Entry):
     gamma: Any = 0.0
 
 
-class _Poses(Entry):
+class _Poses(YamlEntry):
     grid: _Grid | None = None
     path: str | None = None
 
 
-class _Loads(Entry):
+class _Loads(YamlEntry):
     """A grid of forces and moments: each component one value, or an axis."""
 
     force_x: Any = 0.0
@@ -61,19 +61,19 @@ class _Loads(Entry):
     moment_z: Any = 0.0
 
 
-class _Wrenches(Entry):
+class _Wrenches(YamlEntry):
     grid: _Loads | None = None
     rows: list[Any] | None = None
 
 
-class _Around(Entry):
+class _Around(YamlEntry):
     """Loads around each wrench: largest components of force and moment, one number each or three."""
 
     force: Any = 0.0
     moment: Any = 0.0
 
 
-class _SweepEntry(Entry):
+class _SweepEntry(YamlEntry):
     robots: Any
     poses: _Poses
     wrenches: _Wrenches | None = None

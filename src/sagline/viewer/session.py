@@ -16,7 +16,7 @@ from sagline.core.arrays import Array, Codes
 from sagline.core.numbers import n
 from sagline.files.execution_file import plan_of_log
 from sagline.files.mcap_layout import NANO
-from sagline.files.mcap_reader import Log, LogReader
+from sagline.files.mcap_reader import LogReader, RecordedLog
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.player import InMotion
@@ -197,7 +197,7 @@ class LogFollower:
         self._plans: dict[int, tuple[Array, Array, Array]] = {}  # times, positions and quaternions
 
     @property
-    def log(self) -> Log:
+    def log(self) -> RecordedLog:
         """The log as far as it was read."""
         return self._reader.log
 

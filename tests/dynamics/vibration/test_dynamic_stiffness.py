@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.dynamics.vibration.component_modes import Components, component_modes
+from sagline.dynamics.vibration.component_modes import CableComponents, component_modes
 from sagline.dynamics.vibration.dynamic_stiffness import in_world
 from sagline.dynamics.vibration.robot_modes import vibration_model
 from tests.dynamics.states import middle
@@ -72,7 +72,7 @@ def test_component_modes_against_the_exact_stiffness(name: str) -> None:
         assert (np.abs(_of_modes(components, 2.0 * np.pi * frequency) - exact) <= 1e-8 * size).all()
 
 
-def _of_modes(components: Components, omega: float) -> np.ndarray:
+def _of_modes(components: CableComponents, omega: float) -> np.ndarray:
     moving = -(omega**2) * components.still
     shares = omega**4 / (components.square - omega**2)
     terms = components.participation[:, :, None] * components.participation[:, None, :] * shares[:, None, None]

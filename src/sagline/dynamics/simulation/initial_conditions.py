@@ -187,7 +187,7 @@ def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration
     table = initial.wrench
     if wrench is not None:
         table = checked_time_table(wrench, "wrench", "N or N m", 6, initial.begin)
-    check_lengths(initial.robot, initial.lengths)
+    check_set_points(initial.robot, initial.lengths)
     return replace(initial, wrench=table, end=end)
 
 
@@ -264,7 +264,7 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
         raise InvalidValueError("start: model", f"{type(model).__name__}()", "Catenary() or Elastic()", step)
 
 
-def check_lengths(robot: Robot, lengths: TimeTable) -> None:
+def check_set_points(robot: Robot, lengths: TimeTable) -> None:
     """Refuse lengths [m] that are not longer than the dead cable."""
     checked(lengths.value, "unstrained_length", "m")
     least, dead = lengths.value.min(axis=0), dead_cable(robot)

@@ -33,7 +33,7 @@ NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
 Inputs = tuple[TimeTable, TimeTable, TimeTable]
 
 
-class Run:
+class SimulationRun:
     """A simulation in progress."""
 
     def __init__(

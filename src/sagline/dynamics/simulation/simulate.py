@@ -22,7 +22,7 @@ from sagline.dynamics.simulation.initial_conditions import (
 from sagline.dynamics.simulation.modal import check_modal_arguments, modal_simulation
 from sagline.dynamics.simulation.plant import Plant
 from sagline.dynamics.simulation.results import Drop, Event, PickUp, Simulation, checked_events
-from sagline.dynamics.simulation.run import Run
+from sagline.dynamics.simulation.run import SimulationRun
 from sagline.dynamics.simulation.steps import checked_step, frequency_with_winches, platform_frequency
 from sagline.dynamics.simulation.winches import Winches, Winding, check_winding, drive_data, winch_kind
 from sagline.dynamics.vibration.dynamic_stiffness import Damping
@@ -151,7 +151,7 @@ def started_run(
     wind: TableInTime | None = None,
     damping: Damping | None = None,
     record: float | None = None,
-) -> Run:
+) -> SimulationRun:
     """Simulation at its first step, to be continued."""
     if elements:
         check_lumped(given)
@@ -171,7 +171,7 @@ def started_run(
     rules = (code, kind, int(winding == "remembered"), work, round(d.LOOP_PERIOD / size) if kind == d.DRUMS else 1)
     numbers = (size, losses.loss_time, losses.air_damping, 1.0)
     settings = {"integrator": get_args(Integrator)[code], "winches": winches, "winding": winding, "damping": losses}
-    return Run(
+    return SimulationRun(
         plant, rules, numbers, (_set_points(given, plant, kind), given.wrench, air), every, count, happening, settings
     )
 

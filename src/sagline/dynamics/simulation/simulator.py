@@ -14,7 +14,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.dynamics.simulation.initial_conditions import (
     InitialConditions,
     TimeTable,
-    check_lengths,
+    check_set_points,
     initial_conditions,
 )
 from sagline.dynamics.simulation.plant import Plant, Records, energy_error
@@ -237,7 +237,7 @@ class Simulator:
         """Raise the error of the first inadmissible set point."""
         lengths, tension, wrench = self._given
         checked(lengths, "unstrained_length", "m", above=0.0)
-        check_lengths(self._plant.robot, TimeTable.constant(lengths))
+        check_set_points(self._plant.robot, TimeTable.constant(lengths))
         if with_tension:
             checked(tension, "tension", "N")
         checked(wrench, "wrench", "N or N m")

@@ -12,7 +12,7 @@ from sagline.core.arguments import callback, instance
 from sagline.core.arrays import Array, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress
-from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes, Profile, fastest_speed_profile
+from sagline.dynamics.trajectories.force_balance import ForceBalance, HalfPlanes, SpeedProfile, fastest_speed_profile
 from sagline.dynamics.trajectories.jerk_bounded import Bounds, JerkProfile, fastest_jerk_profile
 from sagline.dynamics.trajectories.segments import Curve, RestToRestSegment, joined_path, sample_time, segments_of
 from sagline.kinematics.inverse import inverse
@@ -39,7 +39,7 @@ class _TimedSegment:
     """A move with its new motion: parameter of the curve over time, a little slower than it was found."""
 
     curve: Curve
-    motion: Profile | JerkProfile
+    motion: SpeedProfile | JerkProfile
     slower: float = 1.0
 
     @property
@@ -157,7 +157,7 @@ def _fastest_segment(
         if abs(least - before) <= _CONVERGED * least:
             break
         balances = balances.near_motion(profile.motion)
-    motion: Profile | JerkProfile | None = profile
+    motion: SpeedProfile | JerkProfile | None = profile
     if np.isfinite(limits).any():
         motion = fastest_jerk_profile(curve, robot, speeds, limits, least)
         if motion is None:

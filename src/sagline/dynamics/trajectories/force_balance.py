@@ -128,7 +128,7 @@ _FLAT = 1e-12  # of the largest: rates that are none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Profile:
+class SpeedProfile:
     """Constant acceleration of the parameter from place to place."""
 
     place: Array  # parameters, shape (K,)
@@ -136,7 +136,7 @@ class Profile:
     time: Array  # when they are passed [s], shape (K,)
 
     @classmethod
-    def of(cls, place: Array, square: Array) -> Profile:
+    def of(cls, place: Array, square: Array) -> SpeedProfile:
         """The profile with the times that follow."""
         speed = np.sqrt(square)
         return cls(place, square, np.append(0.0, np.cumsum(2.0 * np.diff(place) / (speed[1:] + speed[:-1]))))
@@ -166,7 +166,7 @@ class Profile:
         return np.stack((place, speed + since * rate, rate, np.zeros_like(place)))
 
 
-def fastest_speed_profile(place: Array, planes: HalfPlanes) -> Profile | None:
+def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
     """The profile from rest to rest that is at each place as fast as any that stays within the bounds; place (K,)."""
     # Backward, from which squares of the speed the end can be reached; forward, the largest acceleration that stays
     # among them. What holds at both ends of a step holds in it, but for the bounds' curvature.
@@ -186,7 +186,7 @@ def fastest_speed_profile(place: Array, planes: HalfPlanes) -> Profile | None:
         most = np.min((bound - rates[:, 1] * square[i])[rising] / rates[rising, 0])
         square[i + 1] = np.clip(square[i] + 2.0 * steps[i] * most, *reach[i + 1])
     inner = square[1:-1]
-    return Profile.of(place, square) if (inner > 0.0).all() else None
+    return SpeedProfile.of(place, square) if (inner > 0.0).all() else None
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:

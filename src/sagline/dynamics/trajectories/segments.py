@@ -126,7 +126,7 @@ class SplineCurve:
         return Jet(Pose.from_quaternion(place[0], q[0]), rates)
 
 
-def lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
+def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
     """Length of the way at each sample, a radian counted as a meter, with its first two derivatives by time."""
     # shapes: time (N,) [s]; twist (N, 6); twist_rate (N, 6); returns (3, N)
     speed = np.linalg.norm(twist, axis=1)
@@ -293,7 +293,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
             off.append((aside / max(np.abs(rate[:-1]).max(), TINY)) ** 2)
         if max(off) <= _ON_A_LINE**2 * max(1.0, square):
             return line, values
-    way = lengths(time, *rates[:2])
+    way = _arc_lengths(time, *rates[:2])
     way /= way[0, -1]
     return SplineCurve.through(pose, way[0]), way
 

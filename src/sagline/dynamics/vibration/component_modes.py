@@ -63,7 +63,7 @@ def _integrals(weights: Array, values: Array) -> Array:
 _TINY = 1e-300
 
 
-class Components(NamedTuple):
+class CableComponents(NamedTuple):
     """Motions of the t taut cables of one state with both ends held, T together: those in the planes come first.
 
     Attributes:
@@ -80,11 +80,11 @@ class Components(NamedTuple):
     cable: Indices
     participation: Array
     still: Array
-    plane: Motions
-    normal: Motions
-    mesh: Mesh
+    plane: PlaneModes
+    normal: PlaneModes
+    mesh: StringMesh
 
-    def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[Motions, Array, Array], ...]:
+    def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[PlaneModes, Array, Array], ...]:
         """The motions in the planes and those normal to them, each with what moves them.
 
         Args:
@@ -100,7 +100,7 @@ class Components(NamedTuple):
         return (self.plane, own[:, ::2], swing), (self.normal, own[:, 1:2], sway)
 
 
-class Mesh(NamedTuple):
+class StringMesh(NamedTuple):
     """Nodes of the taut cables.
 
     Attributes:
@@ -123,7 +123,7 @@ class Mesh(NamedTuple):
         return np.asarray(self.table[:, columns.DENSITY])
 
 
-class Motions(NamedTuple):
+class PlaneModes(NamedTuple):
     """Motions of the taut cables in one plane, k of each.
 
     Displacements of a cable's u unknowns are times the roots of their masses.
@@ -135,7 +135,7 @@ class Motions(NamedTuple):
     drive: Array  # by the platform end, shape (t, k, d)
 
 
-def component_modes(strings: Strings, row: int, up_to: float) -> Components:
+def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents:
     """Motions of the cables of one state, right up to a frequency; those above complete what the cables can do."""
     # units: up_to [Hz]
     omega = 2.0 * np.pi * up_to
@@ -153,24 +153,24 @@ def component_modes(strings: Strings, row: int, up_to: float) -> Components:
     aside = _motions(normal, carried[:, :, 4:], free, first)
     swings = inside.drive @ axes[:, ::2]
     sways = aside.drive @ axes[:, 1:2]
-    return Components(
+    return CableComponents(
         np.concatenate((inside.square.reshape(-1), aside.square.reshape(-1))),
         np.concatenate((np.repeat(taut, inside.square.shape[1]), np.repeat(taut, aside.square.shape[1]))),
         np.concatenate((swings.reshape(-1, 3), sways.reshape(-1, 3))),
         _still(mass, axes, taut, strings.taut.shape[1]),
         inside,
         aside,
-        Mesh(taut, table, axes, omega, points),
+        StringMesh(taut, table, axes, omega, points),
     )
 
 
-def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> Motions:
+def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
     """Fixed-end modes in one plane, of the unknowns that move in any cable."""
     last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
     square, own = np.linalg.eigh(matrix[:, first:last, first:last])
     shape = np.zeros((*matrix.shape[:2], last - first))
     shape[:, first:last] = own
-    return Motions(rest, square, shape, np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last])
+    return PlaneModes(rest, square, shape, np.swapaxes(own, -1, -2) @ (rest * free)[:, first:last])
 
 
 def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
@@ -182,7 +182,7 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
     return still
 
 
-def _node_motion(components: Components, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
+def _node_motion(components: CableComponents, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
     """Motion of the nodes times the roots of their masses: in the planes and normal to them."""
     # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
     plane, normal = (
@@ -191,7 +191,7 @@ def _node_motion(components: Components, ends: Array, amplitudes: Array) -> tupl
     return plane, normal
 
 
-def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: int) -> Array:
+def cable_shapes(components: CableComponents, ends: Array, amplitudes: Array, count: int) -> Array:
     """Displacements of all cables at equally spaced material points, from frame to platform end, (K, m, count, 3)."""
     mesh = components.mesh
     t, n, k = mesh.taut.size, mesh.points.shape[1], ends.shape[2]
@@ -211,13 +211,13 @@ def cable_shapes(components: Components, ends: Array, amplitudes: Array, count: 
     return np.moveaxis(shapes, -1, 0)
 
 
-def stretch_energy(components: Components, ends: Array, amplitudes: Array) -> Array:
+def stretch_energy(components: CableComponents, ends: Array, amplitudes: Array) -> Array:
     """Twice the energy of stretch in each mode of unit modal mass, (t, K) [1/s^2]."""
     plane, _ = _node_motion(components, ends, amplitudes)
     return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
 
 
-def stretch_stiffness(components: Components) -> Array:
+def stretch_stiffness(components: CableComponents) -> Array:
     """Stiffness of stretch between displacements of the platform end at rest and the motions in the plane."""
     # returns (t, 2 + k, 2 + k)
     motions = components.plane
@@ -225,7 +225,7 @@ def stretch_stiffness(components: Components) -> Array:
     return np.asarray(np.swapaxes(basis, -1, -2) @ _stretch_matrices(components.mesh) @ basis)
 
 
-def _stretch_matrices(mesh: Mesh) -> Array:
+def _stretch_matrices(mesh: StringMesh) -> Array:
     n = mesh.points.shape[1]
     matrices = np.empty((mesh.taut.size, 2 * n, 2 * n))
     stretch_matrices(mesh.table, mesh.omega, _lobatto(), mesh.points, matrices)

@@ -91,7 +91,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     if given.ndim > 1:
         raise InvalidValueError("frequency", f"of shape {given.shape}", "one frequency or a list", "Flatten it.")
     optional(damping, Damping, "damping")
-    check_lengths(state)
+    check_solved(state)
     cables = state.cables.shape[-1]
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size * cables, "Take them in parts.")
     found = moving_stiffness(strings_of(state), given.reshape(-1), damping)
@@ -107,7 +107,7 @@ def single_state(state: Equilibrium) -> Equilibrium:
     return state
 
 
-def check_lengths(state: Equilibrium) -> None:
+def check_solved(state: Equilibrium) -> None:
     """Refuse a state without lengths."""
     if np.isnan(state.unstrained_length).any():
         raise InvalidValueError(

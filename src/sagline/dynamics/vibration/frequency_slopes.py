@@ -11,7 +11,7 @@ import numpy as np
 from sagline.core.arrays import Array, Flags, Indices, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
-from sagline.dynamics.vibration.dynamic_stiffness import check_lengths, check_model, single_state
+from sagline.dynamics.vibration.dynamic_stiffness import check_model, check_solved, single_state
 from sagline.dynamics.vibration.flexibility import Flexibility, flexibility
 from sagline.dynamics.vibration.mode_sensitivities import (
     ModeGroup,
@@ -122,7 +122,7 @@ def _rest(state: Equilibrium) -> StateSlopes:
     if state.contact is not None:
         value, allowed = "one of cables with something behind them", "cables that hang from their frame anchors"
         raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
-    check_lengths(state)
+    check_solved(state)
     return state_slopes(state)
 
 

@@ -118,7 +118,7 @@ CLOSE = 1e-5  # relative difference of two frequencies, by which the equations' 
 _UP = np.array([0.0, 0.0, 1.0])
 
 
-class Cable(NamedTuple):
+class StringData(NamedTuple):
     """A cable at rest: force on its platform end (3,) [N], weight a length, length, EA and density."""
 
     force: Array
@@ -139,7 +139,7 @@ class _Waves(NamedTuple):
     end: Array  # both at the platform end, shape (2, 3, 3)
 
 
-def string_data(rest: StateSlopes) -> tuple[Cable, ...]:
+def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
     """The cables of a state, as strings."""
     cables = rest.state.cables
     gravity = 0.0 if cables.model.weightless else cables.gravity
@@ -147,12 +147,12 @@ def string_data(rest: StateSlopes) -> tuple[Cable, ...]:
         np.broadcast_to(field, cables.shape) for field in (cables.cable.linear_density, cables.cable.axial_stiffness)
     )
     return tuple(
-        Cable(rest.slopes.force[i], gravity * float(density[i]), length, float(stiffness[i]), float(density[i]))
+        StringData(rest.slopes.force[i], gravity * float(density[i]), length, float(stiffness[i]), float(density[i]))
         for i, length in enumerate(cables.unstrained_length.tolist())
     )
 
 
-def mode_group(rest: StateSlopes, cables: tuple[Cable, ...], frequency: Array) -> ModeGroup:
+def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Array) -> ModeGroup:
     """Modes of neighboring frequencies [Hz] that count as one."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
     omega *= 1.0 + _correction(rest, cables, omega, group)  # leaves CLOSE of the error
@@ -170,7 +170,7 @@ def mode_group(rest: StateSlopes, cables: tuple[Cable, ...], frequency: Array) -
     return _forms(rest, cables, waves, motion @ units, pulls @ units, omega)
 
 
-def _correction(rest: StateSlopes, cables: tuple[Cable, ...], omega: float, group: int) -> float:
+def _correction(rest: StateSlopes, cables: tuple[StringData, ...], omega: float, group: int) -> float:
     """Relative error of a frequency, to first order, by the singular values of the equations."""
     matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
     near = omega * (1.0 + CLOSE)
@@ -200,7 +200,7 @@ def _equations(rest: StateSlopes, waves: list[_Waves], omega: float, scale: Arra
     return matrix * scale, scale
 
 
-def _waves(cable: Cable, omega: float) -> _Waves:
+def _waves(cable: StringData, omega: float) -> _Waves:
     """Waves of a cable for unit forces on its frame end, by collocation at Gauss points of its elements."""
     edges = _edges(cable, omega)
     size = np.diff(edges)
@@ -233,7 +233,7 @@ def _flexible(force: Array, stiffness: float) -> Array:
     return found
 
 
-def _edges(cable: Cable, omega: float) -> Array:
+def _edges(cable: StringData, omega: float) -> Array:
     """Borders of elements that are short against N/w and against a transverse wave."""
     edges = np.array([0.0, cable.length])
     for _ in range(HALVINGS):
@@ -245,7 +245,7 @@ def _edges(cable: Cable, omega: float) -> Array:
     return edges
 
 
-def _longest(cable: Cable, omega: float, start: Array, end: Array) -> Array:
+def _longest(cable: StringData, omega: float, start: Array, end: Array) -> Array:
     """Longest elements [m] that parts of a cable allow."""
     low, high = (cable.force[2] - cable.weight * (cable.length - s) for s in (start, end))
     least = np.hypot(np.hypot(*cable.force[:2]), np.maximum(np.maximum(low, -high), 0.0)) + TINY
@@ -254,7 +254,7 @@ def _longest(cable: Cable, omega: float, start: Array, end: Array) -> Array:
 
 
 def _forms(
-    rest: StateSlopes, cables: tuple[Cable, ...], waves: list[_Waves], motion: Array, pulls: Array, omega: float
+    rest: StateSlopes, cables: tuple[StringData, ...], waves: list[_Waves], motion: Array, pulls: Array, omega: float
 ) -> ModeGroup:
     gravity = 0.0 if rest.state.cables.model.weightless else rest.state.cables.gravity
     end_force, by_force, by_datum = [], [], []

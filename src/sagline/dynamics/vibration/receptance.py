@@ -9,7 +9,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.progress import blocks
-from sagline.dynamics.vibration.component_modes import Components, Motions, component_modes, stretch_stiffness
+from sagline.dynamics.vibration.component_modes import CableComponents, PlaneModes, component_modes, stretch_stiffness
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, moving_stiffness
 from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
 
@@ -19,7 +19,7 @@ COUPLED: Final = 1.5  # of the same: losses couple modes up to there, those beyo
 BLOCK: Final = 128  # frequencies at once
 
 
-FixedEndModes: TypeAlias = tuple[Components, Array | None]  # of one state; loss matrices of their stretch, if any
+FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]  # of one state; loss matrices of their stretch, if any
 
 
 class Receptance(NamedTuple):
@@ -62,7 +62,7 @@ class Receptance(NamedTuple):
         with np.errstate(all="ignore"):
             return np.asarray(freedom.T @ np.linalg.inv(freedom @ whole @ freedom.T) @ freedom)
 
-    def _moving(self, components: Components, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
+    def _moving(self, components: CableComponents, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
         """Stiffness that vibrating cables add, with their mass and without, (F, m, 3, 3) each."""
         mesh, model = components.mesh, self.model
         density = mesh.density[:, None, None]
@@ -88,7 +88,7 @@ def _in_world(own: Complex, axes: Array) -> Complex:
     return np.asarray(np.einsum("tai,tfab,tbj->ftij", axes, own, axes, optimize=True))
 
 
-def _driven_stiffness(motions: Motions, square: Complex, loss: complex) -> Complex:
+def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Complex:
     """Stiffness that fixed-end modes add to the platform end, undamped or all damped alike, (t, F, d, d)."""
     with np.errstate(all="ignore"):
         shares = square[..., None] ** 2 / (loss * motions.square[:, None] - square[..., None])
@@ -96,7 +96,7 @@ def _driven_stiffness(motions: Motions, square: Complex, loss: complex) -> Compl
 
 
 def _driven_stiffness_with_loss(
-    motions: Motions, square: Complex, loss: complex, lost: Array, scaled: Complex
+    motions: PlaneModes, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
     """The same with the loss in stretch, by modes and end (t, d + k, d + k), and the loss at rest alone."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
-from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_lengths, check_model, single_state
+from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, check_model, check_solved, single_state
 from sagline.dynamics.vibration.receptance import LOWEST, Receptance
 from sagline.dynamics.vibration.robot_modes import check_mode_count, massless_modes, modes_below, vibration_model
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus
@@ -93,7 +93,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     check_memory(f"{given.size:,} frequencies", _BYTES * given.size, "Take them in parts.")
     known = optional(damping, Damping, "damping") or Damping()
     model = vibration_model(state)
-    check_lengths(state)
+    check_solved(state)
     check_mode_count(modes_below(model, 0, max(float(given.max()), LOWEST)), float(given.max()), "frequency")
     if massless_modes(model, 0)[1].shape[1]:
         step = "Simulate it; vibration() names the directions in which it leaves."

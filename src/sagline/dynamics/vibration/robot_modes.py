@@ -10,7 +10,7 @@ import numpy as np
 
 from sagline.core.arrays import Array, Flags
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.dynamics.vibration.component_modes import Components, component_modes, stretch_energy
+from sagline.dynamics.vibration.component_modes import CableComponents, component_modes, stretch_energy
 from sagline.dynamics.vibration.dynamic_stiffness import Damping, check_counts, in_world
 from sagline.kernels.dynamics import collocation
 from sagline.kernels.dynamics.collocation import dynamic_stiffnesses
@@ -49,7 +49,7 @@ class _ReducedModel(NamedTuple):
     driven: Array  # the same to what the motions are driven by, shape (k, n)
     kept: Flags  # which components of the cables are motions by themselves, the first of the k, shape (T,)
     beyond: Array  # the others by the last of the k, shape (T - those, b)
-    components: Components  # of the cables
+    components: CableComponents  # of the cables
 
     def amplitudes(self, vectors: Array) -> Array:
         """Amplitudes of the components beside their motion at rest; vectors (n + k, K); returns (T, K)."""
@@ -171,7 +171,7 @@ class StateModes:
     vectors: Array  # solutions of the problem, shape (n + k, K)
 
     @property
-    def components(self) -> Components:
+    def components(self) -> CableComponents:
         """Fixed-end modes of the cables."""
         return self.problem.components
 

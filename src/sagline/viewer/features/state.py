@@ -12,7 +12,7 @@ import numpy as np
 
 from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError, SaglineError
-from sagline.files.pose_text import STRONGEST, pose_of
+from sagline.files.pose_text import STRONGEST, pose_of_text
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.methods import QuadraticProgram
@@ -96,7 +96,7 @@ class StateFeature(Feature):
         """Go to a pose that was typed."""
 
         def go(text: str) -> dict[str, str]:
-            self._page.go_near(pose_of(text, "the pose", POSE_STEP))
+            self._page.go_near(pose_of_text(text, "the pose", POSE_STEP))
             return {}
 
         self._answer(client, "pose-reply", value, go)
@@ -185,7 +185,7 @@ class StateFeature(Feature):
         if (time is None) == (pose is None):
             raise InvalidValueError("the link", "with both or none", "a pose or a time", STEP)
         if pose is not None:
-            target = pose_of(pose, "the pose of the link", STEP)
+            target = pose_of_text(pose, "the pose of the link", STEP)
             self._page.check_near(target)
             return lambda: self._page.go(target)
         if player.played is None:
