@@ -19,7 +19,7 @@ SAGLINE = (sys.executable, "-m", "sagline.cli")
 VIEW = """
 import sys, threading, time
 import sagline as sl
-from sagline.cli.hosting import Readings
+from sagline.cli.hosting import CompiledReadings
 import numpy as np
 from sagline.viewer.workspace import WorkspaceQuery, region_hull
 from sagline.viewer.server import start_server, stop_server
@@ -29,7 +29,7 @@ from sagline.viewer.page import Page
 
 begun = float(sys.argv[1])
 server = start_server(port=0)
-readings = Readings()
+readings = CompiledReadings()
 viewer = Page(server, FEATURES, sl.load_robot("cogiro"), None, readings.ready)
 
 def watch():

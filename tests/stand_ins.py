@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 import sagline as sl
-from sagline.cli.session import Session
+from sagline.cli.session import OperatorSession
 
 
 def instead_of_machines(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -15,13 +15,13 @@ def instead_of_machines(monkeypatch: pytest.MonkeyPatch) -> None:
     def served(server: Any, watch: Any) -> None:
         raise SystemExit(0)
 
-    def begun(session: Session) -> None:
+    def begun(session: OperatorSession) -> None:
         if session._shadow:  # until Ctrl-C
             raise SystemExit(0)
         begin(session)
 
-    begin = Session._begin
-    monkeypatch.setattr(Session, "_begin", begun)
+    begin = OperatorSession._begin
+    monkeypatch.setattr(OperatorSession, "_begin", begun)
 
     monkeypatch.setattr("sagline.twin.server.Server.run", served)
     monkeypatch.setattr("sagline.cli.control._link", lambda robot, *_, **__: sl.twin.Machine(robot).link())

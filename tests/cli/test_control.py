@@ -8,16 +8,16 @@ from typing import Any
 import pytest
 
 import sagline as sl
-from sagline.cli.session import Session, StatusLine
+from sagline.cli.session import OperatorSession, StatusLine
 from sagline.control.states import State
 from tests.control.rigs import rig
 from tests.tiers import wide
 
 
-def session(monkeypatch: pytest.MonkeyPatch, lines: str) -> tuple[Session, Any]:
+def session(monkeypatch: pytest.MonkeyPatch, lines: str) -> tuple[OperatorSession, Any]:
     control, machine = rig(home=False)
     monkeypatch.setattr(sys, "stdin", io.StringIO(lines))
-    return Session(control, alone=True, shadow=False), machine
+    return OperatorSession(control, alone=True, shadow=False), machine
 
 
 def test_lines_from_a_pipe_are_done_one_after_the_other(

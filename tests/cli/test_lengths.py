@@ -8,7 +8,7 @@ import numpy as np
 
 import sagline as sl
 from sagline.cli.lengths import plan_text, write_rows
-from sagline.cli.study import Run, summary
+from sagline.cli.study import ConfirmedRun, summary
 
 ROBOT = sl.load_robot("article-suspended").replace(winches=sl.Winch(pulley_radius=0.1, dead_cable=4.0))
 ENDS = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.5, 2.0]]), np.stack([np.eye(3)] * 2))
@@ -26,7 +26,7 @@ def test_a_plan_of_a_robot_with_pulleys_is_written_with_all_cable_off_the_drum()
 
 def test_the_summary_counts_all_cable_off_the_drum() -> None:
     plan = sl.inverse(ROBOT, ENDS)
-    told = summary(Run(sl.confirm(plan), 0.0))
+    told = summary(ConfirmedRun(sl.confirm(plan), 0.0))
     straight = np.linalg.norm(ENDS.position[:, None] + ROBOT.platform_anchors - ROBOT.frame_anchors, axis=-1)
     assert straight.min() + 4.0 < told["unstrained_length_min_m"] < straight.min() + 4.0 + 0.2 * np.pi
     assert told["unstrained_length_max_m"] == plan.unstrained_length.max()

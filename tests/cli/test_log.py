@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import sagline as sl
 from sagline import Plan
 from sagline.cli import view
-from sagline.cli.hosting import Address
+from sagline.cli.hosting import ServerAddress
 from sagline.cli.main import app
 from sagline.files.mcap_writer import Recorder
 from tests.files.executions import cycles_of, events_of, execution, plan_of
@@ -24,7 +24,7 @@ from tests.files.test_mcap import assert_same
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
-NOWHERE = Address("", 0, browser=False)
+NOWHERE = ServerAddress("", 0, browser=False)
 ROBOT = sl.load_robot("article-prototype")
 
 
@@ -144,7 +144,7 @@ def test_a_growing_log_is_followed_from_before_it_is_there(tmp_path: Path, monke
         def extend(self, session: Any) -> None:
             lengths.append(len(session.time))
 
-    def serve(robot: sl.Robot, address: Address, *, meanwhile: Any, played: Any, **page: Any) -> int:
+    def serve(robot: sl.Robot, address: ServerAddress, *, meanwhile: Any, played: Any, **page: Any) -> int:
         lengths.append(len(played.time))
         around: AbstractContextManager[None] = meanwhile(Page())
         with around:

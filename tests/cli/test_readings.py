@@ -9,7 +9,7 @@ import pytest
 from sagline.cli import hosting as module
 from sagline.cli.compilation import Stage
 from sagline.cli.entries import MARGINS, POLYGON, VIBRATION
-from sagline.cli.hosting import ENTRY_OF, ORDER, Readings
+from sagline.cli.hosting import ENTRY_OF, ORDER, CompiledReadings
 from sagline.viewer.feature import Reading
 
 
@@ -72,7 +72,7 @@ def test_readings_come_one_after_the_other(side: type[FakeSide], monkeypatch: py
             yield Stage(name, 2, 2, finished=True)
 
     monkeypatch.setattr(side, "said", said, raising=False)
-    readings, others = Readings(), [True] * (len(Reading) - 2)
+    readings, others = CompiledReadings(), [True] * (len(Reading) - 2)
     assert [readings.ready(each) for each in Reading] == [False, False, *others]
     with readings.compiled_for(viewer):  # type: ignore[arg-type]
         for count, expected in ((1, [True, False, *others]), (2, [True, True, *others])):
@@ -95,7 +95,7 @@ def test_if_the_other_process_fails_they_come_all_the_same(
     monkeypatch.setattr(module, "ENTRIES", entries)
     monkeypatch.setattr(module, "not_compiled", lambda names: [MARGINS, VIBRATION])
     monkeypatch.setattr(side, "said", lambda: iter(()), raising=False)
-    readings, viewer = Readings(), Watched()
+    readings, viewer = CompiledReadings(), Watched()
     with readings.compiled_for(viewer):  # type: ignore[arg-type]
         while viewer.refreshed < 2:
             threading.Event().wait(0.001)
@@ -105,7 +105,7 @@ def test_if_the_other_process_fails_they_come_all_the_same(
 
 def test_warm_nothing_is_started(side: type[FakeSide], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "not_compiled", lambda names: [])
-    readings = Readings()
+    readings = CompiledReadings()
     with readings.compiled_for(Watched()):  # type: ignore[arg-type]
         pass
     assert side.started == []
@@ -118,7 +118,7 @@ def test_on_one_core_the_cables_come_first(side: type[FakeSide], monkeypatch: py
     monkeypatch.setattr(module, "not_compiled", lambda names: [MARGINS])
     monkeypatch.setattr(side, "said", lambda: iter([Stage(MARGINS, 1, 1, finished=True)]), raising=False)
     viewer = Watched()
-    with Readings().compiled_for(viewer):  # type: ignore[arg-type]
+    with CompiledReadings().compiled_for(viewer):  # type: ignore[arg-type]
         threading.Event().wait(0.3)
         assert side.started == []
         viewer.shown.set()

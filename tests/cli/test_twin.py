@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.main import app
-from sagline.cli.twin import Watch
+from sagline.cli.twin import TwinMonitor
 from sagline.files.mcap_reader import read_log
 from sagline.files.mcap_writer import Recorder
 from sagline.twin import Machine, Server
@@ -56,7 +56,7 @@ def test_the_first_lines_fit_80_columns_and_can_be_pasted_and_ctrl_c_is_130(
 
 def test_what_the_plcs_do_is_told_when_it_changes(capsys: pytest.CaptureFixture[str], snapshot: Any) -> None:
     machine = Machine(sl.load_robot("article-prototype"), seed=1, faults=["servo 7 trips at 0.5 s"])
-    watch, link = Watch(machine), machine.link()
+    watch, link = TwinMonitor(machine), machine.link()
     with closing(link):
         for counter in range(1, 100):
             link.exchange(a_command(8, owner=OWNER, counter=counter, mode=sl.control.Mode.HOLD, enable=np.ones(8) > 0))
@@ -68,7 +68,7 @@ def test_what_the_plcs_do_is_told_when_it_changes(capsys: pytest.CaptureFixture[
 
 def test_a_log_says_where_the_platform_was(tmp_path: Path) -> None:
     machine = Machine(sl.load_robot("article-prototype"), seed=1, faults=["cable 0 breaks at 0 s"])
-    watch, seen = Watch(machine), []
+    watch, seen = TwinMonitor(machine), []
     with Recorder(tmp_path / "twin.mcap", machine.robot) as watch.recorder:
         for _ in range(30):
             machine.advance()

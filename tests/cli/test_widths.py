@@ -23,7 +23,7 @@ import sagline as sl
 from sagline.cli import terminal
 from sagline.cli.examples import examples
 from sagline.cli.main import app
-from sagline.cli.output import Grid
+from sagline.cli.output import TextTable
 from tests.abuse.command_lines import LINES
 from tests.kinematics.winches import wound
 from tests.tiers import extended, wide
@@ -127,7 +127,7 @@ def test_no_number_and_no_word_is_cut(words: list[str], monkeypatch: pytest.Monk
 
 def test_a_table_is_split_where_it_does_not_fit_and_nowhere_else() -> None:
     rows = [[f"method {k}", *(f"{1234.5 + k + j:.1f}" for j in range(8))] for k in range(3)]
-    grid = Grid(["", *map(str, range(8))], rows, "Tensions")
+    grid = TextTable(["", *map(str, range(8))], rows, "Tensions")
     for width, pieces in ((200, 1), (82, 1), (60, 2), (40, 3), (30, 4)):
         text = StringIO()
         console = Console(file=text, width=width)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sagline.core.arrays import Array
-from sagline.plot.occlusion import ALONG, Line, view_axes, visible_parts
+from sagline.plot.occlusion import ALONG, FlatLine, view_axes, visible_parts
 from tests.tiers import wide
 
 HALF, GAP = 0.02, 0.05
@@ -69,7 +69,7 @@ class Scene:
 
     def parts(self) -> list[list[Array]]:
         drawn = [
-            Line(line @ self.view.T, *((HALF, GAP) if covers else (0.0, 0.0)))
+            FlatLine(line @ self.view.T, *((HALF, GAP) if covers else (0.0, 0.0)))
             for line, covers in zip(self.lines, self.covers, strict=True)
         ]
         return visible_parts(drawn, [face @ self.view.T for box in self.boxes for face in box_faces(*box)])
@@ -146,7 +146,7 @@ def test_three_cables_that_each_pass_before_the_next_are_each_cut_once() -> None
     for one, other in ((0, 1), (1, 2), (2, 0)):
         middle, step = 0.5 * (ends[one] + ends[other]), 0.8 * (ends[other] - ends[one])
         lines.append(np.stack((middle - step + [0, 0, 0.5], middle + step - [0, 0, 0.5])))
-    parts = visible_parts([Line(line, 0.01, 0.02) for line in lines], [])
+    parts = visible_parts([FlatLine(line, 0.01, 0.02) for line in lines], [])
     assert [len(each) for each in parts] == [2, 2, 2]
     for line, (first, second) in zip(lines, parts, strict=True):
         gap = np.linalg.norm((second[0] - first[-1])[:2])
@@ -156,7 +156,7 @@ def test_three_cables_that_each_pass_before_the_next_are_each_cut_once() -> None
 
 def test_lines_that_meet_at_an_anchor_meet_in_the_picture() -> None:
     fan = [np.stack((np.zeros(3), [np.cos(a), np.sin(a), 0.3 * a])) for a in np.linspace(0.0, 2.0, 5)]
-    assert [len(parts) for parts in visible_parts([Line(line, 0.005, 0.01) for line in fan], [])] == [1] * 5
+    assert [len(parts) for parts in visible_parts([FlatLine(line, 0.005, 0.01) for line in fan], [])] == [1] * 5
 
 
 def test_edges_of_a_box_that_are_seen() -> None:
@@ -166,7 +166,7 @@ def test_edges_of_a_box_that_are_seen() -> None:
         turn, size = turned(generator), generator.uniform(0.4, 2.0, 3)
         corners = 0.5 * size * np.array(list(product((-1.0, 1.0), repeat=3))) @ turn.T
         faces = box_faces(np.zeros(3), size, turn)
-        edges = [Line(corners[[a, b]], 0.0, 0.0) for a, b in combinations(range(8), 2) if (a ^ b).bit_count() == 1]
+        edges = [FlatLine(corners[[a, b]], 0.0, 0.0) for a, b in combinations(range(8), 2) if (a ^ b).bit_count() == 1]
         parts = visible_parts(edges, faces)
         lengths = [sum(float(np.linalg.norm(part[-1] - part[0])) for part in each) for each in parts]
         whole = [float(np.linalg.norm(edge.points[1] - edge.points[0])) for edge in edges]
@@ -175,7 +175,7 @@ def test_edges_of_a_box_that_are_seen() -> None:
 
 
 def test_nothing_is_drawn_under_a_label() -> None:
-    line = Line(np.array([[-1.0, 0.0, 5.0], [1.0, 0.0, -5.0]]), 0.01, 0.0)
+    line = FlatLine(np.array([[-1.0, 0.0, 5.0], [1.0, 0.0, -5.0]]), 0.01, 0.0)
     label = np.array([[-0.1, -0.2], [0.3, -0.2], [0.3, 0.2], [-0.1, 0.2]])
     (parts,) = visible_parts([line], [], [label])
     np.testing.assert_allclose([part[[0, -1], 0] for part in parts], [(-1.0, -0.1), (0.3, 1.0)], atol=1e-12)
@@ -183,6 +183,6 @@ def test_nothing_is_drawn_under_a_label() -> None:
 
 def test_nothing_to_draw_and_lines_seen_from_their_ends() -> None:
     assert visible_parts([], []) == []
-    upright = Line(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), 0.1, 0.1)
-    level = Line(np.array([[-1.0, 0, -1], [1, 0, -1]]), 0.1, 0.0)
+    upright = FlatLine(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), 0.1, 0.1)
+    level = FlatLine(np.array([[-1.0, 0, -1], [1, 0, -1]]), 0.1, 0.0)
     assert [len(parts) for parts in visible_parts([upright, level], [])] == [1, 1]

@@ -165,7 +165,7 @@ def test_a_request_is_read_back_as_it_was(tmp_path: Path) -> None:
         moment_arm=0.3,
     )
     found = sweep_folder.open_folder(in_tasks(tmp_path / "sweep", request, SIZE))
-    assert sweep_folder.digest_of(found.request) == sweep_folder.digest_of(request) == found.digest
+    assert sweep_folder.request_digest(found.request) == sweep_folder.request_digest(request) == found.digest
     for name in ("center", "segments", "ellipsoids", "corners", "sizes", "accelerations"):
         np.testing.assert_array_equal(getattr(found.request.around, name), getattr(request.around, name))
     assert [sl.dump_robot(one) for one in found.request.robots] == [sl.dump_robot(one) for one in request.robots]
@@ -255,7 +255,7 @@ def test_without_zarr_a_sentence_says_what_to_install(tmp_path: Path, monkeypatc
 
 def test_tasks_take_as_long_as_they_should(monkeypatch: pytest.MonkeyPatch) -> None:
     times = iter(np.repeat(np.arange(0.0, 1e3, 0.01), 1))
-    monkeypatch.setattr(work, "numbers_of", lambda request, part: {})
+    monkeypatch.setattr(work, "compute_variables", lambda request, part: {})
     monkeypatch.setattr("sagline.sweep.work.time.process_time", lambda: next(times))
     request = planar(2000, 1000)
     size = work.measured_size(request)  # 10 ms for 4,000 requests

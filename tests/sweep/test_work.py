@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.sweep.request import Part
-from sagline.sweep.work import counts_of, numbers_of
+from sagline.sweep.request import RequestBox
+from sagline.sweep.work import compute_variables, count_outcomes
 from tests.sweep.requests import PLANAR, planar
 from tests.tiers import wide
 
@@ -18,7 +18,7 @@ QUANTITIES = ("tension", "length", "shortfall", "margin")
 
 def whole(request: sl.sweep.Request, robot: int = 0) -> dict[str, Any]:
     _, poses, wrenches = request.shape
-    return numbers_of(request, Part(robot, slice(0, poses), slice(0, wrenches)))
+    return compute_variables(request, RequestBox(robot, slice(0, poses), slice(0, wrenches)))
 
 
 def one_by_one(request: sl.sweep.Request, robot: int = 0) -> sl.Plan:
@@ -128,7 +128,7 @@ def test_parts_together_are_the_whole() -> None:
     request = planar()
     all_of_it = whole(request)
     for rows, columns in ((slice(3, 20), slice(5, 6)), (slice(0, 1), slice(0, 25))):
-        part = numbers_of(request, Part(0, rows, columns))
+        part = compute_variables(request, RequestBox(0, rows, columns))
         for name in ("status", "tension"):
             np.testing.assert_array_equal(part[name], all_of_it[name][rows, columns])
 
@@ -145,11 +145,11 @@ def test_large_parts_are_worked_out_in_pieces(monkeypatch: pytest.MonkeyPatch) -
 def test_every_request_is_counted_once() -> None:
     request = planar(quantities=("tension", "margin"))
     found = whole(request)
-    counts = counts_of(found)
+    counts = count_outcomes(found)
     assert counts.feasible == np.count_nonzero(found["status"] == sl.PoseStatus.SOLVED)
     assert counts.infeasible == np.count_nonzero(found["status"] == sl.PoseStatus.INFEASIBLE)
     assert sum(counts) == len(request)
     statuses = list(sl.PoseStatus)
-    told = counts_of({"status": np.array(statuses, dtype=np.int8)})
+    told = count_outcomes({"status": np.array(statuses, dtype=np.int8)})
     assert told == (1, 1, len(statuses) - 4, 1, 1)
-    assert counts_of({"margin_status": np.array(list(sl.MarginStatus), dtype=np.int8)}) == (1, 1, 3, 1, 0)
+    assert count_outcomes({"margin_status": np.array(list(sl.MarginStatus), dtype=np.int8)}) == (1, 1, 3, 1, 0)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.options import JsonOption, OutOption, argument
-from sagline.cli.terminal import counting, note, show_json
+from sagline.cli.terminal import counting, show_json, show_note
 from sagline.files.writing import check_files
 
 
@@ -44,5 +44,5 @@ def article(
         show_json(report.numbers)
         return
     verdicts = Counter(finding.verdict for chapter in report.chapters for finding in chapter.findings)
-    note("", ", ".join(f"{count} × {verdict}" for verdict, count in verdicts.items()))
-    note("", f"The report: {report.page.resolve()}; its numbers: {report.data.name}")
+    show_note("", ", ".join(f"{count} × {verdict}" for verdict, count in verdicts.items()))
+    show_note("", f"The report: {report.page.resolve()}; its numbers: {report.data.name}")

@@ -10,8 +10,17 @@ from rich.text import Text
 
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
-from sagline.cli.options import JsonOption, Model, ModelOption, RobotArgument, argument, flag, option, quantity_option
-from sagline.cli.terminal import note, show, show_json, show_pieces, working
+from sagline.cli.options import (
+    JsonOption,
+    ModelName,
+    ModelOption,
+    RobotArgument,
+    argument,
+    flag,
+    option,
+    quantity_option,
+)
+from sagline.cli.terminal import show_json, show_note, show_pieces, show_text, working
 from sagline.core.errors import FileError, InvalidValueError, printable
 from sagline.files.writing import check_files, create_folder, write_text
 
@@ -82,7 +91,7 @@ def calibrate(
     rotation_deviation: Annotated[float | None, _deviation_option("a measured rotation, '1 mrad'", "rad")] = None,
     folds: Annotated[int, option("NUMBER", "Folds of the cross-validation; 0 for none.")] = 5,
     robust: Annotated[bool, flag("Give outliers less weight.", "--robust/--no-robust")] = True,
-    model: ModelOption = Model.CATENARY,
+    model: ModelOption = ModelName.CATENARY,
     plot: Annotated[Path | None, option("FILE", "Figure of the fit: .png, .svg or .pdf.")] = None,
     plan: Annotated[int | None, option("NUMBER", "Choose this number of poses to measure, instead of a LOG.")] = None,
     seed: Annotated[int, option("NUMBER", "Seed of the candidate poses of --plan.")] = 0,
@@ -143,9 +152,9 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
         _tell_offset(found, files)
     if found.status is CalibrationStatus.FOUND:
         return 0
-    note(f"{robot.name}: ", found.status.text, style="bold red")
+    show_note(f"{robot.name}: ", found.status.text, style="bold red")
     if found.status is CalibrationStatus.NOT_CONVERGED and len(files) < len(request.files):
-        note("", "No robot file is written, because the fit did not converge.")
+        show_note("", "No robot file is written, because the fit did not converge.")
     return OUTSIDE
 
 
@@ -225,7 +234,7 @@ def _show_lines(text: Callable[[int], str]) -> None:
 
 def _tell_files(files: list[Path]) -> None:
     for file in files:
-        show(f"In {file.resolve().parent}: {file.name}", whole=True)
+        show_text(f"In {file.resolve().parent}: {file.name}", whole=True)
 
 
 def _tell_offset(found: Calibration, files: list[Path]) -> None:
@@ -235,7 +244,7 @@ def _tell_offset(found: Calibration, files: list[Path]) -> None:
         whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)
         kept = f"{whole} keeps it" if whole else "--out found.nc does"
         text = "has no length_zero for read lengths; it is to be added to the lengths of the machine"
-        note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
+        show_note("Note: ", f"{robots[0]} {text}; {kept}.", style="bold")
 
 
 def _record(found: Calibration) -> dict[str, Any]:

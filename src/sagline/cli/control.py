@@ -37,7 +37,7 @@ def control(
         echo "home; goto 0.2,-0.4,1.4" | sagline control article-prototype --plc ... --log run.mcap
         sagline control article-prototype --plc ... --shadow --log run.mcap
     """
-    from sagline.cli.session import Session
+    from sagline.cli.session import OperatorSession
     from sagline.control.controller import Controller
     from sagline.control.real_time import Pace
     from sagline.files.robot_file import load_robot
@@ -52,7 +52,7 @@ def control(
 
                 record = stack.enter_context(Recorder(log, robot))
             controller = Controller(robot, link, pace=Pace(), record=record, shadow=shadow)
-        session = Session(controller, alone=not sys.stdin.isatty(), shadow=shadow)
+        session = OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow)
         return session.run()
 
 

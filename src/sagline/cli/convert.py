@@ -11,7 +11,7 @@ import numpy as np
 
 from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.options import FileOption, argument, option, quantity_option
-from sagline.cli.terminal import note, show_data, working
+from sagline.cli.terminal import show_data, show_note, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
 from sagline.files.writing import write_text
@@ -150,8 +150,8 @@ def _mjcf(robot: Robot, at: list[float] | None) -> tuple[str, str]:
 
 def _report(imported: Imported, out: Path | None) -> None:
     robot = imported.robot
-    note(f"{robot.name}: ", f"{robot.cable_count} cables, {robot.motion_pattern}" + (f", in {out}" if out else ""))
+    show_note(f"{robot.name}: ", f"{robot.cable_count} cables, {robot.motion_pattern}" + (f", in {out}" if out else ""))
     for field, why in robot.assumed.items():
-        note("Assumed: ", f"{field}: {why}")
+        show_note("Assumed: ", f"{field}: {why}")
     for what in imported.lost:
-        note("Lost: ", what)
+        show_note("Lost: ", what)

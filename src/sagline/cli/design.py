@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from sagline.cli.entries import INVERSE, SIGNED_MARGINS, VIBRATION
 from sagline.cli.options import JsonOption, RobotArgument, argument, figures_flag, option
-from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note, show, working
+from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.terminal import show_note, show_text, working
 
 if TYPE_CHECKING:
     from sagline.optimization.front import Front
@@ -62,7 +62,7 @@ def design(
         try:
             front = search(first, **asked, folder=out, progress=show_progress)
         except KeyboardInterrupt:
-            note("", f"{rated[0]:,} evaluated robots are in {out}: the same command continues.")
+            show_note("", f"{rated[0]:,} evaluated robots are in {out}: the same command continues.")
             raise
         output.files = front.save(out)
         if figures:
@@ -73,7 +73,7 @@ def design(
 
     def tell() -> None:
         show_table(_table(front))
-        show(front.text)
+        show_text(front.text)
 
     output.report(lambda: _record(front), tell, as_json=as_json)
 
@@ -89,7 +89,7 @@ def _needed(goals: list[Goal]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _table(front: Front) -> Grid:
+def _table(front: Front) -> TextTable:
     """The first robot and the best robots: goals, then the design variables."""
     heads = ["", *(f"{goal.kind}\n[{goal.unit}]" if goal.unit else goal.kind for goal in front.goals)]
     heads += [f"{part.name}\n[{part.unit}]" if part.unit else part.name for part in front.parts]
@@ -97,11 +97,11 @@ def _table(front: Front) -> Grid:
     if front.better:
         found = zip(front.robots, front.values, front.changed, strict=True)
         rows += [[robot.name, *_cells(values), *_cells(changed)] for robot, values, changed in found]
-    return Grid(heads, rows[:MOST_ROWS])
+    return TextTable(heads, rows[:MOST_ROWS])
 
 
 def _cells(values: Any) -> list[str]:
-    return [written(float(value), ".4g") for value in values]
+    return [number_text(float(value), ".4g") for value in values]
 
 
 def _record(front: Front) -> dict[str, object]:

@@ -75,14 +75,14 @@ def _report(error: BaseException, debug: bool) -> int:
         import traceback
 
         traceback.print_exception(error)
-    from sagline.cli.terminal import note
+    from sagline.cli.terminal import show_note
     from sagline.core.errors import LONGEST, shortened
 
     head, text, code = _message(error)
     (text,) = shortened((text,), LONGEST - len(head))
-    note(head, text, style="bold red")
+    show_note(head, text, style="bold red")
     for line in getattr(error, "__notes__", ()):
-        note("", line)
+        show_note("", line)
     return code
 
 

@@ -19,7 +19,7 @@ PLACE = (0.0, 0.0, 2.0)
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class Entry(NamedTuple):
+class _Entry(NamedTuple):
     """An entry of the kernels.
 
     Attributes:
@@ -235,31 +235,31 @@ DESCRIBE = "forward.sensitivity.describe_states"
 ENTRIES = {
     entry.words: entry
     for entry in (
-        Entry(INVERSE, "inverse.poses.inverse_poses", 39, 18.0, _inverse),
-        Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_methods, 2, INVERSE),
-        Entry(VERDICTS, "inverse.feasibility.decide_poses", 56, 40.0, _verdicts),
-        Entry(FORWARD, "forward.forward.forward_poses", 82, 14.0, lambda sl: _forward(sl, sl.Catenary())),
-        Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, 2, FORWARD),
-        Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda sl: _forward(sl, sl.Straight())),
-        Entry(
+        _Entry(INVERSE, "inverse.poses.inverse_poses", 39, 18.0, _inverse),
+        _Entry(SHARING, "inverse.poses.inverse_poses", 39, 49.0, _other_methods, 2, INVERSE),
+        _Entry(VERDICTS, "inverse.feasibility.decide_poses", 56, 40.0, _verdicts),
+        _Entry(FORWARD, "forward.forward.forward_poses", 82, 14.0, lambda sl: _forward(sl, sl.Catenary())),
+        _Entry(FORWARD_OVER_PULLEYS, "forward.forward.forward_poses", 41, 14.0, _forward_over_pulleys, 2, FORWARD),
+        _Entry(FIT, "forward.fit.fit_poses", 30, 5.0, lambda sl: _forward(sl, sl.Straight())),
+        _Entry(
             MARGINS, "inverse.feasibility.margins_of_poses", 33, 9.0, lambda sl: sl.capacity_margin(_unknown_state(sl))
         ),
-        Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 48, 16.0, _signed_margins),
-        Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 66, 17.0, _proofs),
-        Entry(POLYGON, "inverse.feasibility.polygon_of_pose", 38, 5.0, _polygon),
-        Entry(VIBRATION, DESCRIBE, 57, 6.0, lambda sl: sl.modes(_unknown_state(sl))),
-        Entry(VIBRATION_OVER_PULLEYS, DESCRIBE, 39, 4.0, _vibration_over_pulleys, 2, VIBRATION),
-        Entry(CLEARANCES, "interference.catenary_distance.least_distances", 33, 5.0, _clearances),
-        Entry(READINGS, "calibration.observe.observe", 70, 9.0, _readings),
-        Entry(READINGS_OVER_PULLEYS, "calibration.observe.observe", 45, 8.0, _readings_over_pulleys, 2, READINGS),
-        Entry(STARTING_LENGTHS, "calibration.starting_lengths.starting_lengths", 30, 4.0, _starting_lengths),
-        Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes, after=VIBRATION),
-        Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses, after=MODES),
-        Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _stiffness_with_losses, 2, MODES),
-        Entry(SIMULATION, "dynamics.motion.run", 65, 16.0, lambda sl: sl.simulate(_hanging_state(sl), duration=0.01)),
-        Entry(SIMULATION_OVER_PULLEYS, "dynamics.motion.run", 33, 14.0, _simulation_over_pulleys, 2, SIMULATION),
-        Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _period, after=SIMULATION),
-        Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
+        _Entry(SIGNED_MARGINS, "workspaces.signed_margin.signed_margins", 48, 16.0, _signed_margins),
+        _Entry(PROOFS, "workspaces.pose_box_proof.prove_boxes", 66, 17.0, _proofs),
+        _Entry(POLYGON, "inverse.feasibility.polygon_of_pose", 38, 5.0, _polygon),
+        _Entry(VIBRATION, DESCRIBE, 57, 6.0, lambda sl: sl.modes(_unknown_state(sl))),
+        _Entry(VIBRATION_OVER_PULLEYS, DESCRIBE, 39, 4.0, _vibration_over_pulleys, 2, VIBRATION),
+        _Entry(CLEARANCES, "interference.catenary_distance.least_distances", 33, 5.0, _clearances),
+        _Entry(READINGS, "calibration.observe.observe", 70, 9.0, _readings),
+        _Entry(READINGS_OVER_PULLEYS, "calibration.observe.observe", 45, 8.0, _readings_over_pulleys, 2, READINGS),
+        _Entry(STARTING_LENGTHS, "calibration.starting_lengths.starting_lengths", 30, 4.0, _starting_lengths),
+        _Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes, after=VIBRATION),
+        _Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses, after=MODES),
+        _Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _stiffness_with_losses, 2, MODES),
+        _Entry(SIMULATION, "dynamics.motion.run", 65, 16.0, lambda sl: sl.simulate(_hanging_state(sl), duration=0.01)),
+        _Entry(SIMULATION_OVER_PULLEYS, "dynamics.motion.run", 33, 14.0, _simulation_over_pulleys, 2, SIMULATION),
+        _Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _period, after=SIMULATION),
+        _Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
     )
 }
 

@@ -9,7 +9,7 @@ from shlex import quote
 from typing import Annotated
 
 from sagline.cli.options import flag, option
-from sagline.cli.terminal import show
+from sagline.cli.terminal import show_text
 from sagline.core.errors import FileError
 from sagline.files.writing import atomic_file, check_folder, create_folder
 
@@ -39,8 +39,8 @@ def examples(
     for file in sources:
         with atomic_file(folder / file.name) as partial:
             shutil.copyfile(file, partial)
-    show(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}", whole=True)
-    show(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml", whole=True)
+    show_text(f"In {folder.resolve()}: {', '.join(file.name for file in sources)}", whole=True)
+    show_text(f"Try: cd {quote(str(folder))}; sagline track own_robot.yaml own_path.yaml", whole=True)
 
 
 def example_files() -> list[Path]:

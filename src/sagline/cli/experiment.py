@@ -10,8 +10,8 @@ import numpy as np
 
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
 from sagline.cli.options import JsonOption, OutOption, SeedOption, argument, flag, option
-from sagline.cli.output import Grid, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.output import TextTable, number_text, show_table
+from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.core.numbers import n
 from sagline.files.writing import check_files
@@ -82,7 +82,7 @@ def experiment(
         show_json({finding.key: plain(finding.numbers) for finding in experiment_chapter(result, how).findings})
         return
     _tell(result)
-    note("", f"The report: {place.resolve()}; its numbers: {NAMES[1]}")
+    show_note("", f"The report: {place.resolve()}; its numbers: {NAMES[1]}")
 
 
 def apart_over_s7(true: Robot, nominal: Robot, seed: int, tell: Tell) -> Experiment:
@@ -111,14 +111,14 @@ def _how(true: str | None, waits: bool) -> str:
 
 def _tell(result: Experiment) -> None:
     table = result.table
-    places = [", ".join(written(x, ".2f") for x in place) for place in table.desired]
+    places = [", ".join(number_text(x, ".2f") for x in place) for place in table.desired]
     distances = zip(
         (*table.distance, np.mean(table.distance)), (*result.distance, np.mean(result.distance)), strict=True
     )
     rows = [
-        [str(point), place, written(1e3 * theirs, ".1f"), written(1e3 * ours, ".3f")]
+        [str(point), place, number_text(1e3 * theirs, ".1f"), number_text(1e3 * ours, ".3f")]
         for point, place, (theirs, ours) in zip((*table.points, "mean"), (*places, ""), distances, strict=True)
     ]
-    show_table(Grid(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows))
+    show_table(TextTable(["point", "desired x, y, z [m]", "article [mm]", "ours [mm]"], rows))
     took = n(result.duration / 60.0, ".1f", "min")
-    show(f"It took {took}; the fastest winch had {n(1e3 * result.winch_speed, '.0f', 'mm/s')}.")
+    show_text(f"It took {took}; the fastest winch had {n(1e3 * result.winch_speed, '.0f', 'mm/s')}.")

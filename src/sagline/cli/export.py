@@ -7,7 +7,7 @@ from typing import Annotated
 
 from sagline.cli.entries import INVERSE
 from sagline.cli.options import RobotArgument, flag, option
-from sagline.cli.terminal import note, show, working
+from sagline.cli.terminal import show_note, show_text, working
 
 
 def export_c(
@@ -35,10 +35,10 @@ def export_c(
     loaded = load_robot(robot)
     source, header, scl = export_c(loaded, out, single_precision=single_precision)
     precision = "single" if single_precision else "double"
-    note(f"{loaded.name}: ", f"{loaded.cable_count} cables, {loaded.motion_pattern}, {precision} precision")
-    show(f"{source}: C99, the same for every robot; cc -std=c99 -O2 -c {source.name}", whole=True)
-    show(f"{header}: this robot's constants, and the declarations", whole=True)
-    show(f"{scl}: P3 in SCL for a Siemens PLC, not compiled yet", whole=True)
+    show_note(f"{loaded.name}: ", f"{loaded.cable_count} cables, {loaded.motion_pattern}, {precision} precision")
+    show_text(f"{source}: C99, the same for every robot; cc -std=c99 -O2 -c {source.name}", whole=True)
+    show_text(f"{header}: this robot's constants, and the declarations", whole=True)
+    show_text(f"{scl}: P3 in SCL for a Siemens PLC, not compiled yet", whole=True)
 
 
 def export_scl(
@@ -62,4 +62,4 @@ def export_scl(
     with working("", INVERSE):
         path = export_scl(loaded, out)
     groups = len(groups_of(loaded.cable_count))
-    show(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)
+    show_text(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)

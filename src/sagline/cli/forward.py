@@ -11,7 +11,7 @@ from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.options import (
     JsonOption,
-    Model,
+    ModelName,
     ModelOption,
     OutOption,
     PayloadOption,
@@ -20,8 +20,8 @@ from sagline.cli.options import (
     argument,
     flag,
 )
-from sagline.cli.output import Grid, Output, csv_text, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.output import Output, TextTable, csv_text, number_text, show_table
+from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.files.writing import write_text
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def forward(
     counts: Annotated[
         bool, flag("The columns are C0, C1, ...: encoder counts of the robot's winches.", "--counts")
     ] = False,
-    model: ModelOption = Model.CATENARY,
+    model: ModelOption = ModelName.CATENARY,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
@@ -56,16 +56,16 @@ def forward(
         sagline forward cogiro lengths.csv --out poses
         sagline forward my_robot.yaml counts.csv --counts
     """
-    from sagline.cli.values import robot_with
+    from sagline.cli.values import robot_with_payload
     from sagline.files.writing import file_stem
     from sagline.kinematics.forward import forward as solve
     from sagline.kinematics.status import ForwardStatus
 
-    robot = robot_with(name, payload)
+    robot = robot_with_payload(name, payload)
     lengths = _counted(file, robot) if counts else _measured(file, robot)
     table = f"{file_stem(robot.name, 'poses')}.csv"
     output = Output(folder, [table])
-    entry = FIT if model is Model.STRAIGHT else FORWARD
+    entry = FIT if model is ModelName.STRAIGHT else FORWARD
     with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
         first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=wrench)
         start = first.pose if np.isfinite(first.pose.position).all() else None
@@ -79,12 +79,14 @@ def forward(
     else:
         show_table(_grid(rows))
         if len(rows) - 1 > SHOWN:
-            show(f"The first {SHOWN} of {len(rows) - 1:,} samples; the file has all of them.")
+            show_text(f"The first {SHOWN} of {len(rows) - 1:,} samples; the file has all of them.")
         output.show()
     if not lost:
         return 0
     status = ForwardStatus(int(found.status[lost[0]]))
-    note(f"{len(lost)} of {len(found.status)} samples, the first in row {lost[0] + 1}: ", status.text, style="bold red")
+    show_note(
+        f"{len(lost)} of {len(found.status)} samples, the first in row {lost[0] + 1}: ", status.text, style="bold red"
+    )
     return OUTSIDE
 
 
@@ -116,10 +118,10 @@ def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
     return [["time [s]", *header], *([time, *row] for time, row in zip(lengths.time.tolist(), body, strict=True))]
 
 
-def _grid(rows: list[list[Cell]]) -> Grid:
+def _grid(rows: list[list[Cell]]) -> TextTable:
     """The first samples; the time or the number names each row."""
     header, body = [str(name) for name in rows[0]], rows[1 : SHOWN + 1]
-    texts = [[cell if isinstance(cell, str) else written(cell, ".6g") for cell in row] for row in body]
+    texts = [[cell if isinstance(cell, str) else number_text(cell, ".6g") for cell in row] for row in body]
     if not header[0].startswith("time"):
         header, texts = ["sample", *header], [[str(k), *row] for k, row in enumerate(texts)]
-    return Grid(header, texts, left=frozenset({len(header) - 1}))
+    return TextTable(header, texts, left=frozenset({len(header) - 1}))

@@ -33,7 +33,7 @@ from sagline.cli.entries import (
     VERDICTS,
     VIBRATION,
 )
-from sagline.cli.terminal import note, show, working
+from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import FileError
 from sagline.robot.robot import Robot
 
@@ -57,7 +57,7 @@ ORDER = tuple(each for entry in ENTRY_OF.values() for each in ((MODES, entry) if
 PATIENCE = 5.0  # s: longest wait for a compilation at the end
 
 
-class Address(NamedTuple):
+class ServerAddress(NamedTuple):
     """Address and port of the page, 0 for any free one, and True to open a browser here."""
 
     host: str
@@ -77,7 +77,7 @@ def check_viewer() -> None:
 
 def serve(
     robot: Robot,
-    address: Address,
+    address: ServerAddress,
     *,
     meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
     **page: Any,
@@ -92,17 +92,19 @@ def serve(
         signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is the normal end
     try:
         url = web.url(server, address.host)
-        show(f"{robot.name} is at {url}   (Ctrl-C stops it)", whole=True)
+        show_text(f"{robot.name} is at {url}   (Ctrl-C stops it)", whole=True)
         if address.host not in ("127.0.0.1", "::1", "localhost"):
-            note("Note: ", "everyone who can reach this machine can see the page and drag the platform.", style="bold")
-        readings = Readings()
+            show_note(
+                "Note: ", "everyone who can reach this machine can see the page and drag the platform.", style="bold"
+            )
+        readings = CompiledReadings()
         viewer = Page(server, FEATURES, robot, ready=readings.ready, **page)
         if address.browser and _has_display():
             webbrowser.open(url)
         with working("") if readings.missing else nullcontext(), readings.compiled_for(viewer), meanwhile(viewer):
             viewer.serve()
     except KeyboardInterrupt:
-        note("", "Stopped.")
+        show_note("", "Stopped.")
     finally:
         web.stop_server(server)
     return 0
@@ -113,7 +115,7 @@ def _has_display() -> bool:
     return sys.platform in ("win32", "darwin") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
 
 
-class Readings:
+class CompiledReadings:
     """The readings of the viewer whose kernels are compiled; `missing` has the words of the other entries."""
 
     def __init__(self) -> None:

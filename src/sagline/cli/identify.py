@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import numpy as np
 
 from sagline.cli.options import JsonOption, argument, choice_option, flag, quantity_option
-from sagline.cli.output import Grid, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.output import TextTable, number_text, show_table
+from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.numbers import n
 
 if TYPE_CHECKING:
@@ -73,20 +73,24 @@ def identify(
         show_json(_record(cable, model))
         return
     rows = [
-        [name, written(value, ".5g"), written(error, ".2g"), UNITS[name]]
+        [name, number_text(value, ".5g"), number_text(error, ".2g"), UNITS[name]]
         for name, value, error in zip(cable.names, cable.values, cable.standard_error, strict=True)
     ]
     for name, estimate, unit in (("k_h", model.k_h, "m/s²"), ("k_p", model.k_p, "m²/s⁴")):
-        rows.append([name, written(estimate.value, ".5g"), written(estimate.high - estimate.value, ".2g"), unit])
+        rows.append(
+            [name, number_text(estimate.value, ".5g"), number_text(estimate.high - estimate.value, ".2g"), unit]
+        )
     heads = ["", "value", "standard error", "unit"]
-    show_table(Grid(heads, rows, f"{len(data.span)} measurements", left=frozenset({0, 3})))
-    show(f"chi-squared per degree of freedom: {written(cable.chi_squared, '.3g')} (about 1 if the errors are right)")
-    show(
+    show_table(TextTable(heads, rows, f"{len(data.span)} measurements", left=frozenset({0, 3})))
+    show_text(
+        f"chi-squared per degree of freedom: {number_text(cable.chi_squared, '.3g')} (about 1 if the errors are right)"
+    )
+    show_text(
         f"The empirical model with k_h, k_p keeps a position error of {n(1e3 * TOLERANCE, 'g', 'mm')} in the "
         f"measured range from T_x = {n(model.tension_min(TOLERANCE), '.3g', 'N')} on."
     )
     for warning in cable.warnings:
-        note("Warning: ", warning, style="bold yellow")
+        show_note("Warning: ", warning, style="bold yellow")
 
 
 def _model(cable: CableFit, data: Measurements) -> EmpiricalFit:

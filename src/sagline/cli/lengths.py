@@ -13,7 +13,7 @@ from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import needed_for
 from sagline.cli.options import FileOption, argument, option
 from sagline.cli.output import csv_text
-from sagline.cli.terminal import note, show_data, working
+from sagline.cli.terminal import show_data, show_note, working
 from sagline.core.errors import FileError
 from sagline.files.writing import write_text
 
@@ -86,7 +86,7 @@ def encoder(
             samples = beyond.any(axis=1)
             first, cables = plan.path.time[np.argmax(samples)], ", ".join(map(str, np.flatnonzero(beyond.any(axis=0))))
             many = f"{samples.sum():,} of {samples.size:,} samples, the first at {first:g} s, of cables {cables}"
-            note(f"Beyond {limit}: ", f"{many}; winch_rates has the values", style="bold red")
+            show_note(f"Beyond {limit}: ", f"{many}; winch_rates has the values", style="bold red")
     return OUTSIDE if rates.exceeding.any() else code
 
 
@@ -106,7 +106,7 @@ def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path
         write_text(out, text)
     if kept.all():
         return 0
-    note("Left out: ", f"{np.sum(~kept):,} of {kept.size:,} samples, which are not feasible", style="bold red")
+    show_note("Left out: ", f"{np.sum(~kept):,} of {kept.size:,} samples, which are not feasible", style="bold red")
     return OUTSIDE
 
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import numpy as np
 
 from sagline.cli.options import JsonOption, argument, option
-from sagline.cli.output import Grid, show_table
-from sagline.cli.terminal import show, show_json, working
+from sagline.cli.output import TextTable, show_table
+from sagline.cli.terminal import show_json, show_text, working
 from sagline.core.numbers import n
 from sagline.files.writing import check_file
 
@@ -62,7 +62,7 @@ def log(
     if as_json:
         show_json(_record(done, to))
     elif to is not None:
-        show(f"{to}: {len(done):,} cycles of {done.robot.name}", whole=True)
+        show_text(f"{to}: {len(done):,} cycles of {done.robot.name}", whole=True)
     else:
         _tell(done)
     return 0
@@ -71,20 +71,20 @@ def log(
 def _tell(done: Execution) -> None:
     duration = _since(done, done.time[-1]) if len(done) else 0.0
     silent = int(np.count_nonzero(~done.answered))
-    show(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} without an answer.")
-    show(f"{done.status.name}: {done.reason or done.status.text}")
-    show_table(Grid(["state", "time [s]", "cycles"], _states(done)))
+    show_text(f"{done.robot.name}: {len(done):,} cycles in {n(duration, '.4g', 's')}, {silent:,} without an answer.")
+    show_text(f"{done.status.name}: {done.reason or done.status.text}")
+    show_table(TextTable(["state", "time [s]", "cycles"], _states(done)))
     largest = [
         [name, n(value, ".3g", unit), "–" if cable is None else str(cable), f"{time:.2f}"]
         for name, value, unit, time, cable in _extremes(done)
     ]
-    show_table(Grid(["largest", "value", "cable", "at [s]"], largest))
-    show_table(Grid(["cycles that began late by", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
+    show_table(TextTable(["largest", "value", "cable", "at [s]"], largest))
+    show_table(TextTable(["cycles that began late by", "cycles", ""], _histogram(done), left=frozenset({0, 2})))
     if done.events:
         rows = [_row(done, event) for event in done.events[:MOST_EVENTS]]
-        show_table(Grid(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
+        show_table(TextTable(["at [s]", "event", "text"], rows, left=frozenset({1, 2}), prose=frozenset({2})))
     if len(done.events) > MOST_EVENTS:
-        show(f"… and {len(done.events) - MOST_EVENTS:,} more events: --to FILE.nc has all of them.")
+        show_text(f"… and {len(done.events) - MOST_EVENTS:,} more events: --to FILE.nc has all of them.")
 
 
 def _since(done: Execution, time: float) -> float:

@@ -13,7 +13,7 @@ import typer
 
 from sagline.cli.entries import INVERSE
 from sagline.cli.options import argument, flag, option
-from sagline.cli.terminal import note, show, working
+from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import n
 from sagline.files.writing import write_text
@@ -83,21 +83,21 @@ def new(
     with working("checking the robot"):
         lines, share = _explained(made, design, middle)
     for line in lines:
-        show(line)
+        show_text(line)
     if share < NEARLY_ALL:
-        note(
+        show_note(
             "Advice: ",
             "for a larger share, try a larger platform, the other layout, a thicker rope or a lighter load.",
             style="bold",
         )
     for what, command in (("Written", ""), ("Look at it", "sagline view "), ("Every value", "sagline show ")):
-        show(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
+        show_text(f"{what}: {command}{quote(str(file)) if command else file}", whole=True)
     if not look:
         return 0
-    from sagline.cli.hosting import Address
+    from sagline.cli.hosting import ServerAddress
     from sagline.cli.view import view_robot
 
-    return view_robot(made, file, Address("127.0.0.1", 8080, browser=True))
+    return view_robot(made, file, ServerAddress("127.0.0.1", 8080, browser=True))
 
 
 def _check_file(file: Path, *, force: bool) -> None:
@@ -125,7 +125,7 @@ def _answered(name: str, answers: dict[str, str | None]) -> tuple[Design, dict[s
             except InvalidValueError as error:
                 if given is not None or not asks:
                     raise
-                note("No: ", str(error), style="bold red")
+                show_note("No: ", str(error), style="bold red")
             else:
                 said[key] = text
     return design, said

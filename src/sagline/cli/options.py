@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sagline.tension.method import TensionMethod
 
 
-class Model(StrEnum):
+class ModelName(StrEnum):
     """Cable models."""
 
     CATENARY = "catenary"
@@ -30,7 +30,7 @@ class Model(StrEnum):
         return MODELS[self.value.title().replace("-", "")]()
 
 
-class Variable(StrEnum):
+class TensionVariable(StrEnum):
     """Tensions between which a tension distribution is optimal."""
 
     CHORD = "chord"
@@ -53,7 +53,7 @@ class Tension(StrEnum):
     PUNCTURE = "puncture"
     POLYGON_WALK = "polygon-walk"
 
-    def build(self, variable: Variable) -> TensionMethod:
+    def build(self, variable: TensionVariable) -> TensionMethod:
         """The method for a tension."""
         from sagline.tension.methods import METHODS
 
@@ -124,8 +124,10 @@ RobotArgument = Annotated[
 OutOption = Annotated[Path, option("DIR", "Folder for the files; it is created if missing.", "--out")]
 FileOption = Annotated[Path | None, option("FILE", "File to write. Default: stdout.", "--out")]
 JsonOption = Annotated[bool, flag("Print the numbers as JSON and nothing else on stdout.", "--json")]
-ModelOption = Annotated[Model, choice_option("MODEL", "Cable model", Model)]
-VariableOption = Annotated[Variable, choice_option("VARIABLE", "Tension that the method distributes", Variable)]
+ModelOption = Annotated[ModelName, choice_option("MODEL", "Cable model", ModelName)]
+VariableOption = Annotated[
+    TensionVariable, choice_option("VARIABLE", "Tension that the method distributes", TensionVariable)
+]
 WrenchOption = Annotated[
     Any,
     converted_option(

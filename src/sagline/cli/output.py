@@ -18,7 +18,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from sagline.cli.terminal import FREE, show, show_json, show_pieces
+from sagline.cli.terminal import FREE, show_json, show_pieces, show_text
 from sagline.core.errors import printable
 from sagline.files.writing import check_files, create_folder
 
@@ -30,7 +30,7 @@ SUFFIXES = ("png", "svg")  # of a figure
 
 
 @dataclass(frozen=True, slots=True)
-class Grid:
+class TextTable:
     """A table of texts; it is split between columns where it is too wide, and no cell is ever cut.
 
     Attributes:
@@ -93,7 +93,7 @@ class Grid:
         return table
 
 
-def show_table(grid: Grid) -> None:
+def show_table(grid: TextTable) -> None:
     """Print a table as part of the result."""
     show_pieces(grid.pieces)
 
@@ -108,7 +108,7 @@ def _split(columns: range, count: int) -> Iterable[range]:
     return [columns[first:end] for first, end in pairwise(edges)]
 
 
-def written(number: float, form: str) -> str:
+def number_text(number: float, form: str) -> str:
     """A number with a true minus sign; a dash for NaN."""
     return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no minus zero
 
@@ -161,4 +161,4 @@ class Output:
         for file in self.files:
             suffixes.setdefault(file.stem, []).append(file.suffix)
         names = ", ".join(f"{stem}{'/'.join(found)}" for stem, found in suffixes.items())
-        show(f"In {self.folder.resolve()}: {names}", whole=True)
+        show_text(f"In {self.folder.resolve()}: {names}", whole=True)

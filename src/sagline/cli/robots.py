@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sagline.cli.options import JsonOption, RobotArgument
-from sagline.cli.output import Grid, show_table
-from sagline.cli.terminal import show as show_text
-from sagline.cli.terminal import show_json
+from sagline.cli.output import TextTable, show_table
+from sagline.cli.terminal import show_json, show_text
 
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
@@ -55,7 +54,7 @@ def robots(as_json: JsonOption = False) -> None:
         for robot in robots
         for frame, platform in [(_frame(robot), _platform(robot))]
     ]
-    show_table(Grid(heads, rows, left=frozenset({0, 2, 4, 5})))
+    show_table(TextTable(heads, rows, left=frozenset({0, 2, 4, 5})))
     show_text(
         "Frame: length × width × height over the floor. Without a size in the source: size of the box of the anchors."
     )
@@ -167,7 +166,7 @@ def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
     }
 
 
-def _deviations(deviations: Mapping[str, Array], head: str) -> Grid:
+def _deviations(deviations: Mapping[str, Array], head: str) -> TextTable:
     """Standard deviations of numbers: one where all of a field are alike."""
     from sagline.robot.tolerances import UNCERTAIN
 
@@ -176,7 +175,7 @@ def _deviations(deviations: Mapping[str, Array], head: str) -> Grid:
         alike = bool((value == value.flat[0]).all())
         text = f"{value.flat[0]:.4g}" if alike else "\n".join(_numbers(row, 4) for row in np.atleast_2d(value))
         rows.append([name.replace("_", " "), text, UNCERTAIN[name].unit])
-    return Grid(["", head, "unit"], rows, left=frozenset(range(3)), prose=frozenset({1}))
+    return TextTable(["", head, "unit"], rows, left=frozenset(range(3)), prose=frozenset({1}))
 
 
 def _parts(winches: Winch) -> dict[str, Any]:
@@ -193,22 +192,22 @@ def _marked(robot: Robot, field: str) -> str:
     return field.replace("_", " ") + mark
 
 
-def _values(robot: Robot) -> Grid:
+def _values(robot: Robot) -> TextTable:
     rows = [
         [_marked(robot, field), _text(field, value), unit]
         for field, unit in WHOLE.items()
         if (value := _value(robot, field)) is not None
     ]
-    return Grid(["", "value", "unit"], rows, robot.name, left=frozenset(range(3)), prose=frozenset({1}))
+    return TextTable(["", "value", "unit"], rows, robot.name, left=frozenset(range(3)), prose=frozenset({1}))
 
 
-def _winches(robot: Robot, winches: Winch) -> Grid:
+def _winches(robot: Robot, winches: Winch) -> TextTable:
     parts = _parts(winches)
     ways = ["up" if axis[2] > 0.0 else "down" for axis in winches.swivel_axis]
     parts["swivel_axis"]["value"] = ways if len(set(ways)) > 1 else ways[0]
     rows = [[name.replace("_", " "), _spread(entry["value"], digits=9), entry["unit"]] for name, entry in parts.items()]
     title = _marked(robot, "winches")
-    return Grid(["", "value", "unit"], rows, title, left=frozenset(range(3)), prose=frozenset({1}))
+    return TextTable(["", "value", "unit"], rows, title, left=frozenset(range(3)), prose=frozenset({1}))
 
 
 def _spread(value: Any, digits: int = 5) -> str:
@@ -236,7 +235,7 @@ def _numbers(row: Any, digits: int = 5) -> str:
     return "(" + ", ".join(f"{number:.{digits}g}" for number in row) + ")"
 
 
-def _anchors(robot: Robot) -> Grid:
+def _anchors(robot: Robot) -> TextTable:
     heads = ["cable", *(f"{_marked(robot, field)} [{unit}]" for field, unit in ANCHORS.items())]
     rows = [[str(k), *(_numbers(_value(robot, field)[k]) for field in ANCHORS)] for k in range(robot.cable_count)]
-    return Grid(heads, rows, left=frozenset({1, 2}))
+    return TextTable(heads, rows, left=frozenset({1, 2}))

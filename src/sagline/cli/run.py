@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 from sagline.cli.entries import FORWARD, INVERSE, SIGNED_MARGINS
 from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.output import Output
-from sagline.cli.terminal import show, working
+from sagline.cli.terminal import show_text, working
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sagline.cli.study import Run
+    from sagline.cli.study import ConfirmedRun
 
 ROBOTS = ("article-suspended", "article-mixed")
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
@@ -58,14 +58,16 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
         for name, space in zip(HULLS, spaces, strict=True):
             space.surface.export(output.file(f"{name}.glb"))
     if not as_json:
-        show(f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions.")
+        show_text(
+            f"The article's path, {len(path):,} poses in {path.duration:g} s; least norm of the horizontal tensions."
+        )
         for space in spaces:
             name, mass = space.robot.name, space.robot.mass
-            show(f"The workspace of {name} in its frame is {amount_of(space)}, level, with its {mass:g} kg.")
+            show_text(f"The workspace of {name} in its frame is {amount_of(space)}, level, with its {mass:g} kg.")
     return tell(runs, output, as_json=as_json)
 
 
-def _figures(suspended: Run, mixed: Run) -> tuple[Figure | Axes, ...]:
+def _figures(suspended: ConfirmedRun, mixed: ConfirmedRun) -> tuple[Figure | Axes, ...]:
     """The article's figures 18 to 22, with its own cable model, in the order of FIGURES."""
     from sagline import plot
 

@@ -11,8 +11,8 @@ from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any, Final, NamedTuple, Self
 
-from sagline.cli.terminal import note, show
-from sagline.cli.values import middle_of, quantity, whole_of
+from sagline.cli.terminal import show_note, show_text
+from sagline.cli.values import middle_pose, quantity, whole_of
 from sagline.control.controller import Controller
 from sagline.control.real_time import interrupt_calls
 from sagline.control.recording import Event, EventKind
@@ -101,7 +101,7 @@ class _Line(NamedTuple):
     act: Callable[[], object]
 
 
-class Session:
+class OperatorSession:
     """Lines that are read, cycles of the controller, and events that are printed."""
 
     def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
@@ -156,12 +156,12 @@ class Session:
 
     def _begin(self) -> None:
         if self._shadow:
-            show("Reads only: nothing is sent. Ctrl-C ends it.")
+            show_text("Reads only: nothing is sent. Ctrl-C ends it.")
             return
         self.control.connect()
         self._show_events()
         if not self._alone:
-            show("help lists what there is to say; home comes first.")
+            show_text("help lists what there is to say; home comes first.")
         Thread(target=self._read, name="sagline lines", daemon=True).start()
         self._line.ask()
 
@@ -206,7 +206,7 @@ class Session:
         pace = control.pace
         if pace is not None and pace.lateness.longest > LATE:
             often = f"{1e3 * pace.lateness.quantile(0.999):.1f} ms in 999 of 1000 cycles"
-            note("Note: ", f"cycles began up to {1e3 * pace.lateness.longest:.0f} ms late, {often} no more.")
+            show_note("Note: ", f"cycles began up to {1e3 * pace.lateness.longest:.0f} ms late, {often} no more.")
 
     def _cycle(self) -> None:
         self.control.cycle()
@@ -229,18 +229,18 @@ class Session:
     def _carry_out(self, line: _Line) -> None:
         """Carry out a line; an error is printed, or ends the session of a pipe."""
         if self._alone and line.text:
-            show(f"{PROMPT}{line.text}", whole=True)
+            show_text(f"{PROMPT}{line.text}", whole=True)
         try:
             line.act()
         except SaglineError as error:
             if self._alone:
                 raise
-            note("Error: ", str(error), style="bold red")
+            show_note("Error: ", str(error), style="bold red")
         self._show_events()
         self._line.ask()
 
     def _home_pose(self, text: str) -> Pose:
-        return _pose("home", text) if text else middle_of(self.control.robot)
+        return _pose("home", text) if text else middle_pose(self.control.robot)
 
     def _jog(self, text: str) -> Callable[[], None]:
         which, _, far = text.partition(" ")
@@ -275,26 +275,26 @@ class Session:
         self._event_count += len(events)
         for event in events:
             self._line.clear()
-            show(_event_text(event))
+            show_text(_event_text(event))
         if events:
             self._line.ask()
 
     def _show_state(self) -> None:
         control, sample = self.control, self.control.sample
-        show(self._status)
+        show_text(self._status)
         if sample is None:
             return
-        show(f"lengths [m]      {' '.join(f'{x:8.4f}' for x in sample.length + control.zero)}", whole=True)
-        show(f"tensions [N]     {' '.join(f'{x:8.1f}' for x in sample.filtered)}", whole=True)
-        show(f"grants           {' '.join('mine' if x == control.owner else str(x) for x in sample.owner)}")
+        show_text(f"lengths [m]      {' '.join(f'{x:8.4f}' for x in sample.length + control.zero)}", whole=True)
+        show_text(f"tensions [N]     {' '.join(f'{x:8.1f}' for x in sample.filtered)}", whole=True)
+        show_text(f"grants           {' '.join('mine' if x == control.owner else str(x) for x in sample.owner)}")
         if control.pace is not None:
             often, most = control.pace.lateness.quantile(0.999), control.pace.lateness.longest
-            show(f"cycles late      {1e3 * often:.1f} ms (999 of 1000), {1e3 * most:.1f} ms at most")
+            show_text(f"cycles late      {1e3 * often:.1f} ms (999 of 1000), {1e3 * most:.1f} ms at most")
 
     def _show_help(self) -> None:
         wide = max(len(words) for words, _ in HELP)
         for words, sense in HELP:
-            show(f"{words.ljust(wide)}  {sense}")
+            show_text(f"{words.ljust(wide)}  {sense}")
 
 
 def _pose(item: str, text: str) -> Pose:

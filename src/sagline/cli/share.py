@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from sagline.cli.entries import INVERSE
 from sagline.cli.options import argument, option, robot_completions
-from sagline.cli.terminal import show, working
+from sagline.cli.terminal import show_text, working
 from sagline.core.errors import FileError, InvalidValueError
 from sagline.files.writing import check_file, write_text
 
@@ -63,7 +63,7 @@ def share(
         write_text(target, text)
     size = len(text.encode())
     amount = f"{size / 1e3:,.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"
-    show(f"{target.resolve()}: {amount}, opens in any browser, without a network", whole=True)
+    show_text(f"{target.resolve()}: {amount}, opens in any browser, without a network", whole=True)
 
 
 def _found(source: Path) -> Robot | Course:

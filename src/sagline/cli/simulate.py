@@ -16,7 +16,7 @@ from sagline.cli.options import (
     RobotArgument,
     Tension,
     TensionOption,
-    Variable,
+    TensionVariable,
     WrenchOption,
     argument,
     choice_option,
@@ -24,8 +24,8 @@ from sagline.cli.options import (
     option,
     quantity_option,
 )
-from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note, show, working
+from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.terminal import show_note, show_text, working
 from sagline.cli.track import check_unit
 from sagline.core.errors import FileError, InvalidValueError
 
@@ -101,7 +101,7 @@ def simulate(
         sagline simulate article-suspended own_path.yaml --shaper zvd
         sagline simulate cogiro --break 3@0.5s --loss-time 0.001 --out sim.nc
     """
-    from sagline.cli.values import robot_with
+    from sagline.cli.values import robot_with_payload
     from sagline.dynamics.simulation.simulate import simulate as integrate
     from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.files.path_file import load_path
@@ -109,7 +109,7 @@ def simulate(
     from sagline.present.summaries import cable_mass_text, summary_of
     from sagline.robot.batch import has_routing
 
-    robot = robot_with(name, payload)
+    robot = robot_with_payload(name, payload)
     events = tuple(_break(text, robot) for text in breaks or ())
     damping = Damping(loss_time, air_damping)
     file = Path("output") / f"{file_stem(robot.name, 'simulation')}.nc" if out is None else out
@@ -125,7 +125,7 @@ def simulate(
         check_unit(path, way, robot)
     massless = SIMULATION_OVER_PULLEYS if has_routing(robot) else SIMULATION
     moving = {_CableMass.NONE: (massless,), _CableMass.LUMPED: (CHAINS,)}.get(cable_mass, ())
-    method = tension.build(Variable.CHORD)
+    method = tension.build(TensionVariable.CHORD)
     needed = (*needed_for(method), VIBRATION, *moving)
     with working(f"{robot.name}: simulating", *needed) as line:
         start = _start(robot, way, method, shaper, cable_mass, wrench, line)
@@ -172,14 +172,14 @@ def _start(
     line: ProgressLine,
 ) -> Plan | Equilibrium:
     """A plan along the path, shaped if a shaper is chosen; or the robot at rest."""
-    from sagline.cli.values import middle_of
+    from sagline.cli.values import middle_pose
     from sagline.dynamics.trajectories.shapers import EI, ZV, ZVD, shaped
     from sagline.dynamics.vibration.vibration import to_shape, vibration
     from sagline.kinematics.inverse import inverse
     from sagline.statics.stiffness import modes
 
     if way is None:
-        plan = inverse(robot, middle_of(robot), tension=method, wrench=load)
+        plan = inverse(robot, middle_pose(robot), tension=method, wrench=load)
         if not plan.feasible:
             raise InvalidValueError(
                 "robot", "infeasible in the middle of its test box", "a feasible pose", "Give a path."
@@ -192,7 +192,7 @@ def _start(
         frequency = to_shape(vibration(state, up_to=float(light.frequency.max())) if heavy else light, way)
         shaped_out = " and ".join(f"{value:.3f}" for value in frequency)
         kind = "with cable mass" if heavy else "massless"
-        note("Shaper: ", f"{shaper.value} for {shaped_out} Hz ({kind}), at the end of the path")
+        show_note("Shaper: ", f"{shaper.value} for {shaped_out} Hz ({kind}), at the end of the path")
         way = shaped(way, {_ShaperKind.ZV: ZV, _ShaperKind.ZVD: ZVD, _ShaperKind.EI: EI}[shaper](frequency))
     return inverse(robot, way, tension=method, wrench=load, progress=line.stage(f"{robot.name}: planning"))
 
@@ -204,11 +204,11 @@ def _duration(start: Plan | Equilibrium) -> float:
 
 def _tell(simulation: Simulation, summary: Summary) -> None:
     rows = [[row.label, row.text] for row in summary.rows if row.text]
-    show_table(Grid(["", simulation.robot.name], rows, left=frozenset({0, 1})))
+    show_table(TextTable(["", simulation.robot.name], rows, left=frozenset({0, 1})))
     for event in simulation.events:
         what = event.kind if event.cable is None else f"{event.kind} of cable {event.cable}"
-        before, after = (written(value, ",.1f") for value in (event.tension_before, event.tension_after))
-        show(f"{event.time:.3f} s: {what}, {before} N before, then at most {after} N")
+        before, after = (number_text(value, ",.1f") for value in (event.tension_before, event.tension_after))
+        show_text(f"{event.time:.3f} s: {what}, {before} N before, then at most {after} N")
 
 
 def _record(event: Occurrence) -> dict[str, Any]:

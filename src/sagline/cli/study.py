@@ -12,8 +12,8 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note
+from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.terminal import show_note
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.files.writing import file_stem
@@ -46,7 +46,7 @@ WIDEN = " Move the path, or widen the tension limits."
 SAME_PLACE = 1e-6  # m: far above rounding, far below the distance of a second equilibrium
 
 
-class Run(NamedTuple):
+class ConfirmedRun(NamedTuple):
     """A confirmed plan along a path, and the time of the compiled inverse kinematics [s]."""
 
     confirmation: Confirmation
@@ -78,17 +78,17 @@ def run_name(robot: Robot, model: CableModel) -> str:
 
 def run_along(
     robot: Robot, path: Path, model: CableModel, tension: TensionMethod, line: ProgressLine, wrench: Array | None = None
-) -> Run:
+) -> ConfirmedRun:
     """Plan a path, and confirm the plan with exact cables."""
     inverse(robot, path.pose[:1], model, tension, wrench)  # loads the compiled kernels, which are not timed
     start = perf_counter()
     progress = line.stage(f"{robot.name}: planning {len(path):,} poses")
     plan = inverse(robot, path, model, tension, wrench, progress=progress)
     seconds = perf_counter() - start
-    return Run(confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
+    return ConfirmedRun(confirm(plan, progress=line.stage(f"{robot.name}: confirming {len(path):,} poses")), seconds)
 
 
-def summary(run: Run) -> dict[str, float]:
+def summary(run: ConfirmedRun) -> dict[str, float]:
     """The numbers of a run over its feasible poses, by the keys of ROWS; NaN if there are none."""
     plan = run.plan
     error = 1e3 * np.linalg.norm(run.confirmation.position_error, axis=-1)
@@ -121,7 +121,7 @@ def _gap_text(gap: Gap, plan: Plan) -> str:
     return f"{when}: {short}; limits of {cables}"
 
 
-def tell(runs: Sequence[Run], output: Output, *, as_json: bool) -> int:
+def tell(runs: Sequence[ConfirmedRun], output: Output, *, as_json: bool) -> int:
     """Print the summary and the infeasible parts of the paths; returns the exit code."""
     output.report(
         lambda: {"runs": [_record(run) for run in runs]}, lambda: show_table(_summary_grid(runs)), as_json=as_json
@@ -129,34 +129,34 @@ def tell(runs: Sequence[Run], output: Output, *, as_json: bool) -> int:
     return max((_complaints(run) for run in runs), default=0)
 
 
-def _summary_grid(runs: Sequence[Run]) -> Grid:
+def _summary_grid(runs: Sequence[ConfirmedRun]) -> TextTable:
     """One column for each run, one row for each number."""
     heads = [""]
     for run in runs:
         name = fill(run.plan.state.one_robot.name, NARROW if len(runs) > 2 else WIDE)
         heads.append(f"{name}\n{type(run.plan.state.cables.model).__name__}")
     numbers = [summary(run) for run in runs]
-    rows = [[label, *(written(column[field], form) for column in numbers)] for field, (label, form) in ROWS.items()]
-    return Grid(heads, rows)
+    rows = [[label, *(number_text(column[field], form) for column in numbers)] for field, (label, form) in ROWS.items()]
+    return TextTable(heads, rows)
 
 
-def _complaints(run: Run) -> int:
+def _complaints(run: ConfirmedRun) -> int:
     """Print the infeasible parts of the path; returns the exit code of this run."""
     name, gaps, plan = run.plan.state.one_robot.name, run.plan.gaps, run.plan
     for gap in gaps[:MOST_GAPS]:
-        note(f"{name}: ", f"the path leaves the feasible region {_gap_text(gap, plan)}", style="bold red")
+        show_note(f"{name}: ", f"the path leaves the feasible region {_gap_text(gap, plan)}", style="bold red")
     if len(gaps) > MOST_GAPS:
-        note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} more times", style="bold red")
+        show_note(f"{name}: ", f"and {len(gaps) - MOST_GAPS} more times", style="bold red")
     if gaps:
         limits = all(gap.status is PoseStatus.INFEASIBLE for gap in gaps)
-        note("", "The file has the feasible part and marks the rest." + WIDEN * limits)
+        show_note("", "The file has the feasible part and marks the rest." + WIDEN * limits)
     if run.lost:
         what = f"{run.lost} of the planned poses are no stable equilibria: the platform would leave its path"
-        note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
+        show_note(f"{name}: ", f"{what}; move the path, or raise the tensions", style="bold red")
     return OUTSIDE if gaps or run.lost else 0
 
 
-def _record(run: Run) -> dict[str, Any]:
+def _record(run: ConfirmedRun) -> dict[str, Any]:
     plan = run.plan
     clock = plan.path.time if plan.path is not None else None
     return {

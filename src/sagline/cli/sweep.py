@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, SHARING, VERDICTS
 from sagline.cli.options import JsonOption, argument, option
-from sagline.cli.output import Grid, show_table, written
-from sagline.cli.terminal import note, show, show_json, working
+from sagline.cli.output import TextTable, number_text, show_table
+from sagline.cli.terminal import show_json, show_note, show_text, working
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.core.numbers import counted
 from sagline.files.writing import check_folder, create_folder
@@ -77,7 +77,7 @@ def sweep(
         with working(what, *_entries(request)) as line:
             found = run(request, folder, count, scheduler=scheduler, progress=line.progress, tell=_tell)
     except KeyboardInterrupt:
-        note("", f"To continue: {again}")
+        show_note("", f"To continue: {again}")
         raise
     except SaglineError as error:
         if (folder / "done").exists():
@@ -89,7 +89,7 @@ def sweep(
         _show(found)
     left = found.counts.open + found.counts.lost
     if left:
-        note(f"{left:,} of {len(request):,} requests: ", "without a verdict", style="bold red")
+        show_note(f"{left:,} of {len(request):,} requests: ", "without a verdict", style="bold red")
     return OUTSIDE if left else 0
 
 
@@ -100,7 +100,7 @@ def _entries(request: Request) -> tuple[str, ...]:
 
 
 def _tell(text: str) -> None:
-    note("", text)
+    show_note("", text)
 
 
 def _again(file: Path, folder: Path, workers: str | None, scheduler: str | None) -> str:
@@ -115,13 +115,13 @@ def _show(found: Sweep) -> None:
     total = len(found.request)
     counts = found.counts._asdict()
     rows = [
-        [name, f"{count:,}", written(100.0 * count / total, ".3g"), ENDS[name]]
+        [name, f"{count:,}", number_text(100.0 * count / total, ".3g"), ENDS[name]]
         for name, count in counts.items()
         if count
     ]
-    show_table(Grid(["requests", "number", "[%]", ""], rows, str(found.request)))
-    show(f"{counted(found.tasks, 'task')}, {found.seconds:,.1f} s of work; variables: {', '.join(found.names)}")
-    show(f"In {found.folder.resolve()}: read with sl.sweep.load({str(found.folder)!r})", whole=True)
+    show_table(TextTable(["requests", "number", "[%]", ""], rows, str(found.request)))
+    show_text(f"{counted(found.tasks, 'task')}, {found.seconds:,.1f} s of work; variables: {', '.join(found.names)}")
+    show_text(f"In {found.folder.resolve()}: read with sl.sweep.load({str(found.folder)!r})", whole=True)
 
 
 def _record(found: Sweep) -> dict[str, object]:

@@ -11,19 +11,19 @@ from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
 from sagline.cli.options import (
     JsonOption,
-    Model,
+    ModelName,
     ModelOption,
     OutOption,
     PayloadOption,
     PoseOption,
     RobotArgument,
-    Variable,
+    TensionVariable,
     VariableOption,
     WrenchOption,
     figures_flag,
 )
-from sagline.cli.output import Grid, Output, show_table
-from sagline.cli.terminal import note, show, working
+from sagline.cli.output import Output, TextTable, show_table
+from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 
@@ -40,8 +40,8 @@ LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at one pose their t
 def tension(
     name: RobotArgument,
     pose: PoseOption = None,
-    model: ModelOption = Model.CATENARY,
-    variable: VariableOption = Variable.CHORD,
+    model: ModelOption = ModelName.CATENARY,
+    variable: VariableOption = TensionVariable.CHORD,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
@@ -58,15 +58,15 @@ def tension(
         sagline tension article-mixed --pose 1,0.5,2.5
         sagline tension cogiro --pose 0,0,2,10,0,0 --variable frame_end --no-figures
     """
-    from sagline.cli.values import middle_of, robot_with
+    from sagline.cli.values import middle_pose, robot_with_payload
     from sagline.files.writing import file_stem
     from sagline.kinematics.inverse import inverse
     from sagline.kinematics.polygon import tension_polygon
     from sagline.tension.margin import capacity_margin
     from sagline.tension.methods import METHODS, MinimumNorm
 
-    robot = robot_with(name, payload)
-    place = middle_of(robot) if pose is None else pose
+    robot = robot_with_payload(name, payload)
+    place = middle_pose(robot) if pose is None else pose
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
     output = Output(folder, (), [file_stem(robot.name, "tension")] * drawn)
     with working(f"{robot.name}: tension distributions", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
@@ -82,9 +82,9 @@ def tension(
         margin = float(capacity_margin(least.state))
         shape = tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
     for text in least.warnings:
-        note(f"{robot.name}: ", text)
+        show_note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):
-        note("No tensions: ", reason, style="bold red")
+        show_note("No tensions: ", reason, style="bold red")
         return OUTSIDE
     if shape is not None:
         from sagline import plot
@@ -95,7 +95,7 @@ def tension(
 
     def tell() -> None:
         show_table(_grid(robot, plans))
-        show(
+        show_text(
             f"Capacity margin, the additional force in any direction that the cables can balance: {n(margin, unit='N')}"
         )
 
@@ -103,7 +103,7 @@ def tension(
     return 0
 
 
-def _plan(robot: Robot, pose: Pose, model: Model, method: TensionMethod, wrench: Array | None) -> Plan | None:
+def _plan(robot: Robot, pose: Pose, model: ModelName, method: TensionMethod, wrench: Array | None) -> Plan | None:
     """The plan of a method; None if the method is not defined for the robot."""
     from sagline.kinematics.inverse import inverse
 
@@ -137,7 +137,7 @@ def _record(plan: Plan | None) -> Any:
     return {"status": PoseStatus(int(plan.status)).name, "chord_tension": list(map(float, plan.chord_tension))}
 
 
-def _grid(robot: Robot, plans: dict[str, Plan | None]) -> Grid:
+def _grid(robot: Robot, plans: dict[str, Plan | None]) -> TextTable:
     from sagline.kinematics.status import PoseStatus
 
     rows = []
@@ -150,4 +150,4 @@ def _grid(robot: Robot, plans: dict[str, Plan | None]) -> Grid:
     heads = ["", *map(str, range(robot.cable_count)), ""]
     if not any(row[-1] for row in rows):
         heads, rows = heads[:-1], [row[:-1] for row in rows]
-    return Grid(heads, rows, "Chord tensions [N]", left=frozenset({0, robot.cable_count + 1}))
+    return TextTable(heads, rows, "Chord tensions [N]", left=frozenset({0, robot.cable_count + 1}))

@@ -65,7 +65,7 @@ def notices() -> Iterator[None]:
             line: str | None = None,
         ) -> None:
             if issubclass(category, SaglineWarning):
-                note("Note: ", str(message), style="bold")
+                show_note("Note: ", str(message), style="bold")
             else:
                 others(message, category, filename, lineno, file, line)
 
@@ -74,13 +74,13 @@ def notices() -> Iterator[None]:
         yield
 
 
-def note(head: str, text: str, style: str = "") -> None:
+def show_note(head: str, text: str, style: str = "") -> None:
     """Print one line on stderr; paths in it are not broken into lines."""
     with suppress(OSError):  # where nobody can be told, nothing is said
         _err.print(Text.assemble((printable(head), style), printable(text).replace(SPACE, " ")), soft_wrap=True)
 
 
-def show(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
+def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = False) -> None:
     """Print a part of the result; lines are broken between words, or kept `whole` so that paths can be copied."""
     if whole:
         _emit(Text(printable(what), style))

@@ -11,14 +11,14 @@ from sagline.cli.entries import FORWARD, needed_for
 from sagline.cli.lengths import plan_text
 from sagline.cli.options import (
     JsonOption,
-    Model,
+    ModelName,
     ModelOption,
     OutOption,
     PayloadOption,
     RobotArgument,
     Tension,
     TensionOption,
-    Variable,
+    TensionVariable,
     VariableOption,
     WrenchOption,
     argument,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sagline.cli.study import Run
+    from sagline.cli.study import ConfirmedRun
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.robot import Robot
 
@@ -47,9 +47,9 @@ def track(
     path: Annotated[
         Path | None, argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: the article's path.")
     ] = None,
-    model: ModelOption = Model.CATENARY,
+    model: ModelOption = ModelName.CATENARY,
     tension: TensionOption = Tension.CLOSEST,
-    variable: VariableOption = Variable.CHORD,
+    variable: VariableOption = TensionVariable.CHORD,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
     folder: OutOption = Path("output"),
@@ -71,11 +71,11 @@ def track(
         sagline track cogiro own_samples.csv --payload 20 --csv
     """
     from sagline.cli.study import run_along, run_name, tell
-    from sagline.cli.values import robot_with
+    from sagline.cli.values import robot_with_payload
     from sagline.files.path_file import load_path
     from sagline.motion.rest_to_rest import article_path
 
-    machine = robot_with(robot, payload)
+    machine = robot_with_payload(robot, payload)
     way = article_path() if path is None else load_path(path)
     if path is not None:
         check_unit(path, way, machine)
@@ -107,7 +107,7 @@ def check_unit(file: Path, way: MotionPath, robot: Robot) -> None:
         raise FileError(file, reason, "If these are millimeters, write the unit: x [mm] in CSV, 1500 mm in YAML.")
 
 
-def _figures(run: Run) -> tuple[Figure | Axes, ...]:
+def _figures(run: ConfirmedRun) -> tuple[Figure | Axes, ...]:
     """In the order of FIGURES."""
     from sagline import plot
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
 from sagline.cli.options import ModbusOption, RobotArgument, SeedOption, converted_option, option
-from sagline.cli.terminal import note, show, working
+from sagline.cli.terminal import show_note, show_text, working
 
 if TYPE_CHECKING:
     from sagline.dynamics.simulation.simulator import Reading
@@ -77,7 +77,7 @@ def twin(
         with working("switching the machine on", INVERSE, FORWARD, SIMULATION):
             machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
             server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
-        watch = Watch(machine)
+        watch = TwinMonitor(machine)
         if log is not None:
             from sagline.files.mcap_writer import Recorder
 
@@ -89,7 +89,7 @@ def twin(
             server.run(watch)
         finally:
             if server.late > LATE:
-                note("Note: ", f"This computer was busy: the machine was up to {server.late:.2f} s late.")
+                show_note("Note: ", f"This computer was busy: the machine was up to {server.late:.2f} s late.")
     return 0
 
 
@@ -97,18 +97,18 @@ def _greet(name: str, server: Server, host: str, *, modbus: bool) -> None:
     machine = server.machine
     winches, groups = machine.robot.cable_count, len(machine.groups)
     protocol = "Modbus TCP" if modbus else "S7"
-    show(f"{machine.nominal.name}: {winches} winches on {groups} PLCs with {protocol}, brakes on.")
-    show("From another terminal:")
-    show(f"  sagline control {name}{' --modbus' * modbus} \\", whole=True)
+    show_text(f"{machine.nominal.name}: {winches} winches on {groups} PLCs with {protocol}, brakes on.")
+    show_text("From another terminal:")
+    show_text(f"  sagline control {name}{' --modbus' * modbus} \\", whole=True)
     everywhere = "0.0.0.0:"
     places = [place.replace(everywhere, f"{gethostname()}:") for place in server.addresses]
-    show(f"    --plc {','.join(places)}", whole=True)
-    show("Ctrl-C stops it.")
+    show_text(f"    --plc {','.join(places)}", whole=True)
+    show_text("Ctrl-C stops it.")
     if host != "127.0.0.1":
-        note("Note: ", "everyone who can reach this machine can drive it; there is no password.", style="bold")
+        show_note("Note: ", "everyone who can reach this machine can drive it; there is no password.", style="bold")
 
 
-class Watch:
+class TwinMonitor:
     """Prints changes of the PLCs and records the motion of the platform."""
 
     def __init__(self, machine: Machine) -> None:
@@ -135,11 +135,11 @@ class Watch:
         now = self._look()
         changed = [i for i, (new, old) in enumerate(zip(now, self._known, strict=True)) if new != old]
         for what in dict.fromkeys(now[i] for i in changed):
-            show(f"{time:9.1f} s  {_groups([i for i in changed if now[i] == what])} {what}")
+            show_text(f"{time:9.1f} s  {_groups([i for i in changed if now[i] == what])} {what}")
         self._known = now
         if self.recorder is not None and self.recorder.stopped != self._stopped:
             self._stopped = self.recorder.stopped
-            note("Note: ", f"the log has stopped: {self._stopped}", style="bold")
+            show_note("Note: ", f"the log has stopped: {self._stopped}", style="bold")
 
 
 def _doing(report: Report) -> str:

@@ -58,14 +58,14 @@ def ratio(text: str, item: str) -> float:
     return quantity(number, item, "", low=0.0) / (100.0 if percent else 1.0)
 
 
-def middle_of(robot: Robot) -> Pose:
+def middle_pose(robot: Robot) -> Pose:
     """Level pose in the middle of a robot's test box; InvalidValueError if it has none."""
     if robot.test_box is None:
         raise InvalidValueError("--pose", "missing", "X,Y,Z or X,Y,Z,A,B,C", "This robot has no test box.")
     return Pose((robot.test_box.low + robot.test_box.high) / 2, np.eye(3))
 
 
-def robot_with(name: str, payload: float | None) -> Robot:
+def robot_with_payload(name: str, payload: float | None) -> Robot:
     """A robot by its name or file, with a payload [kg]; its inertia grows in proportion."""
     from sagline.files.robot_file import load_robot
 

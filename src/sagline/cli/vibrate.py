@@ -26,8 +26,8 @@ from sagline.cli.options import (
     option,
     quantity_option,
 )
-from sagline.cli.output import Grid, Output, csv_text, show_table, written
-from sagline.cli.terminal import note, show, working
+from sagline.cli.output import Output, TextTable, csv_text, number_text, show_table
+from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import InvalidValueError
 from sagline.files.writing import write_text
 
@@ -97,7 +97,7 @@ def vibrate(
         sagline vibrate article-suspended --damping "2 %" --force z --film 1
         sagline vibrate cogiro --map 8x6x4 --out maps
     """
-    from sagline.cli.values import middle_of, robot_with
+    from sagline.cli.values import middle_pose, robot_with_payload
     from sagline.dynamics.vibration.dynamic_stiffness import Damping
     from sagline.dynamics.vibration.mode_list import listed_modes
     from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
@@ -106,7 +106,7 @@ def vibrate(
     from sagline.kinematics.status import PoseStatus
 
     losses = Damping(loss_time, air_damping, damping)
-    robot = robot_with(name, payload)
+    robot = robot_with_payload(name, payload)
     if points is not None:
         for item, value in (("--pose", pose), ("--film", film), ("--wrench", wrench)):
             if value is not None:
@@ -115,15 +115,15 @@ def vibrate(
     table, drawing = (file_stem(robot.name, what) for what in ("modes", "response"))
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
     output = Output(folder, [f"{table}.csv", *[reel] * (film is not None)], [drawing] * figures)
-    place = middle_of(robot) if pose is None else pose
+    place = middle_pose(robot) if pose is None else pose
     with working(f"{robot.name}: modes up to {up_to:g} Hz", INVERSE, VIBRATION, MODES, *[ANSWERS] * figures) as line:
         plan = inverse(robot, place, wrench=wrench)
         if not plan.feasible:
-            note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
+            show_note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
             return OUTSIDE
         found = vibration(plan.state, up_to=up_to, damping=losses)
         if found.status in (VibrationStatus.UNSTABLE, VibrationStatus.NO_LENGTHS):
-            note("No modes: ", found.status.text, style="bold red")
+            show_note("No modes: ", found.status.text, style="bold red")
             return OUTSIDE
         modes = listed_modes(found)
         _check_film(film, modes)
@@ -142,7 +142,7 @@ def vibrate(
     output.report(lambda: _record(found, modes), lambda: _tell(found, modes, plan.state), as_json=as_json)
     if found.status is VibrationStatus.FOLDED:
         slack = ", ".join(map(str, found.slack_cables))
-        note(f"Cables {slack}: ", found.status.text, style="bold")
+        show_note(f"Cables {slack}: ", found.status.text, style="bold")
     return 0
 
 
@@ -165,7 +165,7 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
     for mode in (each for each in modes if each.kind == MASSLESS):
         k = mode.number - 1
         if swinging and mode.frequency < found.up_to:
-            beside.setdefault(int(shares[k].argmax()), []).append(written(mode.frequency, ".3f"))
+            beside.setdefault(int(shares[k].argmax()), []).append(number_text(mode.frequency, ".3f"))
         else:
             beyond.append(mode.frequency)
     chosen = [
@@ -173,18 +173,18 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
     ]
     if not swinging:
         proof = "by the exact count" if found.complete else "not proved by the exact count"
-        lowest = written(min(beyond, default=np.nan), ".3f")
+        lowest = number_text(min(beyond, default=np.nan), ".3f")
         below = f"No mode with cable mass is below {found.up_to:g} Hz, {proof}"
-        show(f"{below}; the lowest massless one is at {lowest} Hz. Raise --up-to.")
+        show_text(f"{below}; the lowest massless one is at {lowest} Hz. Raise --up-to.")
         return
     rows = [
         [
             mode.name,
-            written(mode.frequency, ".3f"),
-            written(100.0 * mode.platform_share, ".0f"),
+            number_text(mode.frequency, ".3f"),
+            number_text(100.0 * mode.platform_share, ".0f"),
             "–" if mode.cable is None else str(mode.cable),
-            written(100.0 * mode.cable_share, ".0f"),
-            written(100.0 * mode.loss, ".3g"),
+            number_text(100.0 * mode.cable_share, ".0f"),
+            number_text(100.0 * mode.loss, ".3g"),
             ", ".join(beside.get(mode.number - 1, [])),
         ]
         for mode in chosen
@@ -199,18 +199,18 @@ def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None
         "massless\n[Hz]",
     ]
     x, y, z = state.pose.position
-    show_table(Grid(heads, rows, f"{state.one_robot.name} at {x:g}, {y:g}, {z:g} m", left=frozenset()))
+    show_table(TextTable(heads, rows, f"{state.one_robot.name} at {x:g}, {y:g}, {z:g} m", left=frozenset()))
     proof = "the list is complete by the exact count" if found.complete else "some may be missing"
     hidden = len(swinging) - len(chosen)
     text = f"{len(swinging)} modes with cable mass below {found.up_to:g} Hz: {proof}."
     if hidden:
         text += f" Not shown: {hidden} modes of the cables alone (platform below {100.0 * LEAST_SHARE:.0f} %)."
-    show(text)
+    show_text(text)
     if beyond:
-        higher = ", ".join(written(frequency, ".3f") for frequency in beyond)
-        show(f"Massless modes above this frequency: {higher} Hz")
+        higher = ", ".join(number_text(frequency, ".3f") for frequency in beyond)
+        show_text(f"Massless modes above this frequency: {higher} Hz")
     elif swinging:
-        show("Each massless frequency is beside the mode that has most of its motion.")
+        show_text("Each massless frequency is beside the mode that has most of its motion.")
 
 
 def _numbers(mode: ListedMode) -> tuple[Any, ...]:
@@ -254,12 +254,12 @@ def _vibrate_in_box(
     def tell() -> None:
         if known.any():
             show_table(_table_of_map(found))
-        show(f"{int(known.sum()):,} of {known.size:,} poses have modes below {limit:g} Hz.")
+        show_text(f"{int(known.sum()):,} of {known.size:,} poses have modes below {limit:g} Hz.")
 
     output.report(lambda: _record_of_map(found), tell, as_json=as_json)
     if known.any():
         return 0
-    note("No modes: ", "no feasible pose of the box has a mode below --up-to; raise it", style="bold red")
+    show_note("No modes: ", "no feasible pose of the box has a mode below --up-to; raise it", style="bold red")
     return OUTSIDE
 
 
@@ -278,7 +278,7 @@ def _grid(robot: Robot, points: Sequence[int]) -> Pose:
     return Pose.from_euler(places, 0.0, 0.0, 0.0)
 
 
-def _table_of_map(found: FrequencyMap) -> Grid:
+def _table_of_map(found: FrequencyMap) -> TextTable:
     """Minimum and maximum of each quantity, and their positions."""
     rows = []
     for label, values, form in (
@@ -287,12 +287,14 @@ def _table_of_map(found: FrequencyMap) -> Grid:
         ("largest response [mm/N]", 1e3 * found.peak, ".3g"),
     ):
         first, last = int(np.nanargmin(values)), int(np.nanargmax(values))
-        rows.append([label, *(text for k in (first, last) for text in (written(values[k], form), _place(found, k)))])
-    return Grid(["", "minimum", "at x, y, z [m]", "maximum", "at x, y, z [m]"], rows, found.robot.name)
+        rows.append(
+            [label, *(text for k in (first, last) for text in (number_text(values[k], form), _place(found, k)))]
+        )
+    return TextTable(["", "minimum", "at x, y, z [m]", "maximum", "at x, y, z [m]"], rows, found.robot.name)
 
 
 def _place(found: FrequencyMap, k: int) -> str:
-    return ", ".join(written(value, ".2f") for value in found.pose.position[k])
+    return ", ".join(number_text(value, ".2f") for value in found.pose.position[k])
 
 
 def _record_of_map(found: FrequencyMap) -> dict[str, object]:

@@ -21,11 +21,11 @@ from sagline.cli.options import (
     option,
     robot_completions,
 )
-from sagline.cli.terminal import note, working
+from sagline.cli.terminal import show_note, working
 from sagline.core.errors import FileError, InvalidValueError, SaglineError
 
 if TYPE_CHECKING:
-    from sagline.cli.hosting import Address
+    from sagline.cli.hosting import ServerAddress
     from sagline.robot.robot import Robot
     from sagline.viewer.page import Page, Source
     from sagline.viewer.player import Beside, Played
@@ -86,10 +86,10 @@ def view(
         sagline view run.mcap --live
         sagline view run.mcap --truth twin.mcap
     """
-    from sagline.cli.hosting import Address
-    from sagline.cli.values import robot_with
+    from sagline.cli.hosting import ServerAddress
+    from sagline.cli.values import robot_with_payload
 
-    address = Address(host, port, browser)
+    address = ServerAddress(host, port, browser)
     log = next((file for file in (run, Path(robot)) if file is not None and file.suffix.lower() == LOG), None)
     if log is None and (live or truth is not None):
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
@@ -111,19 +111,19 @@ def view(
     if found is not None:
         return view_calibration(found, robot if found is run else None, address)
     start = {"pose": pose, "mode": _mode(mode), "wrench": wrench}
-    machine = robot_with(robot, payload)
+    machine = robot_with_payload(robot, payload)
     if run is not None:
         return view_run(machine, run, address, beside)
     return view_robot(machine, robot, address, None if payload is None else machine.mass, **start)
 
 
-def view_robot(robot: Robot, name: str | Path, address: Address, mass: float | None = None, **start: Any) -> int:
+def view_robot(robot: Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any) -> int:
     """Serve a robot, with its mass if it has a payload [kg], until Ctrl-C; returns the exit code."""
     serve, Source = _viewer()
     return serve(robot, address, source=Source.of_robot(name, mass), **start)
 
 
-def view_run(robot: Robot, file: Path, address: Address, beside: Path | None = None) -> int:
+def view_run(robot: Robot, file: Path, address: ServerAddress, beside: Path | None = None) -> int:
     """Serve a run or a simulation of a robot, optionally with another run, until Ctrl-C; returns the exit code."""
     from sagline.files.netcdf import is_of
     from sagline.files.simulation_file import FORMAT
@@ -135,7 +135,7 @@ def view_run(robot: Robot, file: Path, address: Address, beside: Path | None = N
     return serve(played.robot, address, played=played, source=source, beside=other)
 
 
-def view_calibration(file: Path, robot: str | None, address: Address) -> int:
+def view_calibration(file: Path, robot: str | None, address: ServerAddress) -> int:
     """Serve a calibrated robot with its calibration until Ctrl-C; returns the exit code."""
     from sagline.files.calibration_file import load_calibration
     from sagline.files.robot_file import load_robot
@@ -150,7 +150,7 @@ def view_calibration(file: Path, robot: str | None, address: Address) -> int:
 def view_log(
     file: Path,
     robot: str | None,
-    address: Address,
+    address: ServerAddress,
     *,
     live: bool = False,
     truth: Path | None = None,
@@ -169,7 +169,7 @@ def view_log(
         _check_robot(file, "log", session.robot, load_robot(robot), alone=True)
     other = None if beside is None else played_beside(session.robot, file, beside)
     if not live and not follower.log.complete:
-        note("Note: ", f"{file} was cut off: its last second is missing.", style="bold")
+        show_note("Note: ", f"{file} was cut off: its last second is missing.", style="bold")
     return serve(
         session.robot,
         address,
@@ -245,7 +245,7 @@ def _following(follower: LogFollower, viewer: Page) -> Iterator[None]:
                 if session is not None:
                     viewer.extend(session)
         except SaglineError as error:
-            note("Note: ", f"the page no longer follows the log: {error}", style="bold")
+            show_note("Note: ", f"the page no longer follows the log: {error}", style="bold")
 
     thread = threading.Thread(target=look, name="sagline follows", daemon=True)
     thread.start()

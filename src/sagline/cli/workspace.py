@@ -11,7 +11,7 @@ from sagline.cli.ending import OUTSIDE
 from sagline.cli.entries import CLEARANCES, INVERSE, PROOFS, SIGNED_MARGINS, VIBRATION
 from sagline.cli.options import (
     JsonOption,
-    Model,
+    ModelName,
     ModelOption,
     OutOption,
     PayloadOption,
@@ -22,8 +22,8 @@ from sagline.cli.options import (
     option,
     quantity_option,
 )
-from sagline.cli.output import Grid, Output, show_table, written
-from sagline.cli.terminal import note, show, working
+from sagline.cli.output import Output, TextTable, number_text, show_table
+from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import counted
 
@@ -121,7 +121,7 @@ def workspace(
     ] = None,
     budget: Annotated[float, quantity_option("TIME", "Time for the proof [s].", "s", above=0.0)] = 10,
     cells: Annotated[int, option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
-    model: ModelOption = Model.CATENARY,
+    model: ModelOption = ModelName.CATENARY,
     folder: OutOption = Path("output"),
     figures: Annotated[bool, figures_flag("Draw the hull and a slice, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
@@ -139,7 +139,7 @@ def workspace(
         sagline workspace article-suspended --prove "-2..2, -1..1, 1..3 m"
         sagline workspace ipanema-1 --max-sag "5 cm" --box "-1..1, -1..1, 0..2 m"
     """
-    from sagline.cli.values import robot_with
+    from sagline.cli.values import robot_with_payload
     from sagline.files.writing import file_stem
     from sagline.robot.pose import PoseBox
     from sagline.workspaces.orientations import Tilts
@@ -158,7 +158,7 @@ def workspace(
     if tilt > pi:  # a number without unit is in radians
         step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
         raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
-    robot = robot_with(name, payload)
+    robot = robot_with_payload(name, payload)
     space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
     drawn = [file_stem(robot.name, what) for what in ("workspace", "slice") if figures]
     output = Output(folder, [space_file, hull], drawn)
@@ -190,7 +190,7 @@ def workspace(
                     output.draw(plot.slice(space))
     output.report(lambda: _record(space, proof), lambda: _tell(space, proof), as_json=as_json)
     if space.nearest is not None:
-        note("Empty workspace: ", space.nearest.reason, style="bold red")
+        show_note("Empty workspace: ", space.nearest.reason, style="bold red")
     proved = proof is None or proof.verdict is ProofVerdict.PROVED_INSIDE
     return 0 if space.nearest is None and proved else OUTSIDE
 
@@ -208,26 +208,28 @@ def _tell(space: Workspace, proof: Proof | None) -> None:
 
     facts = [("area" if space.unit == "m²" else "volume", amount_of(space))]
     facts += [(head, text) for head, text in facts_of(space) if head != "nearest"]
-    show_table(Grid(["robot", space.robot.name], facts, left=frozenset({0, 1}), prose=frozenset({1})))
+    show_table(TextTable(["robot", space.robot.name], facts, left=frozenset({0, 1}), prose=frozenset({1})))
     if limits := space.limits:
         show_table(_limits(limits))
     if proof is not None:
         spans = span_of(proof.box)
         shares = {"proved inside": proof.inside, "proved outside": proof.outside, "open": proof.open}
-        rows = [[word, written(100.0 * share, ".2f"), f"{share * proof.volume:.4g}"] for word, share in shares.items()]
-        show_table(Grid([f"{spans} m", "share [%]", "volume [m³]"], rows))
-        show(f"{proof.verdict.name}: {proof.verdict.text}.")
+        rows = [
+            [word, number_text(100.0 * share, ".2f"), f"{share * proof.volume:.4g}"] for word, share in shares.items()
+        ]
+        show_table(TextTable([f"{spans} m", "share [%]", "volume [m³]"], rows))
+        show_text(f"{proof.verdict.name}: {proof.verdict.text}.")
 
 
-def _limits(limits: Sequence[Limit]) -> Grid:
+def _limits(limits: Sequence[Limit]) -> TextTable:
     rows = [
-        [written(100.0 * limit.share, ".1f"), limit.criterion, "–" if limit.cable < 0 else str(limit.cable)]
+        [number_text(100.0 * limit.share, ".1f"), limit.criterion, "–" if limit.cable < 0 else str(limit.cable)]
         for limit in limits[:MOST_LIMITS]
     ]
     if len(limits) > MOST_LIMITS:
         rest = sum(limit.share for limit in limits[MOST_LIMITS:])
-        rows.append([written(100.0 * rest, ".1f"), counted(len(limits) - MOST_LIMITS, "other"), ""])
-    return Grid(["surface [%]", "limited by", "cable"], rows, left=frozenset({1}))
+        rows.append([number_text(100.0 * rest, ".1f"), counted(len(limits) - MOST_LIMITS, "other"), ""])
+    return TextTable(["surface [%]", "limited by", "cable"], rows, left=frozenset({1}))
 
 
 def _record_of_proof(proof: Proof) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from sagline.plot.calibration import calibration
 from sagline.plot.drawing import draw_at_rest
 from sagline.plot.labels import PLACE, TENSIONS, TIME, name_lines
 from sagline.plot.plan import abscissa
-from sagline.plot.robot import pose_of
+from sagline.plot.robot import drawn_pose
 from sagline.plot.sheet import (
     BLUE,
     COLORS,
@@ -39,7 +39,7 @@ from sagline.plot.sheet import (
     unique_names,
 )
 from sagline.plot.style import PLAIN, Using
-from sagline.present.summaries import plan_of
+from sagline.present.summaries import middle_plan
 from sagline.robot.robot import Robot
 from sagline.workspaces.space import Workspace
 
@@ -77,7 +77,7 @@ def figure_of(thing: object) -> Figure | None:
 def _(robot: Robot) -> Figure | None:
     if robot.test_box is None:
         return None
-    return _whole(draw_at_rest(robot, pose_of(robot, None), plan_of(robot)))
+    return _whole(draw_at_rest(robot, drawn_pose(robot, None), middle_plan(robot)))
 
 
 @figure_of.register

@@ -13,15 +13,15 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
-from sagline.plot.occlusion import Line, view_axes, visible_parts
+from sagline.plot.occlusion import FlatLine, view_axes, visible_parts
 from sagline.plot.robot import (
     EDGES,
     FACES,
     catenary_points,
+    drawn_pose,
     frame_box,
     ground,
     platform_box,
-    pose_of,
     pulleys_and_drums,
     straight_points,
     tension_bar,
@@ -102,7 +102,7 @@ def drawing(
         >>> [text.get_text() for text in ax.texts[:8]]
         ['0', '1', '2', '3', '4', '5', '6', '7']
     """
-    where = pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    where = drawn_pose(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
     turn, above = number(azimuth, "azimuth", "rad"), number(elevation, "elevation", "rad")
     if not 0.0 <= above <= 0.5 * np.pi:
         raise InvalidValueError("elevation", f"{above:g} rad", "0 to pi / 2", "Look down at the robot.")
@@ -181,7 +181,7 @@ def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
     look = current()
     strokes = [*scene.cables, *scene.others]
     lines = [
-        Line(each.points @ view.T, *(each.covers * look.line * point * np.array([0.5 * each.width, GAP])))
+        FlatLine(each.points @ view.T, *(each.covers * look.line * point * np.array([0.5 * each.width, GAP])))
         for each in strokes
     ]
     courses = [line.points[:, :2] for line in lines]

@@ -20,7 +20,7 @@ FAR = 1e3  # of the size of the picture: before everything
 ALONG = 3.0  # times as far along a line as beside it what crosses it is hidden, where both run nearly the same way
 
 
-class Line(NamedTuple):
+class FlatLine(NamedTuple):
     """A line in the picture.
 
     Attributes:
@@ -72,7 +72,9 @@ def view_axes(azimuth: float, elevation: float) -> Array:
     return np.stack((right, np.cross(toward, right), toward))
 
 
-def visible_parts(lines: Sequence[Line], surfaces: Sequence[Array], labels: Sequence[Array] = ()) -> list[list[Array]]:
+def visible_parts(
+    lines: Sequence[FlatLine], surfaces: Sequence[Array], labels: Sequence[Array] = ()
+) -> list[list[Array]]:
     """The parts of lines that are seen."""
     if not lines:
         return []
@@ -136,7 +138,9 @@ def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers
     return [np.column_stack((low[s, there[s]], high[s, there[s]])) for s in range(len(starts))]
 
 
-def _covers(lines: Sequence[Line], surfaces: Sequence[Array], crossings: Sequence[_Crossing], size: float) -> _Covers:
+def _covers(
+    lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Crossing], size: float
+) -> _Covers:
     """Strips along the lines, wider ones where others cross, and the surfaces."""
     corners, behind, owners, hides = [], [], [], []
     for number, line in enumerate(lines):
@@ -171,7 +175,7 @@ def _covers(lines: Sequence[Line], surfaces: Sequence[Array], crossings: Sequenc
     return _Covers(normals, offsets, planes, np.array(behind), numbers[0], numbers[1])
 
 
-def _crossings(lines: Sequence[Line], starts: Array, ends: Array, owners: Indices) -> list[_Crossing]:
+def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: Indices) -> list[_Crossing]:
     """Crossings at which a line that hides something passes before another."""
     steps = ends - starts
     hides = np.array([line.half_width + line.gap for line in lines])[owners]

@@ -46,7 +46,7 @@ HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
 LABEL_DISTANCE = 0.045  # of the robot's size: how far outside its anchor a label stands
 
 
-def pose_of(robot: Robot, pose: Pose | None) -> Pose:
+def drawn_pose(robot: Robot, pose: Pose | None) -> Pose:
     """The given pose, or the middle of the robot's test box; InvalidValueError for a batch or without both."""
     if pose is None and robot.test_box is not None:
         return Pose(0.5 * (robot.test_box.low + robot.test_box.high), np.eye(3))
@@ -150,7 +150,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
         >>> import sagline as sl
         >>> axes = sl.plot.robot(sl.load_robot("cogiro"))
     """
-    where = pose_of(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
+    where = drawn_pose(instance(robot, Robot, "robot"), optional(pose, Pose, "pose"))
     optional(ax, Axes3D, "ax")
     if ax is None:
         ax = sheet(height=4.0, width=5.6).add_subplot(projection="3d")

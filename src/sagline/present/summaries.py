@@ -87,7 +87,7 @@ def summary_of(thing: object) -> Summary | None:
 
 @summary_of.register
 def _(robot: Robot) -> Summary:
-    plan = plan_of(robot)
+    plan = middle_plan(robot)
     verdict, good = f"{robot.cable_count} cables", None
     if plan is not None:
         there = "in the middle of its test box"
@@ -104,7 +104,7 @@ def _(robot: Robot) -> Summary:
     return Summary(robot.name, verdict, good, tuple(lines))
 
 
-def plan_of(robot: Robot) -> Plan | None:
+def middle_plan(robot: Robot) -> Plan | None:
     """Plan of the middle of a robot's test box; None without a box or without compiled kernels."""
     from sagline.kernels.inverse.feasibility import decide_poses
     from sagline.kernels.inverse.poses import inverse_poses

@@ -26,7 +26,7 @@ from sagline.files.netcdf import Content, choice_attributes, choice_of
 from sagline.files.robot_file import dump_robot, parse_robot
 from sagline.files.writing import staging
 from sagline.robot.pose import Pose
-from sagline.sweep.request import Part, Request, Variable, variables_of
+from sagline.sweep.request import Request, RequestBox, SweepArray, variables_of
 from sagline.tension.methods import METHODS
 from sagline.workspaces.wrench_sets import WrenchSet
 
@@ -88,13 +88,13 @@ class SweepFolder(NamedTuple):
         """Number of tasks."""
         return math.prod(self.grid)
 
-    def part(self, number: int) -> Part:
+    def part(self, number: int) -> RequestBox:
         """Box of requests of a task."""
         _, poses, wrenches = self.request.shape
         robot, row, column = (int(k) for k in np.unravel_index(number, self.grid))
         first, left = row * self.size.poses, column * self.size.wrenches
         rows = slice(first, min(first + self.size.poses, poses))
-        return Part(robot, rows, slice(left, min(left + self.size.wrenches, wrenches)))
+        return RequestBox(robot, rows, slice(left, min(left + self.size.wrenches, wrenches)))
 
     def write(self, number: int, numbers: Mapping[str, NDArray[np.generic]]) -> None:
         """Write the chunks of a task, each atomically; FileError if they cannot be written."""
@@ -121,7 +121,7 @@ class SweepFolder(NamedTuple):
                 return None
         return numbers
 
-    def _chunk(self, number: int, variable: Variable) -> Path:
+    def _chunk(self, number: int, variable: SweepArray) -> Path:
         """File of a chunk, as Zarr names it."""
         place: list[Any] = [*np.unravel_index(number, self.grid), *[0] * variable.a_cable]
         return self.path.joinpath(GROUP, variable.name, "c", *map(str, place))
@@ -181,12 +181,12 @@ def open_folder(path: Path) -> SweepFolder:
         if isinstance(error, InvalidValueError):
             raise FileError.of(path, error) from None
         raise FileError(path, f"is damaged ({type(error).__name__}: {error})", CONTENT.again) from None
-    if digest != digest_of(request) or min(size) < 1:
+    if digest != request_digest(request) or min(size) < 1:
         raise FileError(path, "is not as it was made: its digest is another", CONTENT.again)
     return SweepFolder(path, group, request, digest, size, made_by)
 
 
-def digest_of(request: Request) -> str:
+def request_digest(request: Request) -> str:
     """Digest of a request: equal for the same robots, poses, wrenches, quantities and methods."""
     return _digest([dump_robot(robot) for robot in request.robots], _options(request), request)
 
@@ -271,7 +271,7 @@ def _fill(place: Path, request: Request, size: TaskSize, attributes: dict[str, A
         )
 
 
-def _attributes(variable: Variable) -> dict[str, Any]:
+def _attributes(variable: SweepArray) -> dict[str, Any]:
     """Attributes of a variable by the CF conventions."""
     found: dict[str, Any] = {"long_name": variable.long_name}
     if variable.unit:

@@ -30,7 +30,7 @@ from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 
 
-class Variable(NamedTuple):
+class SweepArray(NamedTuple):
     """One array of a sweep; its first dimensions are robot, pose and wrench.
 
     Attributes:
@@ -55,30 +55,34 @@ class Variable(NamedTuple):
         return "int8" if self.whole or self.codes is not None else "float64"
 
 
-_STATUS: Final = Variable("status", "", "how each request ended", codes=PoseStatus)
-_PROOF: Final = Variable("proof", "N", "proved least change of the force that makes it feasible, 0 if it is")
+_STATUS: Final = SweepArray("status", "", "how each request ended", codes=PoseStatus)
+_PROOF: Final = SweepArray("proof", "N", "proved least change of the force that makes it feasible, 0 if it is")
 
 QUANTITIES: Final = MappingProxyType(
     {
-        "tension": (_STATUS, _PROOF, Variable("tension", "N", "tension along the chord, T_x / cos phi", a_cable=True)),
+        "tension": (
+            _STATUS,
+            _PROOF,
+            SweepArray("tension", "N", "tension along the chord, T_x / cos phi", a_cable=True),
+        ),
         "length": (
             _STATUS,
             _PROOF,
-            Variable("length", "m", "unstrained length L, all cable off the drum", a_cable=True),
+            SweepArray("length", "m", "unstrained length L, all cable off the drum", a_cable=True),
         ),
-        "shortfall": (_STATUS, _PROOF, Variable("enough", "N", "change of the force that suffices")),
+        "shortfall": (_STATUS, _PROOF, SweepArray("enough", "N", "change of the force that suffices")),
         "margin": (
-            Variable("margin_status", "", "what the margin's bracket says", codes=MarginStatus),
-            Variable("margin", "N", "how much more load the pose can take, below zero how much too much it is"),
-            Variable("margin_low", "N", "lower end of the margin's bracket; feasible where it is not below zero"),
-            Variable("margin_high", "N", "upper end of the margin's bracket; infeasible where it is below zero"),
-            Variable("limiting_cable", "", "cable whose limit moves the margin fastest, -1 for none", whole=True),
+            SweepArray("margin_status", "", "what the margin's bracket says", codes=MarginStatus),
+            SweepArray("margin", "N", "how much more load the pose can take, below zero how much too much it is"),
+            SweepArray("margin_low", "N", "lower end of the margin's bracket; feasible where it is not below zero"),
+            SweepArray("margin_high", "N", "upper end of the margin's bracket; infeasible where it is below zero"),
+            SweepArray("limiting_cable", "", "cable whose limit moves the margin fastest, -1 for none", whole=True),
         ),
     }
 )
 
 
-def variables_of(quantities: Iterable[str]) -> tuple[Variable, ...]:
+def variables_of(quantities: Iterable[str]) -> tuple[SweepArray, ...]:
     """Variables of some quantities, each once, in the order of the quantities."""
     return tuple(dict.fromkeys(variable for name in quantities for variable in QUANTITIES[name]))
 
@@ -202,7 +206,7 @@ def _sequence(value: Any, item: str, allowed: str) -> tuple[Any, ...]:
     raise InvalidValueError(item, brief(value), allowed, f"Give {item} as a list.")
 
 
-class Part(NamedTuple):
+class RequestBox(NamedTuple):
     """A box of requests: index of the robot, ranges of poses and wrenches."""
 
     robot: int
@@ -214,11 +218,11 @@ class Part(NamedTuple):
         """Numbers of poses and wrenches."""
         return self.poses.stop - self.poses.start, self.wrenches.stop - self.wrenches.start
 
-    def pieces(self, most: int) -> Iterator[Part]:
+    def pieces(self, most: int) -> Iterator[RequestBox]:
         """Parts of the box with at most `most` requests."""
         wide = min(self.shape[1], most)
         tall = max(1, most // wide)
         for first in range(self.poses.start, self.poses.stop, tall):
             for left in range(self.wrenches.start, self.wrenches.stop, wide):
                 rows = slice(first, min(first + tall, self.poses.stop))
-                yield Part(self.robot, rows, slice(left, min(left + wide, self.wrenches.stop)))
+                yield RequestBox(self.robot, rows, slice(left, min(left + wide, self.wrenches.stop)))

@@ -32,14 +32,14 @@ NAME: Final = "done"
 HEAD: Final = "#    task  seconds  feasible infeasible   unable     open     lost   progress"
 
 
-class Mark(NamedTuple):
+class TaskMark(NamedTuple):
     """Record of a finished task: time of its worker [s], 0 for a chunk from the disk, and outcomes of its requests."""
 
     seconds: float
     counts: Counts
 
 
-def _read_marks(folder: SweepFolder) -> dict[int, Mark]:
+def _read_marks(folder: SweepFolder) -> dict[int, TaskMark]:
     """Tasks that are done, by their numbers; damaged lines are ignored."""
     try:
         lines = (folder.path / NAME).read_bytes().decode("ascii", "replace").splitlines(keepends=True)
@@ -51,15 +51,15 @@ def _read_marks(folder: SweepFolder) -> dict[int, Mark]:
     return {number: mark for number, mark in filter(None, marks) if number < folder.tasks}
 
 
-class Marks:
+class TaskMarks:
     """The file `done` while a sweep runs, locked against other processes."""
 
-    def __init__(self, folder: SweepFolder, file: IO[bytes], marks: dict[int, Mark]) -> None:
+    def __init__(self, folder: SweepFolder, file: IO[bytes], marks: dict[int, TaskMark]) -> None:
         """Continue from the marks that were read; use `open_marks`."""
         self._folder, self._file = folder, file
         self.marks = marks
 
-    def add(self, number: int, mark: Mark, left: float | None) -> None:
+    def add(self, number: int, mark: TaskMark, left: float | None) -> None:
         """Add the mark of a task, with the remaining time [s] if known."""
         self.marks[number] = mark
         counts = mark.counts
@@ -89,7 +89,7 @@ class Marks:
 
 
 @contextmanager
-def open_marks(folder: SweepFolder) -> Iterator[Marks]:
+def open_marks(folder: SweepFolder) -> Iterator[TaskMarks]:
     """Open the marks of a folder with a lock; FileError if another process works on this sweep."""
     path = folder.path / NAME
     try:
@@ -99,12 +99,12 @@ def open_marks(folder: SweepFolder) -> Iterator[Marks]:
     with file:
         if not try_lock(file.fileno(), if_unknown=True):
             raise FileError(folder.path, "is being worked on by another process", "Wait for it, or stop it.")
-        marks = Marks(folder, file, _read_marks(folder))
+        marks = TaskMarks(folder, file, _read_marks(folder))
         marks.begin()
         yield marks
 
 
-def _total_of(marks: Mapping[int, Mark]) -> Counts:
+def _total_of(marks: Mapping[int, TaskMark]) -> Counts:
     """Sum of all counts."""
     counts = np.array([mark.counts for mark in marks.values()], dtype=np.int64).reshape(-1, len(Counts._fields))
     return Counts(*counts.sum(axis=0).tolist())
@@ -117,13 +117,13 @@ def _time_text(seconds: float) -> str:
     return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
 
 
-def _mark(line: str) -> tuple[int, Mark] | None:
+def _mark(line: str) -> tuple[int, TaskMark] | None:
     words = line.split()
     try:
         number, seconds, counts = int(words[0]), float(words[1]), Counts(*map(int, words[2:7]))
     except (ValueError, IndexError, TypeError):
         return None
-    return (number, Mark(seconds, counts)) if number >= 0 else None
+    return (number, TaskMark(seconds, counts)) if number >= 0 else None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

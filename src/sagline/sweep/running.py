@@ -18,13 +18,13 @@ from sagline.sweep.folder import (
     SweepFolder,
     check_made_here,
     check_package,
-    digest_of,
     is_installed,
     make_folder,
     open_folder,
+    request_digest,
 )
 from sagline.sweep.request import Request
-from sagline.sweep.result import Mark, Marks, Sweep, load, open_marks
+from sagline.sweep.result import Sweep, TaskMark, TaskMarks, load, open_marks
 from sagline.sweep.work import Counts, found_counts, measured_size, task
 
 MOST_WORKERS: Final = 1024
@@ -84,7 +84,7 @@ def run(
         check_package("distributed", "a scheduler")
     report, say = callback(progress, "progress"), callback(tell, "tell") or (lambda text: None)
     check_package("zarr", "sweeps")
-    opened = _made(path, request)
+    opened = _open_or_make_folder(path, request)
     with open_marks(opened) as marks:
         waiting = _waiting(opened, marks)
         start, done = 0.0, 0
@@ -93,7 +93,7 @@ def run(
             nonlocal done
             done += 1
             left = (time.monotonic() - start) / done * (len(waiting) - done)
-            marks.add(number, Mark(seconds, Counts(*counts)), left)
+            marks.add(number, TaskMark(seconds, Counts(*counts)), left)
             if report is not None:
                 report(len(marks.marks), opened.tasks)
 
@@ -113,13 +113,13 @@ def run(
 def open_matching_folder(path: Path, request: Request) -> SweepFolder:
     """Open the folder of a request; the folder of another request is refused."""
     opened = open_folder(path)
-    if opened.digest != digest_of(request):
+    if opened.digest != request_digest(request):
         step = "Give this one another folder, or remove that one."
         raise FileError(path, f"holds another sweep, of {len(opened.request):,} requests", step)
     return opened
 
 
-def _made(path: Path, request: Request) -> SweepFolder:
+def _open_or_make_folder(path: Path, request: Request) -> SweepFolder:
     """Folder of a request, created if missing."""
     try:
         empty = not path.exists() or not any(path.iterdir())
@@ -132,7 +132,7 @@ def _made(path: Path, request: Request) -> SweepFolder:
     return opened
 
 
-def _waiting(folder: SweepFolder, marks: Marks) -> list[int]:
+def _waiting(folder: SweepFolder, marks: TaskMarks) -> list[int]:
     """Tasks to be done; those whose chunks are complete on the disk are marked as done."""
     waiting = []
     for number in range(folder.tasks):
@@ -141,7 +141,7 @@ def _waiting(folder: SweepFolder, marks: Marks) -> list[int]:
             marks.marks.pop(number, None)
             waiting.append(number)
         elif number not in marks.marks:
-            marks.add(number, Mark(0.0, counts), None)
+            marks.add(number, TaskMark(0.0, counts), None)
     return waiting
 
 

@@ -19,7 +19,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.sweep.folder import SweepFolder, TaskSize, check_made_here, open_folder
-from sagline.sweep.request import Part, Request, Variable, variables_of
+from sagline.sweep.request import Request, RequestBox, SweepArray, variables_of
 from sagline.sweep.shared_proofs import proofs_of
 from sagline.tension.options import kernel_options
 from sagline.workspaces.margin import MarginStatus
@@ -49,11 +49,11 @@ class Counts(NamedTuple):
     lost: int
 
 
-def numbers_of(request: Request, part: Part) -> dict[str, NDArray[np.generic]]:
+def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[np.generic]]:
     """All variables of a part by name, (poses, wrenches[, cables]): NaN for missing cables and results."""
     asked = variables_of(request.quantities)
     shape = part.shape
-    filled: dict[str, NDArray[np.generic]] = {each.name: _room(each, shape, request.cable_count) for each in asked}
+    filled: dict[str, NDArray[np.generic]] = {each.name: _empty(each, shape, request.cable_count) for each in asked}
     robot = request.robots[part.robot]
     solvers = [kind(request, robot) for kind, names in SOLVERS.items() if names.intersection(request.quantities)]
     for piece in part.pieces(ROWS):
@@ -70,7 +70,7 @@ def numbers_of(request: Request, part: Part) -> dict[str, NDArray[np.generic]]:
     return filled
 
 
-def counts_of(numbers: dict[str, NDArray[np.generic]]) -> Counts:
+def count_outcomes(numbers: dict[str, NDArray[np.generic]]) -> Counts:
     """Counts of a part from its variables."""
     name, ends = ("status", INVERSE_ENDS) if "status" in numbers else ("margin_status", MARGIN_ENDS)
     status = numbers[name]
@@ -85,7 +85,7 @@ class _Inverse:
         self._request, self._robot = request, robot
         self._options = kernel_options(robot, request.model, request.tension)
 
-    def answers(self, part: Part) -> dict[str, NDArray[Any]]:
+    def answers(self, part: RequestBox) -> dict[str, NDArray[Any]]:
         """Variables of a part, (N,) or (N, m)."""
         request = self._request
         poses, loads = _rows(request.poses, part.poses), request.wrenches[part.wrenches]
@@ -113,7 +113,7 @@ class _Margins:
         self._request = request
         self._rows = MarginRows(robot, request.around, request.model, request.moment_arm)
 
-    def answers(self, part: Part) -> dict[str, NDArray[Any]]:
+    def answers(self, part: RequestBox) -> dict[str, NDArray[Any]]:
         """Variables of a part, (N,)."""
         poses = _rows(self._request.poses, part.poses)
         found = [self._rows.about(load).rows(poses) for load in self._request.wrenches[part.wrenches]]
@@ -132,7 +132,7 @@ def _rows(poses: Pose, part: slice) -> Array:
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
-def _room(variable: Variable, shape: tuple[int, int], cables: int) -> NDArray[np.generic]:
+def _empty(variable: SweepArray, shape: tuple[int, int], cables: int) -> NDArray[np.generic]:
     whole = (*shape, cables) if variable.a_cable else shape
     return np.full(whole, -1 if variable.type == "int8" else np.nan, dtype=variable.type)
 
@@ -158,9 +158,9 @@ def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]
     opened = _opened(folder, digest)
     numbers = opened.read(number)  # written by a worker that ended before it reported
     if numbers is None:
-        numbers = numbers_of(opened.request, opened.part(number))
+        numbers = compute_variables(opened.request, opened.part(number))
         opened.write(number, numbers)
-    return time.perf_counter() - start, tuple(counts_of(numbers))
+    return time.perf_counter() - start, tuple(count_outcomes(numbers))
 
 
 @lru_cache(maxsize=4)
@@ -177,18 +177,18 @@ def _opened(folder: str, digest: str) -> SweepFolder:
 def found_counts(folder: SweepFolder, number: int) -> Counts | None:
     """Counts of a task whose chunks are whole on the disk; None where one is missing or torn."""
     numbers = folder.read(number)
-    return None if numbers is None else counts_of(numbers)
+    return None if numbers is None else count_outcomes(numbers)
 
 
 def measured_size(request: Request) -> TaskSize:
     """Task size of suitable duration, from the measured time of some requests."""
     places = np.linspace(0, len(request) - 1, min(SAMPLES, len(request))).astype(np.int64)
     parts = [_sample(place, request) for place in np.transpose(np.unravel_index(places, request.shape))]
-    numbers_of(request, parts[0])  # loads the machine code
+    compute_variables(request, parts[0])  # loads the machine code
     count, seconds = 0, 0.0
     for part in parts:
         start = time.process_time()  # others may keep the processor busy
-        numbers_of(request, part)
+        compute_variables(request, part)
         seconds += time.process_time() - start
         count += part.shape[0] * part.shape[1]
         if seconds > TIMED or count >= len(request):
@@ -206,10 +206,10 @@ def _size(rows: int, poses: int, wrenches: int) -> TaskSize:
     return TaskSize(min(poses, max(1, rows // wide)), wide)
 
 
-def _sample(place: Indices, request: Request) -> Part:
+def _sample(place: Indices, request: Request) -> RequestBox:
     """A few requests from one place on: robot, pose and wrench, (3,)."""
     robot, pose, wrench = (int(k) for k in place)
     _, poses, wrenches = request.shape
     tall, wide = _size(SAMPLE, poses, wrenches)
     first, left = min(pose, poses - tall), min(wrench, wrenches - wide)
-    return Part(robot, slice(first, first + tall), slice(left, left + wide))
+    return RequestBox(robot, slice(first, first + tall), slice(left, left + wide))
