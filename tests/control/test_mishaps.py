@@ -76,7 +76,7 @@ def link_that_bursts(control: Any, once: bool) -> None:
 
 BURSTS: list[tuple[Any, bool]] = [
     (lambda control: setattr(control._context.estimator._solver, "step_into", burst), True),
-    (lambda control: setattr(control._loop.active.course, "step", burst), True),
+    (lambda control: setattr(control._loop.active.source, "step", burst), True),
     (lambda control: setattr(control._context.faults[0], "look", burst), True),
     (lambda control: link_that_bursts(control, once=True), True),
     (lambda control: link_that_bursts(control, once=False), False),

@@ -11,7 +11,7 @@ import pytest
 
 from sagline.control import Mode, Sample
 from sagline.plc import block_link
-from sagline.plc.block_link import BlockLink, Group
+from sagline.plc.block_link import BlockLink, GroupThread
 from sagline.plc.blocks import CLAIM, FROM_PLC, TO_PLC, Block, Refusal
 from sagline.plc.modbus_link import ModbusWire
 from sagline.plc.s7_link import S7Wire
@@ -160,7 +160,7 @@ def test_what_waited_too_long_for_a_connection_is_never_written(late: float, wri
             return True
 
     clock, wire = [0.0], Wire()
-    group = Group(1, 2, wire, lambda: clock[0])
+    group = GroupThread(1, 2, wire, lambda: clock[0])
     group.hand_over(TO_PLC, b"command")
     group.start()
     group.settled.wait(PATIENCE)
@@ -174,7 +174,7 @@ class Scripted:
 
     def __init__(self, *answers: bytes | Exception, step: float = 0.01) -> None:
         self.answers, self.time, self.step = list(answers), 0.0, step
-        self.group = Group(0, 2, self, self.clock)
+        self.group = GroupThread(0, 2, self, self.clock)
         self.counters, self.troubles = list[int | None](), list[str]()
 
     def clock(self) -> float:

@@ -1,4 +1,4 @@
-"""CandidatePoses of calibration poses: feasible poses of a box, each with several sets of tensions; short tours."""
+"""Candidates of calibration poses: feasible poses of a box, each with several sets of tensions; short tours."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ class Information:
     Attributes:
         rows: Slopes of the readings by the numbers, shape (N, k, P).
         covariance: Of the parameters, by the prior and the chosen candidates, shape (P, P).
-        chosen: CandidatePoses that were taken, in this order.
+        chosen: Chosen candidates, in order.
     """
 
     def __init__(self, rows: Array, known: Array) -> None:

@@ -15,7 +15,7 @@ from sagline.control.homing import Homing, HomingJog, tension_limits
 from sagline.control.jogging import PlatformJog
 from sagline.control.link import Missing, Mode, Sample
 from sagline.control.recording import EventKind
-from sagline.control.set_points import Along, Course, Ramp, SetPoint, Standing
+from sagline.control.set_points import Along, Ramp, SetPoint, SetPointSource, Standing
 from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from sagline.kinematics.status import ForwardStatus
@@ -31,12 +31,12 @@ class ActiveState(ABC):
     Attributes:
         context: Shared by all states.
         point: Set point of the command that goes out next; None where the drives rest.
-        course: Source of the set points; None where nothing is followed.
+        source: Source of the set points; None where nothing is followed.
     """
 
-    def __init__(self, context: Context, point: SetPoint | None = None, course: Course | None = None) -> None:
+    def __init__(self, context: Context, point: SetPoint | None = None, source: SetPointSource | None = None) -> None:
         """Take over set points from the state before."""
-        self.context, self.point, self.course = context, point, course
+        self.context, self.point, self.source = context, point, source
         self._equilibrium: Future[Standing | ForwardStatus] | None = None
 
     @abstractmethod
@@ -56,10 +56,10 @@ class ActiveState(ABC):
         self.point = None
         self.context.sender.rest(mode, enabled=enabled, claims=self.context.state is State.CONNECTING)
 
-    def follow(self, course: Course) -> None:
+    def follow(self, source: SetPointSource) -> None:
         """Command the next set point, with the correction of the tension loop."""
         c = self.context
-        due, point = self.point, course.step()
+        due, point = self.point, source.step()
         row, sample = point.row, c.sample
         if c.tension_loop is not None and row is not None and sample is not None and c.state in LOOP_ON:
             planned = point.tension if due is None else due.tension
@@ -171,7 +171,7 @@ class Emergency(ActiveState):
         c.end_run(ExecutionStatus.EMERGENCY, line)
         c.homed = False
         c.enter(State.EMERGENCY, line)
-        super().__init__(c, course=before.course)
+        super().__init__(c, source=before.source)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
         """Lock."""
@@ -200,11 +200,11 @@ class HomingState(ActiveState):
     def jog(self, winch: int, by: float) -> None:
         """Begin to jog one winch [m] while the others have no power and only tensions are watched."""
         c = self.context
-        if c.sample is None or self.course is not None:
+        if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
         self._largest_tension = tension_limits(self.homing, c.sample)
         begin = SetPoint(c.sample.length, np.zeros(len(c.zero)), c.unknown, c.sender.tension, None, None, np.nan, False)
-        self.course = HomingJog(begin, winch, by, c.period)
+        self.source = HomingJog(begin, winch, by, c.period)
         c.say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
 
     def next(self, answer: Sample | Missing) -> ActiveState:
@@ -212,14 +212,14 @@ class HomingState(ActiveState):
         c, sample, homing = self.context, self.context.sample, self.homing
         if sample is None:
             pass
-        elif self.course is not None:
+        elif self.source is not None:
             line = self._reason_to_end(sample)
             if line:
                 c.say(EventKind.NOTE, "jog", f"the jog ended: {line}")
             elif self.point is None or not self.point.done:
-                self.follow(self.course)
+                self.follow(self.source)
                 return self
-            self.course = None
+            self.source = None
             c.sender.stand_at(sample)
             homing.rest()
         elif homing.look(sample):
@@ -253,22 +253,24 @@ class HomingState(ActiveState):
 
 
 class Following(ActiveState):
-    """IDLE, MOVING, JOGGING or PAUSING: set points of a course, one in each cycle."""
+    """IDLE, MOVING, JOGGING or PAUSING: set points of a source, one in each cycle."""
 
-    def __init__(self, context: Context, state: State, text: str, point: SetPoint | None, course: Course) -> None:
+    def __init__(
+        self, context: Context, state: State, text: str, point: SetPoint | None, source: SetPointSource
+    ) -> None:
         """Enter one of them at the set point that was sent last."""
         context.enter(state, text)
-        super().__init__(context, point, course)
-        self._source = course
+        super().__init__(context, point, source)
+        self._followed = source
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """The next set point; at the end of the course IDLE."""
+        """The next set point; at the end of the source IDLE."""
         point = self.point
         if self.context.state is not State.IDLE and point is not None and point.done:
             after = self._finish(point)
             if after is not self:
                 return after.next(answer)
-        self.follow(self._source)
+        self.follow(self._followed)
         return self
 
     def stop(self) -> ActiveState:
@@ -279,17 +281,17 @@ class Following(ActiveState):
 
     def _finish(self, point: SetPoint) -> ActiveState:
         """The state after the last set point was sent."""
-        c, course = self.context, self.course
-        if isinstance(course, PlatformJog) and course.failed and course.stops_hard:
-            return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, course.failed)
-        if isinstance(course, Along) and course.motion.plan is not None:
-            if course.at_end:
+        c, source = self.context, self.source
+        if isinstance(source, PlatformJog) and source.failed and source.stops_hard:
+            return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, source.failed)
+        if isinstance(source, Along) and source.motion.plan is not None:
+            if source.at_end:
                 c.end_run(ExecutionStatus.DONE, "the end of the plan")
-                c.previous_plan = course.motion.plan
+                c.previous_plan = source.motion.plan
             else:
                 c.end_run(ExecutionStatus.PAUSED, "paused; resume goes on")
-                c.run.paused = course
-            return Following(c, State.IDLE, c.run.reason, point, Standing(point, course.pose))
+                c.run.paused = source
+            return Following(c, State.IDLE, c.run.reason, point, Standing(point, source.pose))
         after = self.settle(point.length, ExecutionStatus.DONE, "the jog ended")
         return after or Stopping(self, State.FAULT, ExecutionStatus.FAULT, POSE_LOST)
 
@@ -303,13 +305,13 @@ class Stopping(ActiveState):
 
     def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:
         """Begin the ramp; status and reason are those of the motion."""
-        c, point, course = before.context, before.point, before.course
+        c, point, source = before.context, before.point, before.source
         if point is not None:
             point = point._replace(done=False)
-            course = Ramp(point, c.period)
+            source = Ramp(point, c.period)
         c.run.status, c.run.reason, c.run.paused = status, reason, None
         c.enter(State.STOPPING, reason)
-        super().__init__(c, point, course)
+        super().__init__(c, point, source)
         self.after = after
 
     def next(self, answer: Sample | Missing) -> ActiveState:
@@ -318,8 +320,8 @@ class Stopping(ActiveState):
             after = self._finish()
             if after is not self:
                 return after.next(answer)
-        if self.course is not None:
-            self.follow(self.course)
+        if self.source is not None:
+            self.follow(self.source)
         return self
 
     def fail(self, line: str) -> ActiveState:

@@ -17,7 +17,7 @@ from sagline.control.link import Link
 from sagline.control.preparation import Preparation
 from sagline.control.real_time import Pace, load_kernels
 from sagline.control.recording import Recorder
-from sagline.control.set_points import Along, Course, SetPoint, Standing
+from sagline.control.set_points import Along, SetPoint, SetPointSource, Standing
 from sagline.control.states import RefusedError, State, check_transition
 from sagline.control.tension_loop import TensionSettings
 from sagline.core.arguments import instance
@@ -208,8 +208,8 @@ class Controller(Preparation):
         here, length = self._here(), self._set_point("the jog").length
         motion = self._result_of(lambda: winch_jog(c.robot, length, here, chosen, far, c.period, c.model))
         check_transition(self.state, State.JOGGING, "the jog")
-        course = Along(motion, c.period, np.zeros(len(length)))
-        self._begin(State.JOGGING, course, motion, f"winch {chosen} by {1e3 * far:+g} mm")
+        source = Along(motion, c.period, np.zeros(len(length)))
+        self._begin(State.JOGGING, source, motion, f"winch {chosen} by {1e3 * far:+g} mm")
 
     def jog(self, winch: int, by: float) -> None:
         """Jog one winch, and wait for its end.
@@ -237,9 +237,9 @@ class Controller(Preparation):
         check_transition(self.state, State.JOGGING, "the jog")
         c.check_agreement("the jog")
         here, point = self._here(), self._set_point("the jog")
-        course = self._result_of(lambda: PlatformJog(c.robot, point, here, far, c.period, c.model, c.method))
+        source = self._result_of(lambda: PlatformJog(c.robot, point, here, far, c.period, c.model, c.method))
         check_transition(self.state, State.JOGGING, "the jog")
-        self._begin(State.JOGGING, course, None, "the platform")
+        self._begin(State.JOGGING, source, None, "the platform")
 
     def jog_platform(self, by: ArrayLike) -> None:
         """Jog the platform, and wait for its end.
@@ -276,11 +276,11 @@ class Controller(Preparation):
         """
         check_transition(self.state, State.PAUSING, "pausing")
         active = self._loop.active
-        if not isinstance(active.course, Along):
+        if not isinstance(active.source, Along):
             raise RefusedError("pausing", "no path is being followed", "Stop instead: stop().")
-        active.course.pause()
-        text = f"at {active.course.clock:.2f} s of the path"
-        self._loop.active = Following(self._context, State.PAUSING, text, active.point, active.course)
+        active.source.pause()
+        text = f"at {active.source.clock:.2f} s of the path"
+        self._loop.active = Following(self._context, State.PAUSING, text, active.point, active.source)
 
     def resume(self) -> None:
         """Go on where `pause` stopped.
@@ -294,21 +294,21 @@ class Controller(Preparation):
             raise RefusedError("resuming", "no path was paused here", "Begin one with start(path).")
         self._context.check_agreement("resuming")
         check_start(self.robot, self.estimate, run.paused.pose)
-        course, run.paused = run.paused, None
-        course.resume()
-        self._follow(State.MOVING, course, f"goes on at {course.clock:.2f} s of the path")
+        source, run.paused = run.paused, None
+        source.resume()
+        self._follow(State.MOVING, source, f"goes on at {source.clock:.2f} s of the path")
 
     # shared by the methods above
 
-    def _begin(self, state: State, course: Course, motion: Motion | None, text: str) -> None:
-        """Begin to follow a course, and its record."""
+    def _begin(self, state: State, source: SetPointSource, motion: Motion | None, text: str) -> None:
+        """Begin to follow a source, and its record."""
         self._context.begin_run(motion)
-        self._follow(state, course, text)
+        self._follow(state, source, text)
 
-    def _follow(self, state: State, course: Course, text: str) -> None:
+    def _follow(self, state: State, source: SetPointSource, text: str) -> None:
         point = self._set_point(text)._replace(done=False)
         self._context.continue_run()
-        self._loop.active = Following(self._context, state, text, point, course)
+        self._loop.active = Following(self._context, state, text, point, source)
 
     def _set_point(self, what: str) -> SetPoint:
         """The set point at rest, from which a motion begins."""
@@ -319,6 +319,6 @@ class Controller(Preparation):
 
     def _here(self) -> Pose:
         """The planned pose of the platform at rest, with which the estimate agrees except for noise."""
-        course = self._loop.active.course
-        pose = course.pose if isinstance(course, Standing) else None
+        source = self._loop.active.source
+        pose = source.pose if isinstance(source, Standing) else None
         return self.estimate if pose is None else pose

@@ -88,10 +88,10 @@ class Monitor:
     @property
     def clock(self) -> tuple[float, float] | None:
         """Time on the path, and its duration [s]; None where no path is followed."""
-        course = self._loop.active.course
-        if not isinstance(course, Along):
+        source = self._loop.active.source
+        if not isinstance(source, Along):
             return None
-        return course.clock, self.period * (len(course.motion) - 1)
+        return source.clock, self.period * (len(source.motion) - 1)
 
     @property
     def execution(self) -> Execution | None:
@@ -113,4 +113,4 @@ class Monitor:
     @property
     def moving(self) -> bool:
         """True if set points change."""
-        return self.state in MOTION and not (self.state is State.HOMING and self._loop.active.course is None)
+        return self.state in MOTION and not (self.state is State.HOMING and self._loop.active.source is None)

@@ -69,7 +69,7 @@ class Preparation(Monitor):
         c, active = self._context, self._loop.active
         if not isinstance(active, HomingState):
             check_transition(self.state, State.HOMING, "homing")
-        elif active.course is not None:
+        elif active.source is not None:
             raise RefusedError("homing", "a winch is being jogged", "Wait until it stands.")
         place = instance(pose, Pose, "pose")
         homing = self._result_of(lambda: Homing(c.robot, place, c.model, c.method))

@@ -34,7 +34,7 @@ class SetPoint(NamedTuple):
         wrench: External plus inertial, on the platform [N, N m], shape (6,); None for none.
         row: Matrices of the tension loop there; None where there are none.
         clock: On the plan [s]; NaN beside one.
-        done: Whether the course ends here.
+        done: Whether the source ends here.
         enable: Drives that may move, shape (m,); None for all.
         leading: Whether the lengths at rest still change to those of a plan: tensions are not the plan's yet.
     """
@@ -51,7 +51,7 @@ class SetPoint(NamedTuple):
     leading: bool = False
 
 
-class Course(Protocol):
+class SetPointSource(Protocol):
     """Source of one set point in each cycle."""
 
     def step(self) -> SetPoint:

@@ -29,11 +29,11 @@ from sagline.robot.robot import Robot
 BLOCK = 1024  # poses
 
 
-class Distances(NamedTuple):
+class _Distances(NamedTuple):
     """Distances of P pairs at N poses.
 
     Attributes:
-        value: Distances less radii [m], shape (N, P); NaN where a cable has no tension.
+        value: _Distances less radii [m], shape (N, P); NaN where a cable has no tension.
         low: Proved lower bounds [m], shape (N, P).
         nearest: Nearest points, on the middle lines of cables and rods [m], shape (N, P, 2, 3).
     """
@@ -64,7 +64,7 @@ class ClearanceRows:
         self._precision = precision
         self._radius = cable_radius
         self._from_anchor = 0.0 if from_anchor is None else from_anchor
-        self._platform = platform_of(robot) if platform is None else platform
+        self._platform = _platform_of(robot) if platform is None else platform
         self.pairs = pairs_of(robot, obstacles, self._platform, from_anchor=from_anchor is not None)
         still = [rod_row(one) if isinstance(one, Capsule | Sphere) else _box_row(one) for one in obstacles]
         self._still = locked(np.array(still).reshape(-1, shapes.COLUMNS))
@@ -74,11 +74,11 @@ class ClearanceRows:
 
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
-    def distances(self, state: Equilibrium, *, together: bool = False) -> Distances:
+    def distances(self, state: Equilibrium, *, together: bool = False) -> _Distances:
         """Least distance of every pair at every pose; with `together` only the least of all pairs is exact."""
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
-        out = Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
+        out = _Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
         known, memory = len(self.pairs.by_kernel), work_arrays_for_pieces()  # of its own: threads may measure at once
         for part in blocks(count, BLOCK):
             own = state if single else state[part]
@@ -88,7 +88,7 @@ class ClearanceRows:
             for whole, piece in zip(out, some, strict=True):
                 whole[part, :known] = piece
             if self._meshed is not None:
-                rest = Distances(*(whole[part, known:] for whole in out))
+                rest = _Distances(*(whole[part, known:] for whole in out))
                 least = out.value[part, :known].min(axis=1, initial=np.inf)
                 self._meshed.measure(own.pose, moving, least if together else None, rest)
             lost = np.isnan(np.atleast_2d(own.free_length)).any(axis=1)
@@ -122,7 +122,7 @@ def _box_row(one: Box | Mesh) -> Array:
     return box_rows(one if isinstance(one, Box) else Box(np.ones(3)))
 
 
-def platform_of(robot: Robots) -> Box | None:
+def _platform_of(robot: Robots) -> Box | None:
     """Platform as a box of its size around its anchors; None without a size, refused if robots differ."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:

@@ -34,7 +34,7 @@ _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))  # of a box's cor
 _FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
 
 
-class Solid(NamedTuple):
+class _Solid(NamedTuple):
     """A body as fcl has it.
 
     Attributes:
@@ -52,7 +52,7 @@ class Solid(NamedTuple):
     place: tuple[Array, Array]
 
 
-class Nearest(NamedTuple):
+class _Nearest(NamedTuple):
     """Distance [m], its proved lower bound, and the nearest points."""
 
     value: float
@@ -90,7 +90,7 @@ class Meshed:
                 if least is not None:
                     enough = min(enough, found.value)
 
-    def _solid(self, form: Form | None) -> Solid:
+    def _solid(self, form: Form | None) -> _Solid:
         still = np.eye(3), np.zeros(3)
         if isinstance(form, Box):
             form = Mesh(_SIGNS * form.size @ form.orientation.T + form.center, _FACES, form.name)
@@ -99,12 +99,12 @@ class Meshed:
             model.beginModel(len(form.vertices), len(form.faces))
             model.addSubModel(np.array(form.vertices), np.array(form.faces))
             model.endModel()
-            return Solid(model, 0.0, form, form.vertices[form.faces[0, 0]], still)
+            return _Solid(model, 0.0, form, form.vertices[form.faces[0, 0]], still)
         if isinstance(form, Capsule):
             place, length = _along(form.start, form.end)
-            return Solid(self._fcl.Capsule(0.0, length), form.radius, None, form.start, place)
+            return _Solid(self._fcl.Capsule(0.0, length), form.radius, None, form.start, place)
         assert isinstance(form, Sphere)
-        return Solid(self._fcl.Capsule(0.0, 0.0), form.radius, None, form.center, (np.eye(3), form.center))
+        return _Solid(self._fcl.Capsule(0.0, 0.0), form.radius, None, form.center, (np.eye(3), form.center))
 
     def _object(self, number: int, at: dict[int, tuple[Array, Array]]) -> Any:
         solid = self._solids[number]
@@ -116,13 +116,13 @@ class Meshed:
         distance = max(float(self._fcl.distance(one, other, request, result)), 0.0)
         return distance, *result.nearest_points
 
-    def _of_solids(self, i: int, j: int, at: dict[int, tuple[Array, Array]]) -> Nearest:
+    def _of_solids(self, i: int, j: int, at: dict[int, tuple[Array, Array]]) -> _Nearest:
         one, other = self._solids[i], self._solids[j]
         distance, a, b = self._apart(self._object(i, at), self._object(j, at))
         if distance > 0.0 and (self._within(one.inner, i, j, at) or self._within(other.inner, j, i, at)):
             distance = 0.0
         radii = one.radius + other.radius
-        return Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
+        return _Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
 
     def _within(self, point: Array, of: int, number: int, at: dict[int, tuple[Array, Array]]) -> bool:
         """True if a point of a body, in its own frame, lies in another's solid."""
@@ -140,7 +140,7 @@ class Meshed:
             self._known[key] = bool(mesh.encloses(point))
         return self._known[key]
 
-    def _of_cable(self, row: Array, number: int, at: dict[int, tuple[Array, Array]], enough: float) -> Nearest:
+    def _of_cable(self, row: Array, number: int, at: dict[int, tuple[Array, Array]], enough: float) -> _Nearest:
         """Distance of a cable, by branch and bound over its pieces."""
         body, radius = self._object(number, at), float(row[shapes.RADIUS])
         enough += radius
@@ -172,7 +172,7 @@ class Meshed:
 
         look_at([(float(row[shapes.FIRST]), float(row[shapes.LAST]))])
         if self._within(_pieces(row, [(nearest[1], nearest[1])])[0, :3].copy(), -1, number, at):
-            return Nearest(-radius, -radius, nearest[2], nearest[2])
+            return _Nearest(-radius, -radius, nearest[2], nearest[2])
         while waiting:
             low, _, begin, end, bulge = heapq.heappop(waiting)
             if low >= min(nearest[0], enough) - self._precision or bulge == 0.0 or looked > _PIECES:
@@ -182,7 +182,7 @@ class Meshed:
             look_at([(begin, middle), (middle, end)])
         if nearest[0] < enough + self._precision:
             nearest = _polished(at_share, nearest, row)
-        return Nearest(nearest[0] - radius, _proved(proved, nearest[0], nearest[2]) - radius, nearest[2], nearest[3])
+        return _Nearest(nearest[0] - radius, _proved(proved, nearest[0], nearest[2]) - radius, nearest[2], nearest[3])
 
 
 def package() -> ModuleType:

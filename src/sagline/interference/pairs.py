@@ -18,7 +18,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 
 
-class Part(NamedTuple):
+class _CablePart(NamedTuple):
     """A whole cable, or a cable without an end at the frame, at the platform, or both."""
 
     cable: int
@@ -28,7 +28,7 @@ class Part(NamedTuple):
 
 def cable_rows(state: Equilibrium, radius: Array) -> Array:
     """Rows of cables from the exit point on, radius (m,) or (N, m) [m]; NaN where there is no tension."""
-    cables, ends = state.cables, platform_ends(state)
+    cables, ends = state.cables, _platform_ends(state)
     exits = state.exit_point
     out = np.zeros((*cables.shape, shapes.COLUMNS))
     out[..., shapes.PLACE : shapes.PLACE + 3] = exits
@@ -52,7 +52,7 @@ def cable_rows(state: Equilibrium, radius: Array) -> Array:
     return out
 
 
-def platform_ends(state: Equilibrium) -> Array:
+def _platform_ends(state: Equilibrium) -> Array:
     """Platform ends of the cables in the world [m], shape (m, 3) or (N, m, 3)."""
     anchors = anchors_of(state.robot).platform
     if anchors.ndim == 2:
@@ -61,7 +61,7 @@ def platform_ends(state: Equilibrium) -> Array:
     return np.asarray(turned + state.pose.position[:, None])
 
 
-def parts_of(cables: Array, lengths: Array, parts: tuple[Part, ...], left_out: float) -> Array:
+def parts_of(cables: Array, lengths: Array, parts: tuple[_CablePart, ...], left_out: float) -> Array:
     """Rows (N, len(parts), COLUMNS) of parts of cables, without an unstrained length `left_out` [m] of an end."""
     out = cables[:, [part.cable for part in parts]]
     for k, part in enumerate(parts):
@@ -116,11 +116,14 @@ class Pairs(NamedTuple):
         left_out: Pairs that are not measured, with the reason.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[_CablePart, ...]
     by_kernel: Indices
     with_mesh: Indices
     names: tuple[tuple[str, str], ...]
     left_out: tuple[str, ...]
+
+
+Body = _CablePart | int  # part of a cable, -1 for the platform, or the number of an obstacle
 
 
 def pairs_of(
@@ -129,7 +132,7 @@ def pairs_of(
     """All pairs of a robot and its obstacles; pairs that share an anchor are left out unless `from_anchor`."""
     at_frame, at_platform = (_together(anchors) for anchors in anchors_of(robot))
     cables = range(len(at_frame))
-    found: list[tuple[Part | int, Part | int]] = []  # a cable's part, -1 the platform, or the number of an obstacle
+    found: list[tuple[Body, Body]] = []  # a cable's part, -1 the platform, or the number of an obstacle
     left_out: list[str] = []
     for i, j in combinations(cables, 2):
         shared = bool(at_frame[i, j]), bool(at_platform[i, j])
@@ -137,26 +140,26 @@ def pairs_of(
             where = " and ".join(name for name, there in zip(("frame", PLATFORM), shared, strict=True) if there)
             left_out.append(f"cable {i} and cable {j}: they share their anchor on the {where}")
         else:
-            found.append((Part(i, *shared), Part(j, *shared)))
-    found += [(Part(i, off_frame=from_anchor), k) for k in range(len(obstacles)) for i in cables]
+            found.append((_CablePart(i, *shared), _CablePart(j, *shared)))
+    found += [(_CablePart(i, off_frame=from_anchor), k) for k in range(len(obstacles)) for i in cables]
     if platform is not None:
         found += [(-1, k) for k in range(len(obstacles))]
-        found += [(Part(i, off_platform=True), -1) for i in cables if from_anchor]
+        found += [(_CablePart(i, off_platform=True), -1) for i in cables if from_anchor]
         left_out += [] if from_anchor else [_NO_LENGTH]
-    parts = tuple(dict.fromkeys(one for pair in found for one in pair if isinstance(one, Part)))
+    parts = tuple(dict.fromkeys(one for pair in found for one in pair if isinstance(one, _CablePart)))
     forms = (platform, *obstacles)
     own = _names(obstacles)
 
-    def number(one: Part | int) -> int:
-        return parts.index(one) if isinstance(one, Part) else len(parts) + 1 + one
+    def number(one: Body) -> int:
+        return parts.index(one) if isinstance(one, _CablePart) else len(parts) + 1 + one
 
-    def name(one: Part | int) -> str:
-        return f"cable {one.cable}" if isinstance(one, Part) else PLATFORM if one < 0 else own[one]
+    def name(one: Body) -> str:
+        return f"cable {one.cable}" if isinstance(one, _CablePart) else PLATFORM if one < 0 else own[one]
 
-    def form(one: Part | int) -> object:
-        return one if isinstance(one, Part) else forms[1 + one]
+    def form(one: Body) -> object:
+        return one if isinstance(one, _CablePart) else forms[1 + one]
 
-    def in_order(pair: tuple[Part | int, Part | int]) -> tuple[Part | int, Part | int]:
+    def in_order(pair: tuple[Body, Body]) -> tuple[Body, Body]:
         boxes = [isinstance(form(one), Box) for one in pair]
         return pair[::-1] if boxes == [True, False] else pair  # kernels take a box behind what is none
 

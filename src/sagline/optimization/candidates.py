@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, Flags, Indices, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import check_fields, checked_by, reduced
 from sagline.kernels import tables
-from sagline.optimization.free import Bound, Free, FreeCable, Part
+from sagline.optimization.free import Bound, DesignVariable, Free, FreeCable
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
@@ -30,7 +30,7 @@ class Candidates:
         self.robot = robot
         self.free = free_parts(free, item)
         self._bound: list[Bound] = [one.bound(robot, f"{item}[{k}]") for k, one in enumerate(self.free)]
-        self.parts: tuple[Part, ...] = tuple(part for bound in self._bound for part in bound.parts)
+        self.parts: tuple[DesignVariable, ...] = tuple(part for bound in self._bound for part in bound.parts)
         names = [part.name for part in self.parts]
         for name in names:
             if names.count(name) > 1:
@@ -136,7 +136,7 @@ def impossible(cables: Array) -> Flags:
     return np.asarray((apart < COINCIDENT).any(axis=-1) | crossed.any(axis=-1))
 
 
-class Solid:
+class PlatformBox:
     """Platform as a box at G poses, which no frame anchor may enter."""
 
     def __init__(self, robot: Robot, poses: Pose) -> None:

@@ -20,7 +20,7 @@ from sagline.kernels import tables
 from sagline.robot.robot import Robot
 
 
-class Part(NamedTuple):
+class DesignVariable(NamedTuple):
     """One design variable.
 
     Attributes:
@@ -48,7 +48,7 @@ class Bound(NamedTuple):
         write: Changes cable tables (N, m, CABLE_COLUMNS) in place, by the parts' values (N, K).
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[DesignVariable, ...]
     write: Callable[[Array, Array], None]
 
 
@@ -180,7 +180,7 @@ class FreeCable(Free):
             pairs = ((own.linear_density, one.cable.linear_density), (own.axial_stiffness, one.cable.axial_stiffness))
             limits = one.tension_max is None or bool(np.allclose(robot.tension_max, one.tension_max, rtol=SAME))
             if limits and all(np.allclose(mine, its, rtol=SAME, atol=0.0) for mine, its in pairs):
-                part = Part("cable", "", 0.0, float(len(self.catalogue) - 1), float(k), len(self.catalogue))
+                part = DesignVariable("cable", "", 0.0, float(len(self.catalogue) - 1), float(k), len(self.catalogue))
                 return Bound((part,), partial(_write_cables, self.catalogue))
         density, stiffness = own.linear_density[0], own.axial_stiffness[0]
         value = f"{1e3 * density:g} g/m, {stiffness:g} N, up to {robot.tension_max[0]:g} N"
@@ -255,4 +255,4 @@ class FreeLimit(Free):
         def write(tables_of_cables: Array, values: Array) -> None:
             tables_of_cables[:, cables, LIMITS[self.which]] = values
 
-        return Bound((Part(name, "N", self.low, self.high, start),), write)
+        return Bound((DesignVariable(name, "N", self.low, self.high, start),), write)

@@ -15,7 +15,15 @@ from sagline.core.arrays import Array, checked, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import set_fields
 from sagline.kernels import tables
-from sagline.optimization.free import Bound, Free, Part, cable_numbers, cables_of_robot, check_order, whose_text
+from sagline.optimization.free import (
+    Bound,
+    DesignVariable,
+    Free,
+    cable_numbers,
+    cables_of_robot,
+    check_order,
+    whose_text,
+)
 from sagline.robot.robot import Robot
 
 Symmetry: TypeAlias = str
@@ -159,7 +167,7 @@ class FreeAnchors(Free):
         """Design variables of a given robot."""
         cables = cables_of_robot(self.cables, robot, f"{item}: cables")
         anchors = robot.frame_anchors if self.end == "frame" else robot.platform_anchors
-        parts: list[Part] = []
+        parts: list[DesignVariable] = []
         rates: list[Array] = []
         names = _direction_names(self.along)
         shifts = _symmetric_shifts(self.symmetry, anchors[cables], self.along, (self.low, self.high), item)
@@ -171,7 +179,7 @@ class FreeAnchors(Free):
                     continue
                 whose = cables if which is None else cables[which : which + 1]
                 named = f"{self.end}_anchors{whose_text(whose, robot.cable_count)} {name}"
-                parts.append(Part(named, "m", float(self.low[k]), float(self.high[k]), 0.0))
+                parts.append(DesignVariable(named, "m", float(self.low[k]), float(self.high[k]), 0.0))
                 rates.append(rate)
         if not parts:
             step = "Leave out the symmetry, or the directions across its planes."

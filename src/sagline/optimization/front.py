@@ -19,7 +19,7 @@ from sagline.files.robot_file import dump_robot
 from sagline.files.writing import atomic_files, create_folder, file_stem
 from sagline.optimization.candidates import Candidates
 from sagline.optimization.folder import DesignFolder
-from sagline.optimization.free import Part
+from sagline.optimization.free import DesignVariable
 from sagline.optimization.goals import Goal, heading
 from sagline.optimization.rating import Rating
 from sagline.optimization.request import Request
@@ -53,7 +53,7 @@ class Front(Result):
     goals: tuple[Goal, ...]
     values: Array
     start_values: Array
-    parts: tuple[Part, ...]
+    parts: tuple[DesignVariable, ...]
     changed: Array
     better: bool
     evaluated: Array
@@ -116,7 +116,7 @@ class Front(Result):
 def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
     """Costs (N, g) to minimize from goal values (N, g), scaled and limited to PENALTY; twice that for NaN."""
     signs = np.array([-1.0 if goal.maximize else 1.0 for goal in goals])
-    scales = np.array([scale_of(goal, value) for goal, value in zip(goals, start, strict=True)])
+    scales = np.array([_scale_of(goal, value) for goal, value in zip(goals, start, strict=True)])
     costs = np.nan_to_num(signs * values / scales, nan=2.0 * PENALTY, posinf=PENALTY, neginf=-PENALTY)
     return np.asarray(np.where(np.isnan(values), PENALTY * 2.0, np.clip(costs, -PENALTY, PENALTY)))
 
@@ -124,14 +124,14 @@ def costs_of(values: Array, goals: tuple[Goal, ...], start: Array) -> Array:
 PENALTY = 1e9  # largest cost of a goal, many times more than any value
 
 
-def scale_of(goal: Goal, start: float) -> float:
+def _scale_of(goal: Goal, start: float) -> float:
     """Scale of a goal, in its unit: its own, or the value of the first robot."""
     if goal.scale is not None:
         return goal.scale
     return abs(float(start)) if np.isfinite(start) and start != 0.0 else 1.0
 
 
-def weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
+def _weighted_costs(costs: Array, goals: tuple[Goal, ...]) -> Array:
     """Weighted sum (N,) of costs (N, g)."""
     weights = np.array([goal.weight for goal in goals])
     return np.asarray(np.einsum("ng,g->n", costs, weights / weights.sum()))
@@ -202,7 +202,7 @@ class Ledger:
         if self._progress is not None:
             self._progress(len(self._rows), self._evaluations)
         costs = self._costs(known)
-        return costs if self.costs > 1 else weighted_costs(costs, self._request.goals)[:, None]
+        return costs if self.costs > 1 else _weighted_costs(costs, self._request.goals)[:, None]
 
     def front(self) -> Front:
         """Result: the best candidates as robots."""
@@ -214,7 +214,7 @@ class Ledger:
             which = which[np.isfinite(goals[which]).all(axis=1)]
             which = which[np.argsort(costs[which, 0], kind="stable")]
         else:
-            total = weighted_costs(costs, request.goals)
+            total = _weighted_costs(costs, request.goals)
             which = np.array([np.argmin(total)])
             which = which[total[which] < total[0]]
         better = bool(len(which))

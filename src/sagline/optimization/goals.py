@@ -33,7 +33,7 @@ class Measured(NamedTuple):
     cost: Array | None = None
 
 
-class Kind(NamedTuple):
+class _Kind(NamedTuple):
     """A kind of goal.
 
     Attributes:
@@ -74,13 +74,13 @@ def heading(name: str, unit: str) -> str:
 
 KINDS: Final = MappingProxyType(
     {
-        "workspace_share": Kind("", True, "margin", _share, "share of the poses whose margin is not negative"),
-        "mean_margin": Kind("N", True, "margin", _mean, "mean margin of the poses"),
-        "least_margin": Kind("N", True, "margin", _least, "least margin of the poses"),
-        "largest_tension": Kind("N", False, "tension", _largest, "largest tension"),
-        "largest_sag": Kind("m", False, "sag", _largest, "largest sag"),
-        "least_stiffness": Kind("N/m", True, "stiffness", _least, "least stiffness against a force"),
-        "cable_cost": Kind("", False, "cost", lambda cost: cost, "cost of the cables"),
+        "workspace_share": _Kind("", True, "margin", _share, "share of the poses whose margin is not negative"),
+        "mean_margin": _Kind("N", True, "margin", _mean, "mean margin of the poses"),
+        "least_margin": _Kind("N", True, "margin", _least, "least margin of the poses"),
+        "largest_tension": _Kind("N", False, "tension", _largest, "largest tension"),
+        "largest_sag": _Kind("m", False, "sag", _largest, "largest sag"),
+        "least_stiffness": _Kind("N/m", True, "stiffness", _least, "least stiffness against a force"),
+        "cable_cost": _Kind("", False, "cost", lambda cost: cost, "cost of the cables"),
     }
 )
 AT_POSES: Final = ("tension", "sag", "stiffness")  # which need the load shared

@@ -17,7 +17,7 @@ from sagline.core.numbers import counted, n
 from sagline.core.progress import Progress, blocks
 from sagline.core.results import Result
 from sagline.optimization.candidates import Candidates, free_parts
-from sagline.optimization.free import Free, Part
+from sagline.optimization.free import DesignVariable, Free
 from sagline.optimization.goals import Goal
 from sagline.optimization.rating import Rating, move_anchors
 from sagline.optimization.request import COUNTS, poses_of
@@ -45,7 +45,7 @@ class MovingAnchors(Result):
 
     robot: Robot
     pose: Pose
-    parts: tuple[Part, ...]
+    parts: tuple[DesignVariable, ...]
     moved: Array
     margin: Array
     fixed_margin: Array

@@ -17,7 +17,7 @@ from sagline.kernels.forward.sensitivity import DATA, describe_states
 from sagline.kernels.inverse.poses import inverse_poses
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.inverse_rows import InverseRows
-from sagline.optimization.candidates import AnchorErrors, Candidates, Solid, impossible
+from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBox, impossible
 from sagline.optimization.goals import AT_POSES, Goal, Measured
 from sagline.optimization.search import latin_hypercube
 from sagline.robot.batch import has_routing
@@ -163,7 +163,7 @@ class Rating:
         # the first robot's, so that margins of candidates compare
         self._arm = float(mean_arms(cable_table(candidates.robot), body_table(candidates.robot))[0])
         self._needs = {goal.needs for goal in self._goals}
-        self._solid = Solid(candidates.robot, poses)
+        self._solid = PlatformBox(candidates.robot, poses)
         self._held = np.ones(len(self.rows), dtype=np.bool_)
         if self._needs & set(AT_POSES):
             self._held = self._held_at(candidates.cables(candidates.start[None]))

@@ -12,7 +12,7 @@ from sagline.cables.model import CableModel
 from sagline.core.arguments import brief, choice, instance, optional, whole_number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import tables
-from sagline.optimization.candidates import AnchorErrors, Candidates, Solid, free_parts
+from sagline.optimization.candidates import AnchorErrors, Candidates, PlatformBox, free_parts
 from sagline.optimization.free import Free
 from sagline.optimization.free_anchors import FreeAnchors
 from sagline.optimization.goals import Goal
@@ -175,7 +175,7 @@ def _check_platform(request: Request) -> None:
         points = latin_hypercube(LOOKED_AT, len(candidates.parts), 0)
         values = np.concatenate((candidates.start[None], candidates.values(points)))
         anchors = candidates.cables(values)[..., : tables.FRAME_Z + 1]
-        poses = Solid(request.robot, request.poses).holds(anchors)
+        poses = PlatformBox(request.robot, request.poses).holds(anchors)
         hits = np.argwhere(poses >= 0)
         if not hits.size:
             continue

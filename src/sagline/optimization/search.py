@@ -13,7 +13,7 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 
 
-def extra(module: str) -> Any:
+def _optional_module(module: str) -> Any:
     """Module of an optional package of `sagline[design]`; the error says how to install it."""
     try:
         return import_module(module)
@@ -58,9 +58,9 @@ GROWTH: Final = 2  # of the population, from each beginning to the next
 LEAST_DIMENSIONS: Final = 2  # numbers: with a single one the package fails; a second that means nothing goes along
 
 
-def search_cma(task: Task) -> None:
+def _search_cma(task: Task) -> None:
     """CMA-ES (Hansen & Ostermeier 2001), restarted with a growing population (Auger & Hansen 2005)."""
-    cma = extra("cma")
+    cma = _optional_module("cma")
     first = task.first
     costs = task.rate(first)[:, 0]
     order = iter(np.argsort(costs, kind="stable"))
@@ -91,7 +91,7 @@ def _strategy(cma: Any, start: Array, random: np.random.Generator, population: i
     return cma.CMAEvolutionStrategy(padded, SPREAD, options)
 
 
-def search_differential_evolution(task: Task) -> None:
+def _search_differential_evolution(task: Task) -> None:
     """Differential evolution (Storn & Price 1997)."""
     from scipy.optimize import differential_evolution
 
@@ -114,13 +114,13 @@ def search_differential_evolution(task: Task) -> None:
     )
 
 
-def search_nsga2(task: Task) -> None:
+def _search_nsga2(task: Task) -> None:
     """NSGA-II (Deb, Pratap, Agarwal & Meyarivan 2002)."""
-    evaluator, problems = extra("pymoo.core.evaluator"), extra("pymoo.core.problem")
-    static, termination = extra("pymoo.problems.static"), extra("pymoo.core.termination")
+    evaluator, problems = _optional_module("pymoo.core.evaluator"), _optional_module("pymoo.core.problem")
+    static, termination = _optional_module("pymoo.problems.static"), _optional_module("pymoo.core.termination")
     dimensions = task.first.shape[1]
     problem = problems.Problem(n_var=dimensions, n_obj=task.goals, xl=np.zeros(dimensions), xu=np.ones(dimensions))
-    algorithm = extra("pymoo.algorithms.moo.nsga2").NSGA2(pop_size=len(task.first), sampling=task.first)
+    algorithm = _optional_module("pymoo.algorithms.moo.nsga2").NSGA2(pop_size=len(task.first), sampling=task.first)
     algorithm.setup(problem, termination=termination.NoTermination(), seed=task.seed)
     left = task.evaluations
     while left > 0:
@@ -134,7 +134,7 @@ def search_nsga2(task: Task) -> None:
 
 
 SEARCHES: Final[MappingProxyType[str, Callable[[Task], None]]] = MappingProxyType(
-    {"cma": search_cma, "differential_evolution": search_differential_evolution, "nsga2": search_nsga2}
+    {"cma": _search_cma, "differential_evolution": _search_differential_evolution, "nsga2": _search_nsga2}
 )
 
 

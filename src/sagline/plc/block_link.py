@@ -20,7 +20,7 @@ from sagline.robot.robot import Robot
 RETRY: Final = 0.2  # s between attempts to connect
 
 
-class Newest(NamedTuple):
+class _Newest(NamedTuple):
     """The newest good block of a group.
 
     Attributes:
@@ -34,7 +34,7 @@ class Newest(NamedTuple):
     round_trip: float
 
 
-class Outgoing(NamedTuple):
+class _Outgoing(NamedTuple):
     """Block to be written next.
 
     Attributes:
@@ -48,7 +48,7 @@ class Outgoing(NamedTuple):
     since: float
 
 
-class Group(Thread):
+class GroupThread(Thread):
     """The exchange with one PLC.
 
     Attributes:
@@ -63,7 +63,7 @@ class Group(Thread):
         """Prepare the thread; clock of the link [s]."""
         super().__init__(name=f"sagline group {number}", daemon=True)
         self.number = number
-        self.newest: Newest | None = None
+        self.newest: _Newest | None = None
         self.discarded = 0
         self.trouble: Refusal | None = None
         self.settled = Event()
@@ -71,12 +71,12 @@ class Group(Thread):
         self._wire = wire
         self._clock = clock
         self._kick = Event()
-        self._outgoing: deque[Outgoing] = deque(maxlen=1)  # the newest takes the place of one not yet written
+        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # the newest takes the place of one not yet written
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
         """Queue a block to be written, in place of one not written yet, and read the PLC's."""
-        self._outgoing.append(Outgoing(block, data, self._clock()))
+        self._outgoing.append(_Outgoing(block, data, self._clock()))
         self._kick.set()
 
     def ask(self) -> None:
@@ -136,7 +136,7 @@ class Group(Thread):
         if isinstance(values, Refusal) or self.trouble or not self._is_newer(values["counter"], arrived, connected):
             self.discarded += 1
         else:
-            self.newest = Newest(values, arrived, arrived - asked)
+            self.newest = _Newest(values, arrived, arrived - asked)
         self.settled.set()
 
     def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
@@ -185,7 +185,7 @@ class BlockLink:
         self._addresses = tuple(addresses)
         self._began = perf_counter()
         self._exchanges = [
-            Group(i, len(group), wire, self._clock)
+            GroupThread(i, len(group), wire, self._clock)
             for i, (group, wire) in enumerate(zip(self._groups, wires, strict=True))
         ]
         for group in self._exchanges:

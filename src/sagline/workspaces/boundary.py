@@ -87,13 +87,13 @@ def boundary(
     first = grid = sample_grid(counted, *corners, numbers)
     for _ in range(halvings):
         grid = refine_grid(grid, counted)
-    net, vertices, slope = place_vertices(triangulate(grid.inside), grid, counted)
+    net, vertices, slope = _place_vertices(triangulate(grid.inside), grid, counted)
     surface = Surface(locked(vertices), locked(net.faces))
-    on_box = faces_on_box(surface, grid)
+    on_box = _faces_on_box(surface, grid)
     open_faces = tuple(name for name, flat in zip(FACES, on_box, strict=True) if flat.any())
     curved = np.flatnonzero(~np.logical_or.reduce(on_box))
     faces = net.faces[curved]
-    between, errors = bulge_volumes(
+    between, errors = _bulge_volumes(
         counted, surface.vertices, faces, _slopes(surface.vertices, faces, net, slope), grid
     )
     volumes = volumes_of(surface.vertices, surface.faces)
@@ -113,7 +113,7 @@ def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int,
     return x, y, z
 
 
-def place_vertices(
+def _place_vertices(
     net: Net, grid: Grid, level: Level, *, precision: float = 1e-10, narrow: float = 1e-12
 ) -> tuple[Net, Array, Array]:
     """Net, vertices on the exact boundary (V, 3) [m], and fall of the function along their edges (V,) [1/m]."""
@@ -147,7 +147,7 @@ def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:
     return found
 
 
-def faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
+def _faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
     """Triangles on each face of the box: masks of shape (F,), in the order of `FACES`."""
     corners = surface.vertices[surface.faces]
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]
@@ -158,7 +158,7 @@ MISSED: Final = 5.0 / 12.0  # of it at most
 FLAT: Final = 1e-6  # of the reach: a distance that adds nothing
 
 
-def bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
+def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
     """Volume between each triangle and the boundary [m^3], negative inward, and its error bar; both (F,)."""
     normals = normals_of(vertices, faces)
     area = np.linalg.norm(normals, axis=1)
@@ -166,13 +166,13 @@ def bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, g
     points = vertices[faces].mean(axis=1)
     low, high = (np.array([axis[end] for axis in grid.axes]) for end in (0, -1))
     reach = [np.minimum(grid.step.max(), distance_to_box(points, side * normals, low, high)) for side in (1.0, -1.0)]
-    distance = distances_to_boundary(level, points, normals, slope, reach[0], reach[1])
+    distance = _distances_to_boundary(level, points, normals, slope, reach[0], reach[1])
     found = ~np.isnan(distance)
     volume = np.where(found, MEAN * area * distance, 0.0)
     return volume, area * np.where(found, MISSED * np.abs(distance), np.maximum(*reach))
 
 
-def distances_to_boundary(
+def _distances_to_boundary(
     level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array
 ) -> Array:
     """Distances of points (N, 3) from the boundary along normals [m], (N,), to some percent; NaN beyond reach."""
@@ -243,10 +243,10 @@ def outline(levels: Levels, region: Region) -> Outline:
     from scipy.ndimage import label  # a third of a second to load
 
     grid = sample_grid(levels, region.low, region.high, region.cells)
-    net, vertices, _ = place_vertices(triangulate(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)
+    net, vertices, _ = _place_vertices(triangulate(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)
     surface = Surface(locked(vertices), locked(net.faces))
     decided = levels.details(vertices)
-    on_box = faces_on_box(surface, grid)
+    on_box = _faces_on_box(surface, grid)
     ends = np.stack((region.low == region.box.low, region.high == region.box.high), axis=1).ravel()
     return Outline(
         surface=surface,

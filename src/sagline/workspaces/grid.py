@@ -95,7 +95,7 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
     nearest = np.ix_(*(np.arange(len(axis)) // 2 for axis in axes))
     fine = _grid(axes, grid.values[nearest], np.zeros([len(axis) for axis in axes], dtype=np.bool_), lock=False)
     fine.evaluated[::2, ::2, ::2] = grid.evaluated
-    cells = crossed_cells(grid.inside, _CELL, 1)
+    cells = _crossed_cells(grid.inside, _CELL, 1)
     while True:
         wanted = np.zeros_like(fine.evaluated)
         for part in _views(wanted, _HALVED, 2):
@@ -106,10 +106,10 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
         where = tuple(nodes.T)
         fine.values[where] = evaluate(level, fine.positions(nodes))
         fine.evaluated[where] = True
-        cells = crossed_cells(fine.inside, _HALVED, 2)
+        cells = _crossed_cells(fine.inside, _HALVED, 2)
 
 
-def crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
+def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
     """Mask of the cells that the boundary crosses: some of their nodes are inside, and some are not."""
     parts = list(_views(inside, nodes, stride))
     return np.asarray(np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts))

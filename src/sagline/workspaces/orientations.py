@@ -139,7 +139,7 @@ class Tilts:
             InvalidValueError: If the platform does not turn.
         """
         if self.angle == 0.0:
-            return level()
+            return _level()
         check_tilt(robot, self.angle, "orientations: tilt")
         if robot.motion_pattern in PLANAR and robot.plane_normal is not None:
             axes, angles = np.repeat(robot.plane_normal[None], len(_SHARES), axis=0), self.angle * _SHARES
@@ -149,7 +149,7 @@ class Tilts:
         return Orientations._of(np.vstack((LEVEL, turned)), "all")
 
 
-def level() -> Orientations:
+def _level() -> Orientations:
     """Level orientation alone."""
     return Orientations._of(LEVEL[None].copy(), "all")
 

@@ -155,10 +155,10 @@ class Workspace(Result, Saved):
 
     def __str__(self) -> str:
         """Summary in lines of at most 80 columns."""
-        return "\n".join(summary_lines(self)).replace(SPACE, " ")
+        return "\n".join(_summary_lines(self)).replace(SPACE, " ")
 
 
-def summary_lines(space: Workspace) -> list[str]:
+def _summary_lines(space: Workspace) -> list[str]:
     """Summary of a workspace in lines of at most 80 columns."""
     lines = [f"Workspace of {space.robot.name}: {amount_of(space)}"]
     for head, text in facts_of(space):
