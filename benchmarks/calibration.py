@@ -13,7 +13,7 @@ import sagline as sl
 from benchmarks.measure import Row, best_seconds, print_table
 from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import best_step, evaluate_step
-from sagline.calibration.parameters import external, parameters_of, robot_with
+from sagline.calibration.parameters import external, parameters_of, with_values
 from sagline.calibration.problem import FitProblem, ReadingsTable, SearchState, readings_table, start_of
 from sagline.core.arrays import Array
 from sagline.robot.drum import drums_of
@@ -48,7 +48,7 @@ def plain_seconds(log: sl.WinchLog) -> float:
 
     def misses(x: Array) -> Array:
         numbers, lengths = x[:width], x[width:].reshape(state.lengths.shape)
-        robot = robot_with(COGIRO, problem.parameters, external(problem.parameters, numbers))
+        robot = with_values(COGIRO, problem.parameters, external(problem.parameters, numbers))
         drums = drums_of(robot)
         said = drums.lengths_at(log.readings) / (1.0 + drums.rest_strain)
         found = sl.forward(robot, lengths, log.commanded)

@@ -5,29 +5,29 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from sagline.calibration.candidates import length_of, shortest_tour
+from sagline.calibration.candidates import shortest_tour, tour_length
 from tests.tiers import wide
 
 
 @pytest.mark.parametrize("seed", wide(range(12), first=2))
 def test_tours_against_all_orders(seed: int) -> None:
     places = np.random.default_rng(seed).uniform(size=(7, 3))
-    best = min(length_of(places, np.array(order)) for order in permutations(range(7)))
+    best = min(tour_length(places, np.array(order)) for order in permutations(range(7)))
     found = shortest_tour(places)
     assert sorted(found) == list(range(7))
-    assert best - 1e-12 <= length_of(places, found) <= 1.1 * best
+    assert best - 1e-12 <= tour_length(places, found) <= 1.1 * best
 
 
 def test_a_row_of_places_is_driven_along() -> None:
     places = np.zeros((30, 3))
     places[:, 1] = np.random.default_rng(1).permutation(30)
-    assert length_of(places, shortest_tour(places)) == pytest.approx(29.0)
+    assert tour_length(places, shortest_tour(places)) == pytest.approx(29.0)
 
 
 def test_many_places_are_no_way_for_long() -> None:
     places = np.random.default_rng(2).uniform(size=(300, 2))
     # 0.7124 sqrt(N A) is the best tour of many places; 2-opt is some 5 % longer, nearest neighbors alone 25 %
-    assert length_of(places, shortest_tour(places)) <= 1.12 * 0.7124 * np.sqrt(300.0)
+    assert tour_length(places, shortest_tour(places)) <= 1.12 * 0.7124 * np.sqrt(300.0)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])

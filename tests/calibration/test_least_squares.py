@@ -8,7 +8,7 @@ import sagline as sl
 from sagline.calibration.calibrate import active_sensors
 from sagline.calibration.least_squares import evaluate_step, predict_state, solve
 from sagline.calibration.log import load_cells_of
-from sagline.calibration.parameters import external, parameters_of, robot_with
+from sagline.calibration.parameters import external, parameters_of, with_values
 from sagline.calibration.problem import (
     Fit,
     FitProblem,
@@ -59,7 +59,7 @@ def plainly(problem: FitProblem, made: Synthetic, fit: Fit) -> Array:
 
     def misses(x: Array) -> Array:
         numbers, lengths = x[:width], x[width:].reshape(cells.shape)
-        robot = robot_with(problem.robot, problem.parameters, external(problem.parameters, numbers))
+        robot = with_values(problem.robot, problem.parameters, external(problem.parameters, numbers))
         said = sl.lengths_from_counts(robot, counts)
         found = sl.forward(robot, lengths, poses)
         assert found.solved.all()

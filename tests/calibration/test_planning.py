@@ -356,8 +356,8 @@ def test_words_fit_a_terminal(name: str) -> None:
     text, lines = str(plan), plan.table().splitlines()
     assert max(map(len, text.splitlines())) <= 80, text
     assert max(map(len, lines)) <= 80, lines
-    narrow = planning.in_words(plan, 60)
-    assert max(map(len, [*narrow.splitlines(), *planning.table(plan, 60).splitlines()])) <= 60, narrow
+    narrow = planning.poses_text(plan, 60)
+    assert max(map(len, [*narrow.splitlines(), *planning.poses_table(plan, 60).splitlines()])) <= 60, narrow
     assert narrow.split() == text.replace("standard errors", "errors").split()
     assert re.findall(rf"\d+|{name}", text.partition(":")[0]) == ["6", str(len(plan.parameters.names)), name]
     per = 1 if robot.cable_count <= 8 else 2

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-from sagline.calibration.parameters import offset_with, parameters_of, robot_with
+from sagline.calibration.parameters import offset_with, parameters_of, with_values
 from sagline.calibration.result import motion_slopes
 from sagline.core.arrays import Array
 from tests.calibration.reference import counts_of, pose_rows
@@ -57,7 +57,7 @@ def drawn(name: str, believed: Array, start: sl.Pose, rng: np.random.Generator) 
     values = values_drawn(calibration, DRAWS, rng)
     robots, lengths = [], []
     for value in values:
-        robot = robot_with(calibration.robot, parameters, value)
+        robot = with_values(calibration.robot, parameters, value)
         noise = calibration.sensors.length_deviation * rng.normal(size=8)
         if counted:
             lengths.append(sl.lengths_from_counts(robot, believed) + noise)
@@ -106,7 +106,7 @@ def test_what_the_poses_of_the_log_have_in_common() -> None:
     offset = calibration.length_offset
     left, turns = [], []
     for value in values:
-        robot = robot_with(calibration.robot, calibration.parameters, value)
+        robot = with_values(calibration.robot, calibration.parameters, value)
         more = offset_with(calibration.robot, calibration.parameters, value) - offset
         moved = sl.forward(robot, lengths + more, poses).pose.position - poses.position
         there = sl.forward(robot, wanted + more + 5e-4 * rng.normal(size=8), pose).pose
@@ -222,7 +222,7 @@ def test_the_same_robot_moves_otherwise_by_its_stiffness_where_counts_were_read(
         for sign in (-1.0, 1.0):
             values = parameters.prior.copy()
             values[k] = value * (1.0 + sign * step)
-            other = robot_with(robot, parameters, values)
+            other = with_values(robot, parameters, values)
             length = sl.lengths_from_counts(other, believed[0]) if counted else lengths[0]
             ends.append(sl.forward(other, length, plan.state.pose).pose.position)
         slope = (ends[1] - ends[0]) / (2.0 * step * value)

@@ -8,7 +8,7 @@ import pytest
 
 import sagline as sl
 from sagline.calibration.findings import CrossValidation, Direction, Outlier
-from sagline.calibration.summary import anchor_covariance, in_words, relative_covariance, row_ranges
+from sagline.calibration.summary import anchor_covariance, calibration_text, relative_covariance, row_ranges
 from sagline.core.arrays import Array
 from tests.calibration.made_up import MOTIONS, STEP, made_up, motions, parameters
 from tests.refusal import refused
@@ -159,7 +159,7 @@ def calibrations(count: int, found: sl.Calibration) -> list[sl.Calibration]:
 
 def test_a_narrow_terminal_gets_the_same_words_in_shorter_lines(found: sl.Calibration) -> None:
     for one in calibrations(10, found):
-        narrow = in_words(one, 60)
+        narrow = calibration_text(one, 60)
         assert [line for line in narrow.splitlines() if len(line) > 60] == []
         (head, values), (own_head, own_values) = (text.split("Values ±") for text in (narrow, str(one)))
         assert "".join(head.split()) == "".join(own_head.split())

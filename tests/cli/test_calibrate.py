@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 import sagline as sl
 from sagline.calibration import planning
-from sagline.calibration.summary import in_words
+from sagline.calibration.summary import calibration_text
 from sagline.cli import terminal
 from sagline.cli.main import app
 from sagline.core.numbers import SPACE
@@ -114,8 +114,8 @@ def test_it_is_written_for_a_narrow_terminal(run: Run, monkeypatch: pytest.Monke
     found = sl.calibrate(robot, log, ("length_zero", "mass"), folds=0)
     plan = sl.calibration_poses(robot, 6, ("length_zero", "mass"), sl.Sensors(tension_deviation=5.0))
     for words, text in (
-        (["winches.csv", "--folds", "0"], in_words(found, 60).replace(SPACE, " ")),
-        (["--plan", "6", "--tension-deviation", "5 N"], planning.in_words(plan, 60)),
+        (["winches.csv", "--folds", "0"], calibration_text(found, 60).replace(SPACE, " ")),
+        (["--plan", "6", "--tension-deviation", "5 N"], planning.poses_text(plan, 60)),
     ):
         lines = [line.rstrip() for line in run("robot.yaml", *words, *FEW).stdout.splitlines()]
         assert lines[: len(text.splitlines())] == text.splitlines()

@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline import Path
-from sagline.control.checks import motion_along
+from sagline.control.checks import plan_motion
 from sagline.control.link import PERIOD
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array
@@ -29,7 +29,7 @@ def moved(path: Path, shift: Array) -> Path:
 
 
 def planned(robot: sl.Robot, path: Path) -> object:
-    return motion_along(robot, path, PERIOD, sl.Catenary(), sl.Closest())
+    return plan_motion(robot, path, PERIOD, sl.Catenary(), sl.Closest())
 
 
 @pytest.mark.parametrize("jump", [1e-3, 6e-3, None])
@@ -122,12 +122,12 @@ def test_the_load_counts_on_the_side_on_which_it_pulls() -> None:
 def test_a_motion_of_another_period_or_robot_is_refused() -> None:
     """Of 100 ms a row, followed in cycles of 10 ms, it was ten times as fast."""
     control, _ = rig()
-    slow = motion_along(prototype(), way(rate=10.0), 0.1, sl.Catenary(), sl.Closest())
+    slow = plan_motion(prototype(), way(rate=10.0), 0.1, sl.Catenary(), sl.Closest())
     with pytest.raises(RefusedError, match=r"100 ms.* 10 ms"):
         control.start(slow)
     heavy = prototype().replace(mass=prototype().mass + 1.0)
     with pytest.raises(RefusedError, match="another robot"):
-        control.start(motion_along(heavy, way(), PERIOD, sl.Catenary(), sl.Closest()))
+        control.start(plan_motion(heavy, way(), PERIOD, sl.Catenary(), sl.Closest()))
     own = control.plan(way())
     assert own.robot is control.robot
     assert own.period == PERIOD

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline, make_interp_spline
 
 import sagline as sl
-from sagline.control.checks import motion_along
+from sagline.control.checks import plan_motion
 from sagline.control.link import RAMP
 from sagline.control.set_points import LEAD_SPEED, Along, Fade
 from sagline.control.states import RefusedError
@@ -36,7 +36,7 @@ def test_a_lead_fades_smoothly_and_no_faster_than_its_speed(size: float) -> None
 
 def test_between_two_rows_lengths_are_cubic_and_tensions_linear() -> None:
     path = sl.quintic_path([(0, 0, 1.5), (0.3, 0.2, 1.4)], speed=0.3)
-    motion = motion_along(prototype(), path, PERIOD, sl.Catenary(), sl.Closest())
+    motion = plan_motion(prototype(), path, PERIOD, sl.Catenary(), sl.Closest())
     rows = np.arange(len(motion))
     length = CubicHermiteSpline(PERIOD * rows, motion.length, motion.rate)
     tension = make_interp_spline(PERIOD * rows, motion.tension, k=1)

@@ -143,7 +143,7 @@ def test_one_part_that_is_refused_leaves_no_other_cold(monkeypatch: pytest.Monke
 
         return part
 
-    names = ["standing_at", "motion_along", "winch_jog", "PlatformJog"]
+    names = ["standing_at", "plan_motion", "winch_jog", "PlatformJog"]
     for name in names:
         monkeypatch.setattr(real_time, name, trying(name))
     nowhere = prototype().replace(tension_min=2000.0, tension_max=2100.0)  # no pose has such tensions

@@ -16,7 +16,7 @@ from sagline.core.arguments import whole_number
 from sagline.core.arrays import Array, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.workspaces.crossing import Brackets, brackets, crossings, crossings_of, distance_to_box
-from sagline.workspaces.grid import Level, evaluate
+from sagline.workspaces.grid import Level, level_values
 from sagline.workspaces.surface import Surface
 
 ITERATIONS: Final = 100  # of facets that replace one another along a ray: three are usual
@@ -88,7 +88,7 @@ def ray_hull(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike, d
             start, at_start, step = np.zeros(len(new)), np.full(len(new), at_center), limit
         else:
             start = np.minimum(_chords(directions, length, parents, new), limit)
-            at_start = evaluate(level, origin + start[:, None] * new)
+            at_start = level_values(level, origin + start[:, None] * new)
             step = np.clip(1.5 * np.abs(at_start) / slope[parents].mean(axis=1), 1e-4 * limit, limit)
         points = origin + start[:, None] * new
         ends = brackets(level, points, new, at_start, step, limit - start, start)
@@ -141,7 +141,7 @@ def _origin(level: Level, center: ArrayLike, low: ArrayLike, high: ArrayLike) ->
     """Center, checked, and the level there."""
     origin = exactly(center, "center", "m", (3,))
     outside = (origin <= exactly(low, "low", "m", (3,))) | (origin >= exactly(high, "high", "m", (3,)))
-    value = float(evaluate(level, origin[None])[0])
+    value = float(level_values(level, origin[None])[0])
     if outside.any() or not value >= 0.0:
         where = "outside the box" if outside.any() else f"where the level is {value:.4g}"
         raise InvalidValueError("center", where, "a position in the set, within the box", "Choose another center.")

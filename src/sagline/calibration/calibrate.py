@@ -10,7 +10,7 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.cables.models import Catenary
 from sagline.calibration.diagnostics import GOOD, diagnose_log, fits_without_measured_poses, frame_mismatch, wrong_units
-from sagline.calibration.evaluation import evaluate
+from sagline.calibration.evaluation import calibration_of
 from sagline.calibration.findings import Omission
 from sagline.calibration.least_squares import misfit
 from sagline.calibration.log import Sensors, WinchLog
@@ -108,7 +108,7 @@ def calibrate(
     elif Omission.OTHER_EQUILIBRIUM in found.left_out:
         _refuse(frame_mismatch(fit_log, found.left_out[Omission.OTHER_EQUILIBRIUM], parameters.names))
     validation = cross_validate(problem, found, folds, robust=robust, progress=progress) if folds else None
-    return evaluate(problem, found, rows, left_out, log.source, validation)
+    return calibration_of(problem, found, rows, left_out, log.source, validation)
 
 
 def active_sensors(log: WinchLog) -> Sensors:

@@ -185,7 +185,7 @@ def shortest_tour(places: Array) -> Indices:
     return np.asarray(order[1:-1])
 
 
-def length_of(places: Array, order: Indices) -> float:
+def tour_length(places: Array, order: Indices) -> float:
     """Length of a tour through places (N, d) in an order (N,), in the unit of the places."""
     return float(np.linalg.norm(np.diff(places[order], axis=0), axis=-1).sum())
 

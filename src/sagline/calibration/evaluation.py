@@ -31,7 +31,7 @@ TOLERATED: Final = 1.1  # of chi squared to what is to be expected: no model is 
 LITTLE: Final = 1e-6  # of a direction: a parameter with a smaller part of it is still observable
 
 
-def evaluate(
+def calibration_of(
     problem: FitProblem,
     found: SearchResult,
     rows: Indices,

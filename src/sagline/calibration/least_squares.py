@@ -19,7 +19,7 @@ from sagline.calibration.observations import (
     NO_LOAD,
     MachineTerms,
     WhitenedRows,
-    counts_of,
+    counts_at,
     whitened_rows,
     winch_slopes,
 )
@@ -70,7 +70,7 @@ def whitened_at(
     counts, along = (None if log.counts is None else log.counts[part]), reported
     if free_of_noise and machine.drums is not None:
         along = state.lengths[part]
-        counts = counts_of(machine.drums, along)
+        counts = counts_at(machine.drums, along)
     slopes = winch_slopes(machine.robot, parameters, counts, along)
     readings = Readings(reported, log.cells[part], log.positions[part], log.rotations[part])
     turning = parameters.where[kinds.TURN : kinds.TURN + 3, 0]

@@ -34,7 +34,7 @@ def lengths_at_counts(drums: Drums, counts: Array) -> Array:
     return np.asarray(drums.lengths_at(counts) / (1.0 + drums.rest_strain))
 
 
-def counts_of(drums: Drums, lengths: Array) -> Array:
+def counts_at(drums: Drums, lengths: Array) -> Array:
     """Counts, not rounded, at unstrained lengths off the drums [m], both (N, m)."""
     return drums.counts(lengths * (1.0 + drums.rest_strain))
 
@@ -220,7 +220,7 @@ def predicted_rows(
 ) -> WhitenedRows:
     """Slopes of readings by these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; no misfit."""
     machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
-    counts = None if machine.drums is None else counts_of(machine.drums, lengths)
+    counts = None if machine.drums is None else counts_at(machine.drums, lengths)
     slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)
     aligned = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
     readings = Readings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), aligned)

@@ -276,7 +276,7 @@ def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
     return slopes
 
 
-def robot_with(robot: Robot, parameters: Parameters, values: Array) -> Robot:
+def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
     """The robot with other parameter values (P,); refused if it cannot have them."""
     changes: dict[str, dict[str, Any]] = {"cables": {}, "winches": {}, "robot": {}}
     for name in dict.fromkeys(parameters.names):

@@ -11,7 +11,7 @@ import numpy as np
 
 from sagline.cables.models import Catenary
 from sagline.calibration.calibrate import UNKNOWNS
-from sagline.calibration.candidates import CandidatePoses, candidates_of, length_of, shortest_tour
+from sagline.calibration.candidates import CandidatePoses, candidates_of, shortest_tour, tour_length
 from sagline.calibration.information import (
     Choice,
     Situation,
@@ -84,19 +84,19 @@ class CalibrationPoses(Result, Saved):
 
     def __str__(self) -> str:
         """Expected errors, in lines of at most 80 columns."""
-        return in_words(self)
+        return poses_text(self)
 
     def table(self) -> str:
         """Poses and tensions, one a line."""
-        return table(self)
+        return poses_table(self)
 
 
-def in_words(plan: CalibrationPoses, width: int = WIDTH) -> str:
+def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
     """Expected errors of calibration poses, beside random ones, in lines of at most `width` columns."""
     return "\n".join((*_head(plan, width), *_errors(plan, width), *_advice(plan, width))).replace(SPACE, " ")
 
 
-def table(plan: CalibrationPoses, width: int = WIDTH) -> str:
+def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
     """Poses and tensions in the order to drive, one a line; more cables than fit continue in the next."""
     position, tension = plan.poses.position, plan.frame_end_tension
     angles = np.degrees(plan.poses.rotation.as_euler("ZYX"))
@@ -130,7 +130,7 @@ def _column(head: str, values: Iterable[float], decimals: int) -> list[str]:
 
 def _head(plan: CalibrationPoses, width: int) -> Iterator[str]:
     places = plan.poses.position[_first_of_each(plan.poses.position)]
-    way = n(length_of(places, np.arange(len(places))), ".3g", "m")
+    way = n(tour_length(places, np.arange(len(places))), ".3g", "m")
     what = f"{counted(len(plan), 'pose')} to find {counted(len(plan.parameters.names), 'number')} of {plan.robot.name}"
     yield from wrap(f"{what}: {counted(len(places), 'place')}, {way} to drive", width)
     yield from wrap(f"read by {' and '.join(_sensors(plan))}", width, initial_indent="  ", subsequent_indent="  ")

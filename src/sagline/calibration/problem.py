@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from sagline.cables.model import CableModel
 from sagline.calibration.log import Sensors, WinchLog, load_cells_of
 from sagline.calibration.observations import NO_LOAD, MachineTerms, WhitenedRows, lengths_at_counts, machine_of
-from sagline.calibration.parameters import KINDS, Parameters, external, internal, offset_with, robot_with, sensors_with
+from sagline.calibration.parameters import KINDS, Parameters, external, internal, offset_with, sensors_with, with_values
 from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.starting_lengths import starting_lengths
@@ -156,7 +156,7 @@ Evaluated = tuple[SearchState, Normal]
 def machine_at(problem: FitProblem, numbers: Array) -> MachineTerms:
     """The robot and its sensors with internal parameters (P,); refused if the robot cannot have them."""
     values, parameters = external(problem.parameters, numbers), problem.parameters
-    robot = robot_with(problem.robot, parameters, values)
+    robot = with_values(problem.robot, parameters, values)
     sensors = sensors_with(problem.sensors, parameters, values)
     offset = offset_with(problem.robot, parameters, values)
     return machine_of(robot, problem.model, parameters, sensors, offset)

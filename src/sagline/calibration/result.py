@@ -155,7 +155,7 @@ class Calibration(Findings, Saved):
 
     def __str__(self) -> str:
         """Values with their standard errors and diagnostics, in lines of 80 columns, the verdict first."""
-        return summary.in_words(self)
+        return summary.calibration_text(self)
 
     def pose_error(self, pose: Pose) -> PoseError:
         """Expected error of the platform at a commanded pose, with this calibration.

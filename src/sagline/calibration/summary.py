@@ -20,7 +20,7 @@ UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "r
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
 
-def in_words(found: Findings, width: int = WIDTH) -> str:
+def calibration_text(found: Findings, width: int = WIDTH) -> str:
     """A calibration in lines of at most `width` columns, the verdict first."""
     parts = (
         _verdict(found, width),

@@ -147,7 +147,7 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
     if as_json:
         show_json({**_record(found), "files": files})
     else:
-        _show_lines(lambda width: summary.in_words(found, width))
+        _show_lines(lambda width: summary.calibration_text(found, width))
         _tell_files(files)
         _tell_offset(found, files)
     if found.status is CalibrationStatus.FOUND:
@@ -181,7 +181,7 @@ def _plan_poses(request: _Request, count: int, seed: int, log: Path | None, *, a
     if as_json:
         show_json({**_record_of_poses(chosen), "files": list(request.files)})
         return 0
-    _show_lines(lambda width: f"{planning.in_words(chosen, width)}\n{planning.table(chosen, width)}")
+    _show_lines(lambda width: f"{planning.poses_text(chosen, width)}\n{planning.poses_table(chosen, width)}")
     _tell_files(list(request.files))
     return 0
 

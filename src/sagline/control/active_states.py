@@ -11,7 +11,7 @@ import numpy as np
 from sagline.control.commands import FRESH, Claim
 from sagline.control.context import Context
 from sagline.control.execution import ExecutionStatus
-from sagline.control.homing import Homing, HomingJog, tension_limits
+from sagline.control.homing import Homing, HomingJog, jog_tension_limits
 from sagline.control.jogging import PlatformJog
 from sagline.control.link import Missing, Mode, Sample
 from sagline.control.recording import EventKind
@@ -202,7 +202,7 @@ class HomingState(ActiveState):
         c = self.context
         if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
-        self._largest_tension = tension_limits(self.homing, c.sample)
+        self._largest_tension = jog_tension_limits(self.homing, c.sample)
         begin = SetPoint(c.sample.length, np.zeros(len(c.zero)), c.unknown, c.sender.tension, None, None, np.nan, False)
         self.source = HomingJog(begin, winch, by, c.period)
         c.say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")

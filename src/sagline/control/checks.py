@@ -65,7 +65,7 @@ class Motion:
         return self.state.one_robot
 
 
-def motion_along(
+def plan_motion(
     robot: Robot,
     path: Path,
     period: float,

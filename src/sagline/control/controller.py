@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from sagline.cables.model import CableModel
 from sagline.control.active_states import Following, HomingState
-from sagline.control.checks import Motion, check_lead, check_motion, check_start, motion_along
+from sagline.control.checks import Motion, check_lead, check_motion, check_start, plan_motion
 from sagline.control.context import Context
 from sagline.control.execution import Execution
 from sagline.control.jogging import PlatformJog, checked_displacement, checked_winch, winch_jog
@@ -102,7 +102,7 @@ class Controller(Preparation):
         """
         c, given = self._context, instance(path, Path, "path")
         arguments = c.robot, given, c.period, c.model, c.method, c.previous_plan
-        return self._result_of(lambda: motion_along(*arguments))
+        return self._result_of(lambda: plan_motion(*arguments))
 
     def start(self, path: Path | Motion) -> None:
         """Begin to follow a path.

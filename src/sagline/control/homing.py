@@ -117,6 +117,6 @@ class HomingJog:
         )
 
 
-def tension_limits(homing: Homing, sample: Sample) -> Array:
+def jog_tension_limits(homing: Homing, sample: Sample) -> Array:
     """Tension limits of a jog [N], shape (m,): 1.2 of the plan, or the present tension where that is larger."""
     return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

@@ -16,7 +16,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from sagline.cables.model import CableModel
-from sagline.control.checks import motion_along
+from sagline.control.checks import plan_motion
 from sagline.control.homing import Homing
 from sagline.control.jogging import PlatformJog, winch_jog
 from sagline.control.link import PERIOD
@@ -192,7 +192,7 @@ def load_kernels(robot: Robot, period: float, model: CableModel, method: Tension
     parts: tuple[Callable[[], object], ...] = (
         lambda: None if homing is None else homing.refusal(),
         lambda: standing_at(robot, point.length, None, model),
-        lambda: motion_along(robot, path, period, model, method, previous),
+        lambda: plan_motion(robot, path, period, model, method, previous),
         lambda: winch_jog(robot, point.length, middle, 0, 1e-3, period, model),
         lambda: PlatformJog(robot, point, middle, by, period, model, method).step(),
     )

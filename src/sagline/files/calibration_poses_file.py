@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sagline.calibration.observations import counts_of, has_drum_data
+from sagline.calibration.observations import counts_at, has_drum_data
 from sagline.core.arguments import file_path
 from sagline.core.arrays import Array
 from sagline.files.writing import write_text
@@ -42,7 +42,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
         "unstrained_length": plan.unstrained_length,
     }
     if has_drum_data(plan.robot):
-        rows["counts"] = counts_of(drums_of(plan.robot), plan.unstrained_length)
+        rows["counts"] = counts_at(drums_of(plan.robot), plan.unstrained_length)
     poses = [
         {name: _round(row, _DECIMALS[name]) for name, row in zip(rows, each, strict=True)}
         for each in zip(*rows.values(), strict=True)

@@ -18,7 +18,7 @@ from sagline.core.progress import blocks
 from sagline.core.results import Result
 from sagline.interference.mesh import Mesh, extent_text
 from sagline.interference.obstacles import Box, Capsule, Sphere
-from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, parts_of, rod_row
+from sagline.interference.pairs import Obstacle, box_rows, cable_rows, pairs_of, rod_row, rows_of_parts
 from sagline.kernels.interference import shapes
 from sagline.kernels.interference.catenary_distance import least_distances, work_arrays_for_pieces
 from sagline.robot.batch import Robots, first_of
@@ -111,7 +111,7 @@ class ClearanceRows:
         known = np.zeros(1) if diameter is None else 0.5 * diameter
         cables = cable_rows(state, known if self._radius is None else self._radius)
         lengths = np.atleast_2d(state.free_length)
-        parts = parts_of(cables.reshape(*lengths.shape, -1), lengths, self.pairs.parts, self._from_anchor)
+        parts = rows_of_parts(cables.reshape(*lengths.shape, -1), lengths, self.pairs.parts, self._from_anchor)
         box = self._platform if isinstance(self._platform, Box) else Box(np.ones(3))
         rows = np.concatenate((parts, box_rows(box, state.pose).reshape(-1, 1, shapes.COLUMNS)), axis=1)
         return locked(np.ascontiguousarray(rows))  # a batch's are not, and the kernel would be compiled again

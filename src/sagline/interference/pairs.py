@@ -61,7 +61,7 @@ def _platform_ends(state: Equilibrium) -> Array:
     return np.asarray(turned + state.pose.position[:, None])
 
 
-def parts_of(cables: Array, lengths: Array, parts: tuple[_CablePart, ...], left_out: float) -> Array:
+def rows_of_parts(cables: Array, lengths: Array, parts: tuple[_CablePart, ...], left_out: float) -> Array:
     """Rows (N, len(parts), COLUMNS) of parts of cables, without an unstrained length `left_out` [m] of an end."""
     out = cables[:, [part.cable for part in parts]]
     for k, part in enumerate(parts):

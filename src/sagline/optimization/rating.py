@@ -27,7 +27,7 @@ from sagline.statics.stiffness import compliance_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
 from sagline.tension.methods import MinimumNorm
 from sagline.tension.options import kernel_options
-from sagline.workspaces.levels import middle_of
+from sagline.workspaces.levels import middle_wrench
 from sagline.workspaces.margin_rows import MarginRows, mean_arms
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
@@ -158,7 +158,7 @@ class Rating:
         """Prepare; refused if a cost is missing, or the first robot holds no pose where a goal needs tensions."""
         self._candidates, self._goals, self._robust, self._inner = candidates, tuple(goals), robust, inner
         self._model, self._poses, self.rows = model, poses, pose_rows(poses)
-        self._wrench = np.zeros(6) if wrenches is None else middle_of(wrenches)
+        self._wrench = np.zeros(6) if wrenches is None else middle_wrench(wrenches)
         self._wrenches = NO_LOAD if wrenches is None else wrenches
         # the first robot's, so that margins of candidates compare
         self._arm = float(mean_arms(cable_table(candidates.robot), body_table(candidates.robot))[0])

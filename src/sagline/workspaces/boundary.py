@@ -13,7 +13,16 @@ from sagline.core.arrays import Array, Flags, Indices, exactly, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.results import Result
 from sagline.workspaces.crossing import Brackets, brackets, crossings, distance_to_box
-from sagline.workspaces.grid import Grid, Level, Net, evaluate, merge_vertices, refine_grid, sample_grid, triangulate
+from sagline.workspaces.grid import (
+    Grid,
+    Level,
+    Net,
+    level_values,
+    merge_vertices,
+    refine_grid,
+    sample_grid,
+    triangulate,
+)
 from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Region
 from sagline.workspaces.surface import Components, Surface, components_of, normals_of, vertex_areas, volumes_of
@@ -176,7 +185,7 @@ def _distances_to_boundary(
     level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array
 ) -> Array:
     """Distances of points (N, 3) from the boundary along normals [m], (N,), to some percent; NaN beyond reach."""
-    at_points = evaluate(level, points)
+    at_points = level_values(level, points)
     reach = np.where(at_points >= 0.0, outward, inward)
     with np.errstate(divide="ignore", invalid="ignore"):
         guess = np.abs(at_points) / slope

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, Indices
-from sagline.workspaces.grid import Level, evaluate
+from sagline.workspaces.grid import Level, level_values
 
 TRIAL = 3  # steps of regula falsi, after which a bracket is to be an eighth
 ITERATIONS = 100  # a jump takes some 45, by halving; what is continuous ends after 5 to 8
@@ -51,7 +51,7 @@ def brackets(
     found = np.zeros(len(points), dtype=np.bool_)
     while len(k):
         far[k] = points[k] + distance[k, None] * away[k]
-        at_far[k] = evaluate(level, far[k])
+        at_far[k] = level_values(level, far[k])
         found[k] = (at_far[k] >= 0.0) != is_inside[k]
         k = k[~found[k] & (distance[k] < limit[k])]
         near[k], at_near[k] = far[k], at_far[k]
@@ -74,7 +74,7 @@ def crossings(
     """Share of each line that is inside one function, (V,): `crossings_of` with the same function for all lines."""
 
     def values(_: Indices, positions: Array) -> Array:
-        return evaluate(level, positions)
+        return level_values(level, positions)
 
     return crossings_of(values, inner, outer, at_inner, at_outer, precision=precision, narrow=narrow)
 

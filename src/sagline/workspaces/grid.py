@@ -65,7 +65,7 @@ class Grid(Result):
         return np.stack([axis[nodes[:, k]] for k, axis in enumerate(self.axes)], axis=1)
 
 
-def evaluate(level: Level, positions: Array) -> Array:
+def level_values(level: Level, positions: Array) -> Array:
     """Values (N,) of a level function at positions (N, 3) [m]; refused if NaN or of another shape."""
     if not len(positions):
         return np.zeros(0)
@@ -86,7 +86,7 @@ def sample_grid(level: Level, low: Array, high: Array, cells: tuple[int, int, in
     axes = [np.linspace(a, b, n + 1) for a, b, n in zip(low, high, cells, strict=True)]
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     shape = tuple(n + 1 for n in cells)
-    return _grid(axes, evaluate(level, positions).reshape(shape), np.ones(shape, dtype=np.bool_))
+    return _grid(axes, level_values(level, positions).reshape(shape), np.ones(shape, dtype=np.bool_))
 
 
 def refine_grid(grid: Grid, level: Level) -> Grid:
@@ -104,7 +104,7 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
         if not len(nodes):
             return _grid(axes, fine.values, fine.evaluated)
         where = tuple(nodes.T)
-        fine.values[where] = evaluate(level, fine.positions(nodes))
+        fine.values[where] = level_values(level, fine.positions(nodes))
         fine.evaluated[where] = True
         cells = _crossed_cells(fine.inside, _HALVED, 2)
 

@@ -71,7 +71,7 @@ class Levels:
 
     def __post_init__(self) -> None:
         """Prepare the margin."""
-        self.middle = middle_of(self.wrenches)
+        self.middle = middle_wrench(self.wrenches)
         self._margins = MarginRows(self.robot, self.wrenches, self.model, self.moment_arm)
         self._scales = [one.scale(self.robot) for one in self.criteria]
 
@@ -135,7 +135,7 @@ class Levels:
         return Details(level, bracket.value, criterion, cable, np.full(len(rows), rotation, dtype=np.int64))
 
 
-def middle_of(wrenches: WrenchSet) -> Array:
+def middle_wrench(wrenches: WrenchSet) -> Array:
     """Middle of a wrench set, of polytopes the mean of the corners: force [N], moment [N m], shape (6,)."""
     ends = np.cumsum(wrenches.sizes)
     means = [wrenches.corners[end - size : end].mean(axis=0) for end, size in zip(ends, wrenches.sizes, strict=True)]
