@@ -59,8 +59,9 @@ def the_command_writes_the_page_and_tells_the_table(
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.stderr
     lines = done.stdout.splitlines()
-    assert [line.split()[0] for line in lines[1:12]] == [*whole.table.points, "mean"]
-    assert lines[11].split()[1:] == ["18.4", f"{1e3 * whole.distance.mean():.3f}"]
+    rows = {line.split()[0]: line.split()[1:] for line in lines if line.split()}
+    assert {*whole.table.points, "mean"} <= rows.keys()
+    assert rows["mean"] == ["18.4", f"{1e3 * whole.distance.mean():.3f}"]
     assert max(map(len, lines)) <= 80
     assert "13.9 min" in lines[-1].replace("\u00a0", " ")
     done = CliRunner().invoke(app, [*words, "--json"])
