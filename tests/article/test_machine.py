@@ -177,13 +177,13 @@ def test_information_counts_parameters_and_scatter() -> None:
 
 
 def test_the_tour_stops_at_the_ten_poses() -> None:
-    way = tour()
-    path = way.plan.path
+    plan, stops = tour()
+    path = plan.path
     assert path is not None
-    for stop, desired in zip(way.stops, table2().desired, strict=True):
+    for stop, desired in zip(stops, table2().desired, strict=True):
         k = int(np.argmin(np.abs(path.time - stop)))
         assert path.pose.position[k] == pytest.approx(desired, abs=1e-3)
-    assert way.plan.feasible.all()
+    assert plan.feasible.all()
 
 
 def test_a_machine_without_rest_says_so(study: Planned) -> None:

@@ -221,8 +221,8 @@ def test_what_ten_poses_cannot_tell(study: TenPoses) -> None:
     by_anchors = np.tile([0.0, 0.0, 1.0], 10)  # nearly: all is lifted
     others = np.stack((by_zero, by_anchors), axis=1)
     part = others @ np.linalg.lstsq(others, by_pulley)[0]
-    assert study.limits.imitated == pytest.approx(np.linalg.norm(part) / np.linalg.norm(by_pulley), abs=5e-3)
-    assert study.limits.imitated == pytest.approx(0.99, abs=2e-3)
+    assert study.imitated == pytest.approx(np.linalg.norm(part) / np.linalg.norm(by_pulley), abs=5e-3)
+    assert study.imitated == pytest.approx(0.99, abs=2e-3)
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=pulley))
     lengths = sl.inverse(robot, study.plan.state.pose, tension=METHOD).unstrained_length
     columns = []
@@ -232,7 +232,7 @@ def test_what_ten_poses_cannot_tell(study: TenPoses) -> None:
     matrix = np.stack(columns, axis=1)
     scatter = study.best(2).rms * np.sqrt(30 / 22)
     deviation = scatter * np.sqrt(np.diag(np.linalg.inv(matrix.T @ matrix)))
-    np.testing.assert_allclose(study.limits.single_zero, deviation, rtol=1e-3)
+    np.testing.assert_allclose(study.single_zero, deviation, rtol=1e-3)
 
 
 def test_the_documentation_tells_the_same_numbers(study: TenPoses) -> None:
@@ -245,7 +245,7 @@ def test_the_documentation_tells_the_same_numbers(study: TenPoses) -> None:
     for (_, *cells), found in zip(rows, told, strict=True):
         numbers = f"{1e3 * found.rms:.1f} mm", f"{1e3 * found.left_out:.1f} mm", f"{found.aicc:.1f}"
         assert tuple(cell.strip() for cell in cells) == numbers
-    least, most = 1e3 * study.limits.single_zero.min(), 1e3 * study.limits.single_zero.max()
+    least, most = 1e3 * study.single_zero.min(), 1e3 * study.single_zero.max()
     assert f"{least:.0f} to {most:.0f} mm" in flowing
-    assert f"reproduce {100.0 * study.limits.imitated:.1f} % of" in flowing
+    assert f"reproduce {100.0 * study.imitated:.1f} % of" in flowing
     assert f"{sum(len(group) for group in study.explanations)} models" in flowing

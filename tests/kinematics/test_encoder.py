@@ -179,7 +179,7 @@ def memory_matters(plan: Plan, winding_tension: float) -> float:
 
 
 def test_on_the_prototypes_tour_the_memory_is_worth_twelve_millimeters() -> None:
-    plan = tour().plan
+    plan, _ = tour()
     tension = plan.state.cables.frame_end_tension
     assert (tension.min(), tension.max()) == pytest.approx((71.0, 768.0), abs=0.5)
     assert plan.state.one_robot.cables.axial_stiffness == pytest.approx(14e3)

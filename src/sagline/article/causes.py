@@ -68,12 +68,12 @@ def limits_of_ten_points(study: TenPoses) -> Finding:
     """Limits of ten points: parameters that they cannot tell apart."""
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {PULLEY, ANCHORS} for found in few)
-    zeros = 1e3 * study.limits.single_zero
+    zeros = 1e3 * study.single_zero
     return finding(
         "ten-points",
         numbers={
             "printing_rms_mm": 1e3 * PRINTING,
-            "pulley_imitated_by_zero_and_anchor_height": study.limits.imitated,
+            "pulley_imitated_by_zero_and_anchor_height": study.imitated,
             "single_zero_deviation_mm": zeros,
             "few_mm": 1e3 * FEW,
             "pairs_that_leave_few": len(few),

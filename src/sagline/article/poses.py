@@ -8,7 +8,7 @@ from sagline.article.causes import best_explanations, limits_of_ten_points, sing
 from sagline.article.drawing import Drawings, axes, cables_over_time, error_panels, legend_above
 from sagline.article.machine import Parameter
 from sagline.article.sampling import fit_line
-from sagline.article.ten_poses import TenPoses, Tour, ten_poses, tour
+from sagline.article.ten_poses import TenPoses, ten_poses, tour
 from sagline.article.texts import chapter, finding
 from sagline.core.arrays import Array
 from sagline.core.numbers import n
@@ -20,14 +20,14 @@ AREA = 2e4  # pt^2 a meter of error
 
 def poses_chapter() -> Chapter:
     """The ten poses of the prototype, and what could be wrong with it."""
-    study, way = ten_poses(), tour()
+    study = ten_poses()
     draw = Drawings("poses")
     return chapter(
         "poses",
         (
             _table(study),
             single_causes(study),
-            _tour(way, draw),
+            _tour(draw),
             _space(study, draw),
             _trends(study, draw),
             best_explanations(study, draw),
@@ -65,8 +65,9 @@ def _table(study: TenPoses) -> Finding:
     )
 
 
-def _tour(way: Tour, draw: Drawings) -> Finding:
-    path, cables = way.plan.path, way.plan.state.cables
+def _tour(draw: Drawings) -> Finding:
+    plan, stops = tour()
+    path, cables = plan.path, plan.state.cables
     assert path is not None
     panels = []
     for values, label, caption in (
@@ -77,7 +78,7 @@ def _tour(way: Tour, draw: Drawings) -> Finding:
             "Planned differences of length from the home pose, for figure 26.",
         ),
     ):
-        figure, _ = cables_over_time(path.time, values, label, 0.9, stops=way.stops.tolist())
+        figure, _ = cables_over_time(path.time, values, label, 0.9, stops=stops.tolist())
         panels.append(draw.panel(figure, caption))
     tension = cables.frame_end_tension
     return finding(
@@ -85,10 +86,10 @@ def _tour(way: Tour, draw: Drawings) -> Finding:
         numbers={
             "frame_end_tension_min_N": tension.min(),
             "frame_end_tension_max_N": tension.max(),
-            "feasible_share": float(np.mean(way.plan.feasible)),
+            "feasible_share": float(np.mean(plan.feasible)),
         },
         panels=panels,
-        feasible="yes" if way.plan.feasible.all() else "no",
+        feasible="yes" if plan.feasible.all() else "no",
     )
 
 

@@ -40,22 +40,6 @@ class Trend(NamedTuple):
     height_slope: float
 
 
-class Tour(NamedTuple):
-    """The prototype's way through the ten poses."""
-
-    plan: sl.Plan  # planned along it with the empirical model
-    stops: Array  # when it passes the ten poses [s], shape (10,)
-
-
-class Limits(NamedTuple):
-    """Limits of ten poses near the best explanation by two parameters."""
-
-    # of what a pulley radius does to the positions, the part that a zero of the lengths and an anchor height do
-    # together: length of the projection over length of the whole
-    imitated: float
-    single_zero: Array  # standard deviation of the zero of each cable if every cable had its own [m], shape (m,)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class TenPoses:
     """The ten poses."""
@@ -68,7 +52,10 @@ class TenPoses:
     trends: tuple[Trend, ...]  # one parameter off at a time
     # all explanations by one, by two and by three parameters, those that leave least first within each
     explanations: tuple[tuple[Explanation, ...], ...]
-    limits: Limits  # what the poses cannot tell apart
+    # part of a pulley radius's effect on the positions that a zero of the lengths and an anchor height reproduce
+    # together: length of the projection over length of the whole
+    imitated: float
+    single_zero: Array  # standard deviation of the zero of each cable if every cable had its own [m], shape (m,)
     dead_meter: Array  # predicted actual less desired position with 1 m of dead cable [m], shape (10, 3)
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
@@ -94,6 +81,7 @@ def ten_poses(most: int = 3) -> TenPoses:
     nominal, dead, *off = error_of([{}, {DEAD: 1.0}, *({one.name: one.typical} for one in PARAMETERS)])
     found = sorted(explanations(error_of, table.error, subsets(PARAMETERS, most)), key=lambda one: one.rms)
     ranked = tuple(tuple(one for one in found if len(one.parameters) == count + 1) for count in range(most))
+    imitated, single_zero = _limits(robot, error_of, plan, ranked[1][0])
     return TenPoses(
         table=table,
         plan=plan,
@@ -102,19 +90,20 @@ def ten_poses(most: int = 3) -> TenPoses:
         height_line=fit_line(table.desired[:, 2], table.error[:, 2]),
         trends=tuple(_trend(parameter, error, table) for parameter, error in zip(PARAMETERS, off, strict=True)),
         explanations=ranked,
-        limits=_limits(robot, error_of, plan, ranked[1][0]),
+        imitated=imitated,
+        single_zero=single_zero,
         dead_meter=dead,
         measured_rms=float(np.sqrt(np.mean(table.error**2))),
     )
 
 
-def tour(rate: float = 10.0) -> Tour:
+def tour(rate: float = 10.0) -> tuple[sl.Plan, Array]:
     """The prototype's way from its home position through the ten poses and back, from rest to rest, without stops."""
     stops = [HOME, *table2().desired, HOME]
     path = sl.quintic_path(stops, speed=TOUR_SPEED, rate=rate)
     plan = sl.inverse(sl.load_robot("article-prototype"), path, sl.Empirical(), METHOD)
     way = np.linalg.norm(np.diff(np.asarray(stops), axis=0), axis=1)
-    return Tour(plan, locked(np.cumsum(way * QUINTIC.peak_speed / TOUR_SPEED)[:-1]))
+    return plan, locked(np.cumsum(way * QUINTIC.peak_speed / TOUR_SPEED)[:-1])
 
 
 def _planned(robot: sl.Robot, positions: Array) -> sl.Plan:
@@ -127,8 +116,8 @@ def _trend(parameter: Parameter, error: Array, table: Table2) -> Trend:
     return Trend(parameter, error, float(line.slope))
 
 
-def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> Limits:
-    """Limits of ten poses near an explanation."""
+def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanation) -> tuple[float, Array]:
+    """Limits of ten poses near the best explanation by two parameters: `imitated` and `single_zero`."""
     at = dict(zip((p.name for p in found.parameters), found.values, strict=True))
     three = tuple(p for p in PARAMETERS if p.name in (PULLEY, ZERO, ANCHORS))
     slopes = tangents(error_of, [three], [np.array([at.get(p.name, 0.0) for p in three])])[0].slopes
@@ -138,7 +127,5 @@ def _limits(robot: sl.Robot, error_of: ErrorOf, plan: sl.Plan, found: Explanatio
     state = sl.inverse(robot_with_errors(robot, at), plan.state.pose, tension=METHOD).state
     by_zero = sl.stiffness(state).length_sensitivity[:, :3].reshape(-1, robot.cable_count)
     scatter = found.rms * np.sqrt(len(by_zero) / (len(by_zero) - robot.cable_count))
-    return Limits(
-        imitated=float(np.linalg.norm(imitation) / np.linalg.norm(whole)),
-        single_zero=scatter * np.sqrt(np.diag(np.linalg.inv(by_zero.T @ by_zero))),
-    )
+    imitated = float(np.linalg.norm(imitation) / np.linalg.norm(whole))
+    return imitated, scatter * np.sqrt(np.diag(np.linalg.inv(by_zero.T @ by_zero)))
