@@ -63,13 +63,14 @@ def test_blocks_do_not_overlap_and_are_all_inside(m: int, n: int, method: int) -
         assert array.shape == shape, name
 
 
-def test_a_block_and_the_place_that_follows() -> None:
-    numbers = np.arange(20.0)
-    rows, at = take_block(numbers, 3, 2, 4)
-    np.testing.assert_array_equal(rows, np.arange(3.0, 11.0).reshape(2, 4))
-    assert at == 11
+def test_a_block_and_the_memory_that_is_left() -> None:
+    whole = Memory(np.arange(20.0), np.arange(3))
+    rows, rest = take_block(whole, 2, 4)
+    np.testing.assert_array_equal(rows, np.arange(8.0).reshape(2, 4))
+    np.testing.assert_array_equal(rest.numbers, np.arange(8.0, 20.0))
+    np.testing.assert_array_equal(rest.counters, np.arange(3))
     with pytest.raises(ValueError, match="total size"):
-        take_block(numbers, 13, 2, 4)
+        take_block(rest, 2, 7)
 
 
 def test_too_little_memory_is_told() -> None:

@@ -1,6 +1,7 @@
 """The memory that kernels work in: kernels allocate nothing, which spares them counting references to it.
 
-It comes from Python as one flat array of numbers and one of counters, from which a kernel carves its blocks.
+It comes from Python as one flat array of numbers and one of counters, from which `block`,
+`vector` and `counters` take named arrays one after the other.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from sagline.kernels.jit import glue
 
 
 class Memory(NamedTuple):
-    """Memory of a kernel."""
+    """Memory of a kernel, or what is left of it."""
 
     numbers: Array  # flat
     counters: Indices  # flat
@@ -26,12 +27,19 @@ def memory_for(cables: int) -> tuple[Array, Indices]:
 
 
 @glue
-def block(numbers: Array, at: int, rows: int, columns: int) -> tuple[Array, int]:
-    """A block (rows, columns) of flat memory from a place on, and the place that follows it."""
-    return numbers[at : at + rows * columns].reshape((rows, columns)), at + rows * columns
+def block(memory: Memory, rows: int, columns: int) -> tuple[Array, Memory]:
+    """A block (rows, columns), and the memory that is left."""
+    size = rows * columns
+    return memory.numbers[:size].reshape((rows, columns)), Memory(memory.numbers[size:], memory.counters)
 
 
 @glue
-def counters(memory: Memory, at: int, count: int) -> tuple[Indices, int]:
-    """So many counters from a place on, and the place that follows them."""
-    return memory.counters[at : at + count].reshape((count,)), at + count  # which tells when there are too few
+def vector(memory: Memory, size: int) -> tuple[Array, Memory]:
+    """A vector (size,), and the memory that is left."""
+    return memory.numbers[:size].reshape((size,)), Memory(memory.numbers[size:], memory.counters)
+
+
+@glue
+def counters(memory: Memory, count: int) -> tuple[Indices, Memory]:
+    """So many counters, and the memory that is left; reshape fails where there are too few."""
+    return memory.counters[:count].reshape((count,)), Memory(memory.numbers, memory.counters[count:])

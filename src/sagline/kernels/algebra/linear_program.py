@@ -13,7 +13,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.algebra.bounds import TOLERANCE, box_radius, inward, largest_bound, most_violated_bound, side_of
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.memory import Memory, block, counters
+from sagline.kernels.memory import Memory, block, counters, vector
 
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
@@ -38,10 +38,10 @@ class Basis(NamedTuple):
 @glue
 def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
     """Work arrays for d unknowns, and the memory that is left."""
-    weights, at = block(memory.numbers, 0, 1, d + 1)
-    inverse, at = block(memory.numbers, at, d, d)
-    labels, after = counters(memory, 0, d + 1)
-    return Basis(labels, weights[0], inverse), Memory(memory.numbers[at:], memory.counters[after:])
+    weights, memory = vector(memory, d + 1)
+    inverse, memory = block(memory, d, d)
+    labels, memory = counters(memory, d + 1)
+    return Basis(labels, weights, inverse), memory
 
 
 @formula

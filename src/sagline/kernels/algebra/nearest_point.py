@@ -39,11 +39,11 @@ class ActiveSet(NamedTuple):
 @glue
 def new_active_set(memory: Memory, d: int) -> tuple[ActiveSet, Memory]:
     """Work arrays for d unknowns, and the memory that is left."""
-    frame, at = block(memory.numbers, 0, d + 1, d)
-    triangle, at = block(memory.numbers, at, d + 1, d + 1)
-    pushes, at = block(memory.numbers, at, 2, d + 1)
-    labels, after = counters(memory, 0, d + 2)
-    return ActiveSet(labels, frame, triangle, pushes), Memory(memory.numbers[at:], memory.counters[after:])
+    frame, memory = block(memory, d + 1, d)
+    triangle, memory = block(memory, d + 1, d + 1)
+    pushes, memory = block(memory, 2, d + 1)
+    labels, memory = counters(memory, d + 2)
+    return ActiveSet(labels, frame, triangle, pushes), memory
 
 
 @glue

@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS
 from sagline.kernels.algebra.factors import factorize, minimum_norm, orthogonal_factor, pseudo_inverse
 from sagline.kernels.balance.wrench import along_freedom, fill_structure_matrix, needed_wrench, rows_along_freedom
@@ -21,16 +21,8 @@ from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import chord_tension_at_frame_end, taut_at_frame_end
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import (
-    FRAME_END_TENSION,
-    HORIZONTAL_TENSION,
-    LIMITS_OF_FRAME_END,
-    POSE_NO_CHORD,
-    POSE_SINGULAR,
-    POSE_SOLVED,
-)
 from sagline.kernels.jit import glue
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 
 SHORTEST_CHORD = 1e-9  # [m]
 
@@ -75,25 +67,25 @@ class Balance(NamedTuple):
 @glue
 def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
     """Work arrays for m cables and n free motions, and the memory that is left."""
-    r = m - n
-    numbers = memory.numbers
-    rotation, at = block(numbers, 0, 3, 3)
-    diagonals, at = block(numbers, at, 2, n)
-    rows, at = block(numbers, at, g.GEOMETRY_ROWS + 6 + 3 * n + (m + 1) + r + STRIP_ROWS + 3, m)
-    full = rows[g.GEOMETRY_ROWS :]
-    matrix = full[6:]
-    reduced = matrix[n:]
-    inverse = reduced[n:]
-    q = inverse[n:]
-    null = q[m + 1 :]
-    bounds = null[r:]
-    others = bounds[STRIP_ROWS:]
+    rotation, memory = block(memory, 3, 3)
+    geometry, memory = block(memory, g.GEOMETRY_ROWS, m)
+    full, memory = block(memory, 6, m)
+    matrix, memory = block(memory, n, m)
+    reduced, memory = block(memory, n, m)
+    diagonals, memory = block(memory, 2, n)
+    q, memory = block(memory, m + 1, m)
+    inverse, memory = block(memory, n, m)
+    null, memory = block(memory, m - n, m)
+    needed, memory = vector(memory, 6)
+    right, memory = vector(memory, n)
+    bounds, memory = block(memory, STRIP_ROWS, m)
+    others, memory = block(memory, 3, m)
+    scale, offset, tension = others[0], others[1], others[2]
     balance = Balance(
-        rotation, rows[: g.GEOMETRY_ROWS], full[:6], matrix[:n], reduced[:n], diagonals, q[: m + 1], inverse[:n],
-        null[:r], numbers[at : at + 6], numbers[at + 6 : at + 6 + n], others[0], others[1], bounds[:STRIP_ROWS],
-        others[2],
+        rotation, geometry, full, matrix, reduced, diagonals, q, inverse, null, needed, right, scale, offset, bounds,
+        tension,
     )  # fmt: skip
-    return balance, Memory(numbers[at + 6 + n :], memory.counters)
+    return balance, memory
 
 
 @glue
@@ -112,11 +104,11 @@ def set_pose(
     """
     cable_geometry(platform.robot, platform.body, platform.pose, balance.rotation, balance.geometry)
     if not place_cables(model, limits, platform.robot, balance.geometry, cables):
-        return POSE_NO_CHORD
+        return codes.POSE_NO_CHORD
     fill_structure_matrix(balance.geometry, balance.full)
     rows_along_freedom(platform.freedom, balance.full, balance.matrix)
     _choose_variable(variable, weight, cables, balance)
-    return POSE_SOLVED if factor_balance(balance) else POSE_SINGULAR
+    return codes.POSE_SOLVED if factor_balance(balance) else codes.POSE_SINGULAR
 
 
 @glue
@@ -139,7 +131,7 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
         cables.half_weight[i] = 0.5 * robot[i, tables.DENSITY] * model.gravity * chord
         cables.sag_force[i] = shallow_sag_force(model, chord, robot[i, tables.DENSITY])
         low, high = robot[i, tables.TENSION_MIN], robot[i, tables.TENSION_MAX]
-        if limits.quantity == LIMITS_OF_FRAME_END:
+        if limits.quantity == codes.LIMITS_OF_FRAME_END:
             line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
             low = chord_tension_at_frame_end(model, line, material, pulley, low)
             high = taut_at_frame_end(model, line, material, pulley, high, 0.0)  # 0: no cable hangs with so little
@@ -161,9 +153,9 @@ def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Bala
     for i in range(weight.size):
         scale = weight[i]
         offset = 0.0
-        if variable == HORIZONTAL_TENSION:
+        if variable == codes.HORIZONTAL_TENSION:
             scale *= cables.cosine[i]
-        elif variable == FRAME_END_TENSION:
+        elif variable == codes.FRAME_END_TENSION:
             offset = -cables.half_weight[i] * cables.sine[i]
         balance.scale[i] = scale
         balance.offset[i] = offset

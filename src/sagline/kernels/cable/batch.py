@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Codes, Flags
+from sagline.kernels import codes
 from sagline.kernels.cable.catenary import (
     TAUT_STRAIN,
     catenary_end,
@@ -15,7 +16,6 @@ from sagline.kernels.cable.catenary import (
 )
 from sagline.kernels.cable.models import from_length, from_tension, sag_of_shallow, shallow_length_ratio
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
-from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import entry, kernel
 
 CHUNK = 256  # cables at a time: so many buffers of this length stay in the fastest cache
@@ -74,7 +74,7 @@ def batch_from_tension(
             cosine[i] = x[i] / chord[i]
         for i in range(size):
             half[i] = 0.5 * rho[i] * model.gravity * chord[i] / tau[i]
-        if model.code == CATENARY:
+        if model.code == codes.CATENARY:
             for i in range(size):
                 ratio[i] = ordinary_length_ratio(half[i], sine[i], cosine[i], tau[i] / ea[i])
             stretched = 0
@@ -88,8 +88,8 @@ def batch_from_tension(
             for i in range(size):
                 ratio[i] *= chord[i]
         for i in range(size):
-            status = CABLE_SOLVED
-            if model.code != CATENARY or not is_ordinary(half[i], tau[i] / ea[i]):
+            status = codes.CABLE_SOLVED
+            if model.code != codes.CATENARY or not is_ordinary(half[i], tau[i] / ea[i]):
                 line = Chord(chord[i], sine[i], cosine[i])
                 ratio[i], sag_force[i], status = from_tension(model, line, Material(rho[i], ea[i]), tau[i])
             status_out[start + i] = status
@@ -165,7 +165,7 @@ def shape_points(
     for i in range(points_out.shape[0]):
         for k in range(count):
             t = k / (count - 1)
-            if model.code == CATENARY and density[i] * model.gravity > 0.0:
+            if model.code == codes.CATENARY and density[i] * model.gravity > 0.0:
                 x, z = catenary_point(
                     t, horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i]
                 )
@@ -179,7 +179,7 @@ def shape_points(
 @kernel
 def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
     """Drop below the chord [m] at a fraction t of it: b D t (1 - t)/tau, with b the sag force on the end."""
-    if model.code == STRAIGHT or model.code == ELASTIC or tension == 0.0:
+    if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or tension == 0.0:
         return 0.0
     chord = math.hypot(span, rise)
     sag_force = vertical - tension * rise / chord
@@ -218,7 +218,7 @@ def largest_sags(
     model = model_of(terms)
     for i in range(sag_out.shape[0]):
         weight = density[i] * model.gravity
-        if model.code == CATENARY and weight > 0.0:
+        if model.code == codes.CATENARY and weight > 0.0:
             sag_out[i] = _catenary_sag(span[i], rise[i], length[i], horizontal[i], vertical[i], weight, stiffness[i])
         else:
             sag_out[i] = _shallow_drop(0.5, model, span[i], rise[i], vertical[i], tension[i])
@@ -244,9 +244,9 @@ def closures(
     model = model_of(terms)
     for i in range(residual_out.shape[0]):
         chord = math.hypot(span[i], rise[i])
-        if model.code == STRAIGHT:
+        if model.code == codes.STRAIGHT:
             residual_out[i] = abs(length[i] - chord)
-        elif model.code == CATENARY and density[i] * model.gravity > 0.0:
+        elif model.code == codes.CATENARY and density[i] * model.gravity > 0.0:
             x, z = catenary_end(horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i])
             residual_out[i] = math.hypot(x - span[i], z - rise[i])
         elif tension[i] == 0.0:  # slack: any length beyond the chord will do
@@ -254,9 +254,9 @@ def closures(
         else:
             sine = rise[i] / chord
             cosine = span[i] / chord
-            weightless = model.code == ELASTIC or density[i] * model.gravity == 0.0
+            weightless = model.code == codes.ELASTIC or density[i] * model.gravity == 0.0
             sag = 0.0 if weightless else sag_of_shallow(model, density[i] * chord * cosine)
-            sag_force = vertical[i] - tension[i] * sine if model.code == EMPIRICAL else 0.0
+            sag_force = vertical[i] - tension[i] * sine if model.code == codes.EMPIRICAL else 0.0
             ratio = shallow_length_ratio(tension[i], sine, cosine, sag_force, sag, stiffness[i])
             residual_out[i] = abs(length[i] - chord * ratio)
 

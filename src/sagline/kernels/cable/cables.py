@@ -50,15 +50,15 @@ class Cables(NamedTuple):
 @glue
 def new_cables(memory: Memory, m: int, machine: bool) -> tuple[Cables, Memory]:
     """Work arrays for m cables, behind which there may be something (machine), and the memory that is left."""
-    own, at = block(memory.numbers, 0, 20, m)
-    other, at = block(memory.numbers, at, 6, m)
+    own, memory = block(memory, 20, m)
+    other, memory = block(memory, 6, m)
     free = other if machine else own[:6]
     cables = Cables(
         machine, own[6], own[7], own[0], own[1], own[2], own[3], own[8], own[9], own[4], own[10], own[5], own[11],
         own[12], own[13], free[0], free[1], free[2], free[3], free[4], free[5], own[18], own[19], own[14], own[15],
         own[16], own[17],
     )  # fmt: skip
-    return cables, Memory(memory.numbers[at:], memory.counters)
+    return cables, memory
 
 
 @glue

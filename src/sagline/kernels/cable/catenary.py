@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from sagline.kernels import codes
 from sagline.kernels.algebra.functions import (
     POLYNOMIAL_LIMIT,
     atanhc,
@@ -20,7 +21,6 @@ from sagline.kernels.algebra.functions import (
     sinhc_polynomial,
 )
 from sagline.kernels.cable.terms import Force
-from sagline.kernels.codes import CABLE_NOT_CONVERGED, CABLE_SLACK, CABLE_SOLVED, CABLE_TOO_SLACK
 from sagline.kernels.jit import formula, kernel
 
 RANGE = 500.0  # of X = wD/(2 tau): beyond it sinh X overflows and no cable hangs like this
@@ -113,9 +113,9 @@ def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) 
         ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
         if strain > TAUT_STRAIN:
             ratio = ordinary_length_ratio_near(half_weight, sine, cosine, strain, ratio)
-        return ratio, CABLE_SOLVED
+        return ratio, codes.CABLE_SOLVED
     if not half_weight < RANGE:
-        return math.nan, CABLE_TOO_SLACK
+        return math.nan, codes.CABLE_TOO_SLACK
     cosine2 = cosine * cosine
     sine2 = sine * sine
     square = half_weight * half_weight
@@ -145,8 +145,8 @@ def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) 
         change = abs(new - ratio)
         ratio = new
         if change <= SMALL_NEWTON_STEP * ratio:
-            return ratio, CABLE_SOLVED
-    return ratio, CABLE_NOT_CONVERGED
+            return ratio, codes.CABLE_SOLVED
+    return ratio, codes.CABLE_NOT_CONVERGED
 
 
 @kernel
@@ -249,8 +249,8 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
         change = abs(new - h)
         h = new
         if change <= SMALL_HALLEY_STEP * (h + kappa):
-            return h, CABLE_SOLVED
-    return h, CABLE_NOT_CONVERGED
+            return h, codes.CABLE_SOLVED
+    return h, codes.CABLE_NOT_CONVERGED
 
 
 @formula
@@ -265,8 +265,8 @@ def _vertical_from_length(rise: float, length: float, weight: float, stiffness: 
         # tanh h = kappa/stretch; a weightless cable has h = 0 and carries the sag force alone
         h = math.atanh(kappa / stretch) if stretch > kappa else math.inf
         tension = sag_force if weight == 0.0 else 0.5 * weight * height / (h + kappa)
-        return vertical, tension, CABLE_SOLVED if tension > 0.0 else CABLE_SLACK
-    return 0.5 * weight * length + 0.5 * weight * rise / (1.0 + kappa), 0.0, CABLE_SLACK
+        return vertical, tension, codes.CABLE_SOLVED if tension > 0.0 else codes.CABLE_SLACK
+    return 0.5 * weight * length + 0.5 * weight * rise / (1.0 + kappa), 0.0, codes.CABLE_SLACK
 
 
 @kernel

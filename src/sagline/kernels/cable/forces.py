@@ -10,14 +10,13 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import cosh_polynomial, sinh_excess_polynomial, sinhc_polynomial
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.catenary import SMALL_HALLEY_STEP, relative_excess
 from sagline.kernels.cable.models import from_length
 from sagline.kernels.cable.over_pulleys import fill_equivalent_cables, start_passes, update_from_equivalent_cables
 from sagline.kernels.cable.terms import Material, Model
-from sagline.kernels.codes import CABLE_NOT_CONVERGED, CABLE_SOLVED, CATENARY
 from sagline.kernels.jit import formula, glue
 
 CLOSE = 0.1  # relative first step within which two Halley steps are trusted
@@ -115,13 +114,13 @@ def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) 
                 break
         if not missed <= MISSED:
             for i in range(cables.shape[0]):
-                rows[g.STATUS, i] = CABLE_NOT_CONVERGED
+                rows[g.STATUS, i] = codes.CABLE_NOT_CONVERGED
 
 
 @glue
 def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
     """Fill T_x, T_z, tau and status of the cables that are asked for."""
-    exact = model.code == CATENARY
+    exact = model.code == codes.CATENARY
     if exact:
         _two_halley_steps(model.gravity, cables, asked, rows)
     for i in range(cables.shape[0]):
@@ -137,7 +136,7 @@ def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCabl
             rows[g.HORIZONTAL, i] = half * span
             rows[g.VERTICAL, i] = 0.5 * weight * (length + rise / (tangent + kappa))
             rows[g.TENSION, i] = half * chord
-            rows[g.STATUS, i] = CABLE_SOLVED
+            rows[g.STATUS, i] = codes.CABLE_SOLVED
             rows[g.PARAMETER, i] = h
             continue
         force, status = from_length(model, span, rise, Material(density, asked.stiffness[i]), length)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import EXCESS_LIMIT, angle, atanhc_excess_polynomial
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.catenary import catenary_end
@@ -28,7 +28,6 @@ from sagline.kernels.cable.pulley import (
     straight_behind,
 )
 from sagline.kernels.cable.terms import Chord, Material, Model, PlaneStiffness
-from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.jit import formula, glue
 
 LEAST_FREE = 1e-3  # of a cable's length: what is asked for is never shorter
@@ -73,7 +72,7 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
         rows[g.ASKED_LENGTH, i] = max(length - rows[g.BEHIND, i], LEAST_FREE * length)
     for i in range(m):
         rows[g.SOFT, i] = cables[i, tables.STIFFNESS] / (1.0 + rows[g.BEHIND, i] / rows[g.ASKED_LENGTH, i])
-    if model.code == CATENARY:
+    if model.code == codes.CATENARY:
         for i in range(m):
             rows[g.ASKED_SPAN, i] = rows[g.SPAN, i] + rows[g.OFF_X, i]
         for i in range(m):
@@ -96,7 +95,7 @@ def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> f
     A miss is added to what is asked for next time: of the exact cable by how much its platform end is missed, of the
     shallow ones by how much their length.
     """
-    if model.code == CATENARY:
+    if model.code == codes.CATENARY:
         _exit_points_from_forces(model, cables, rows)
         _fill_free_span_ends(model, cables, rows)
         return _end_errors(rows)
@@ -192,7 +191,7 @@ def _length_errors(model: Model, cables: Array, rows: Array) -> float:
         wrapped, dead = behind_cable(model, material, pulley, tension, _wrap_at(rows, i))
         free = rows[g.LENGTH, i] - (wrapped + dead)
         rows[g.FREE_LENGTH, i] = free
-        if model.code != ELASTIC and tension > 0.0:
+        if model.code != codes.ELASTIC and tension > 0.0:
             miss = free - from_tension(model, chord, material, tension)[0]
             rows[g.OFF_LENGTH, i] += miss
             largest = _larger(largest, abs(miss) / rows[g.LENGTH, i])
@@ -202,7 +201,7 @@ def _length_errors(model: Model, cables: Array, rows: Array) -> float:
 @formula
 def _weight_per_length(model: Model, material: Material) -> float:
     """Weight per length that the part behind P has [N/m]: the exact cable's alone."""
-    return material.density * model.gravity if model.code == CATENARY else 0.0
+    return material.density * model.gravity if model.code == codes.CATENARY else 0.0
 
 
 @formula

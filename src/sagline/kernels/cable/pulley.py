@@ -12,10 +12,9 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.terms import Chord, Force, Material, Model
-from sagline.kernels.codes import CATENARY, STRAIGHT
 from sagline.kernels.jit import formula, kernel
 
 
@@ -139,9 +138,9 @@ def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap
 @formula
 def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
     """The same of a cable of any model; only the exact one weighs there, and the straight one does not stretch."""
-    if model.code == STRAIGHT:
+    if model.code == codes.STRAIGHT:
         return Behind(pulley.radius * wrap.angle, pulley.dead)
-    weight = material.density * model.gravity if model.code == CATENARY else 0.0
+    weight = material.density * model.gravity if model.code == codes.CATENARY else 0.0
     return behind(pulley, weight, material.stiffness, tension, wrap)
 
 

@@ -11,11 +11,11 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
+from sagline.kernels import codes
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.states import solve_cable_state, solve_cable_states
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
@@ -53,8 +53,8 @@ class Section(NamedTuple):
 @glue
 def new_curves(model: Model, cables: Cables, statuses: Codes, memory: Memory) -> tuple[Curves, Memory]:
     """Work arrays for the curves of cables in place, and the memory that is left."""
-    turns, at = block(memory.numbers, 0, TURN_ROWS, cables.low.size)
-    return Curves(model, cables, turns, statuses), Memory(memory.numbers[at:], memory.counters)
+    turns, memory = block(memory, TURN_ROWS, cables.low.size)
+    return Curves(model, cables, turns, statuses), memory
 
 
 @kernel
@@ -65,7 +65,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
     for k in range(EXITS if curves.cables.machine else 1):
         solve_cable_states(curves.model, curves.cables, k == 0, False, curves.statuses)
     for i in range(tau.size):
-        if curves.model.code != CATENARY:  # the same at every tension, one of zero included
+        if curves.model.code != codes.CATENARY:  # the same at every tension, one of zero included
             curves.cables.sag_force[i] = shallow_sag_force(
                 curves.model, curves.cables.chord[i], curves.cables.density[i]
             )
@@ -76,7 +76,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
 def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
     """Fill slopes (m,) and curvatures (m,) [1/N] of the sag forces by the chord tensions, from central differences."""
     cables = curves.cables
-    if curves.model.code != CATENARY:
+    if curves.model.code != codes.CATENARY:
         for i in range(tau.size):
             slope[i] = bend[i] = 0.0
         return
@@ -99,7 +99,7 @@ def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
 def sag_force_at(curves: Curves, i: int, tau: float) -> float:
     """Pull of one cable at a chord tension [N]; zero at an infinite one, which leaves no cable to weigh."""
     cables = curves.cables
-    if curves.model.code != CATENARY:
+    if curves.model.code != codes.CATENARY:
         return shallow_sag_force(curves.model, cables.chord[i], cables.density[i])
     if tau == math.inf:
         return 0.0
@@ -296,14 +296,14 @@ def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> Non
     """Fill the turns of the cables' sag forces between chord tensions (m,), which are finite."""
     cables, turns = curves.cables, curves.turns
     m = cables.low.size
-    work, _ = block(memory.numbers, 0, ROWS, m)
+    work, memory = block(memory, ROWS, m)
     for i in range(m):
         turns[LEAST_TENSION, i] = turns[LEAST_SAG_FORCE, i] = turns[MOST_TENSION, i] = turns[MOST_SAG_FORCE, i] = (
             math.nan
         )
         work[A, i] = low[i]
         work[B, i] = high[i]
-    if curves.model.code != CATENARY:
+    if curves.model.code != codes.CATENARY:
         return
     _find_rises(curves, work)
     sought = False

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from sagline.kernels import codes
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import shallow_sag_force
 from sagline.kernels.cable.pulley import Change, Motion, Pulley, end_by
 from sagline.kernels.cable.stiffness import shallow_slopes
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
-from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.jit import formula
 
 
@@ -79,7 +79,7 @@ def force_by_length(
 ) -> Pair:
     """dT/dL [N/m] of a cable of the exact or the weightless model; zero where a weightless one is slack."""
     weight = material.density * model.gravity
-    if model.code == CATENARY and weight > 0.0:
+    if model.code == codes.CATENARY and weight > 0.0:
         end = _catenary_by_length(force.horizontal, force.vertical, length, weight, material.stiffness)
         return force_change(plane, end)
     if force.tension == 0.0:
@@ -113,17 +113,15 @@ def force_slopes(
     horizontal, vertical, tension = force
     stiffness = material.stiffness
     weight = material.density * model.gravity
-    if model.code not in (CATENARY, ELASTIC) and weight > 0.0:
+    if model.code not in (codes.CATENARY, codes.ELASTIC) and weight > 0.0:
         return _shallow_force_slopes(model, span, rise, material, length, tension)
     by_length = force_by_length(model, span, rise, material, length, force, plane)
-    if model.code == CATENARY and weight > 0.0:
+    if model.code == codes.CATENARY and weight > 0.0:
         by_weight = force_change(plane, _catenary_by_weight(horizontal, vertical, length, weight, stiffness))
         soft = -length / (stiffness * stiffness)
         stretched = Pair(soft * horizontal, soft * (vertical - 0.5 * weight * length))
         return _ForceSlopes(
-            by_length,
-            Pair(model.gravity * by_weight.x, model.gravity * by_weight.z),
-            force_change(plane, stretched),
+            by_length, Pair(model.gravity * by_weight.x, model.gravity * by_weight.z), force_change(plane, stretched)
         )
     along = tension / (stiffness * math.hypot(span, rise))
     return _ForceSlopes(by_length, Pair(0.0, 0.0), Pair(along * span, along * rise))
@@ -137,7 +135,7 @@ def slopes_over(
 
     free: unstrained length of the free span [m].
     """
-    weight = 0.0 if model.code == ELASTIC else material.density * model.gravity
+    weight = 0.0 if model.code == codes.ELASTIC else material.density * model.gravity
     by_weight = Motion(0.0, 0.0)
     if weight > 0.0:
         x, z = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)

@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.cable.cables import Cables, chord_of, free_chord_of, material_of, pulley_of
 from sagline.kernels.cable.catenary import (
@@ -20,7 +20,6 @@ from sagline.kernels.cable.geometry import CHORD, COSINE, SINE, cable_geometry
 from sagline.kernels.cable.models import from_tension
 from sagline.kernels.cable.pulley import Pulley, Wrap, behind_cable, free_rise, free_span, pulley_at
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
-from sagline.kernels.codes import CABLE_SOLVED, CATENARY, ELASTIC, STRAIGHT
 from sagline.kernels.jit import entry, glue, kernel
 
 # Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
@@ -43,7 +42,7 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
     The forces are those of the last length and sag force (fresh: of first order) at the present chord tensions. Cables
     of the shallow models leave along their chord.
     """
-    exact = model.code == CATENARY
+    exact = model.code == codes.CATENARY
     for i in range(cables.tau.size):
         chord, pulley = chord_of(cables, i), pulley_of(cables, i)
         half_density = 0.5 * cables.density[i] * model.gravity
@@ -84,7 +83,7 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
         cables.slackness[i] = cables.free_half_weight[i] / cables.free_tau[i]
     for i in range(m):
         cables.strain[i] = cables.free_tau[i] / cables.stiffness[i]
-    if model.code == CATENARY:
+    if model.code == codes.CATENARY:
         stretched = 0
         if not near:
             for i in range(m):
@@ -102,10 +101,10 @@ def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, st
             cables.free_sag_force[i] = cables.free_tau[i] * ordinary_sag_force_ratio(
                 cables.slackness[i], cables.free_sine[i], cables.strain[i], cables.ratio[i]
             )
-    gravest = CABLE_SOLVED
+    gravest = codes.CABLE_SOLVED
     for i in range(m):
-        statuses[i] = CABLE_SOLVED
-        if model.code != CATENARY or not is_ordinary(cables.slackness[i], cables.strain[i]):
+        statuses[i] = codes.CABLE_SOLVED
+        if model.code != codes.CATENARY or not is_ordinary(cables.slackness[i], cables.strain[i]):
             free = free_chord_of(cables, i)
             length, sag_force, status = from_tension(model, free, material_of(cables, i), cables.free_tau[i])
             cables.ratio[i] = length / free.length
@@ -125,7 +124,7 @@ def solve_cable_state(
 ) -> tuple[float, float, int]:
     """Free unstrained length [m], sag force T_z - tau sin phi [N] and status of one cable at a chord tension."""
     length, sag_force, status = from_tension(model, chord, material, tau)
-    if pulley.radius > 0.0 and model.code == CATENARY:
+    if pulley.radius > 0.0 and model.code == codes.CATENARY:
         horizontal, weight = tau * chord.cosine, material.density * model.gravity
         for _ in range(CONTACTS):
             vertical_a = tau * chord.sine + sag_force - weight * length
@@ -145,7 +144,7 @@ def solve_cable_state(
 @kernel
 def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> float:
     """Tension at the frame end of a cable's free span at a chord tension [N]."""
-    if model.code == STRAIGHT or model.code == ELASTIC:
+    if model.code == codes.STRAIGHT or model.code == codes.ELASTIC:
         return tau
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
     return math.hypot(tau * chord.cosine, tau * chord.sine + sag_force - material.density * model.gravity * length)
@@ -174,7 +173,7 @@ def taut_at_frame_end(
     tension: at the frame end [N]; otherwise: the answer where no cable hangs with so little.
     """
     weight = material.density * model.gravity
-    if model.code == STRAIGHT or model.code == ELASTIC or weight == 0.0 or tension == math.inf:
+    if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:
         return tension
     half = 0.5 * weight * chord.length
     along, across = half * chord.sine, half * chord.cosine
@@ -205,14 +204,14 @@ class _CableAtTension(NamedTuple):
 @kernel
 def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
     """A cable at a chord tension, with what is on its pulley and behind it; sag force: T_z - tau sin phi."""
-    weightless = model.code == STRAIGHT or model.code == ELASTIC
+    weightless = model.code == codes.STRAIGHT or model.code == codes.ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
     horizontal, vertical = tau * chord.cosine, tau * chord.sine + sag_force - weight * length
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
     # cables of the shallow models leave along their chord, and have its tension behind it
     sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
-    if model.code == CATENARY:
+    if model.code == codes.CATENARY:
         there = tension
         sine, cosine = horizontal / there, pulley.entry * vertical / there
     rest = behind_cable(model, material, pulley, there, Wrap(sine, cosine, angle(sine, cosine)))

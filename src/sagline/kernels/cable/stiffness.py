@@ -12,13 +12,13 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
+from sagline.kernels import codes
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import sag_of_shallow, shallow_sag_force, stretching_tension
 from sagline.kernels.cable.over_pulleys import across_pulley, energy_over, material_at, stiffness_in_series
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
-from sagline.kernels.codes import CATENARY, ELASTIC, EMPIRICAL, STRAIGHT
 from sagline.kernels.jit import formula, kernel
 
 
@@ -115,7 +115,7 @@ def shallow_slopes(
     sine = rise / chord
     density, stiffness = material
     sag = sag_of_shallow(model, density * chord * cosine)
-    sag_force = shallow_sag_force(model, chord, density) if model.code == EMPIRICAL else 0.0
+    sag_force = shallow_sag_force(model, chord, density) if model.code == codes.EMPIRICAL else 0.0
     stretch = stretching_tension(tension, sine, cosine, sag_force)
     square = tension * tension
     share = sag / square
@@ -158,12 +158,12 @@ def cable_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force
 ) -> PlaneStiffness:
     """In-plane stiffness of a cable of any model; NaN for the straight one, which has none."""
-    if model.code == STRAIGHT:
+    if model.code == codes.STRAIGHT:
         return PlaneStiffness(math.nan, math.nan, math.nan, math.nan)
     weight = material.density * model.gravity
-    if model.code == CATENARY and weight > 0.0:
+    if model.code == codes.CATENARY and weight > 0.0:
         return catenary_stiffness(force.horizontal, force.vertical, length, weight, material.stiffness)
-    if model.code in (CATENARY, ELASTIC) or weight == 0.0:
+    if model.code in (codes.CATENARY, codes.ELASTIC) or weight == 0.0:
         return _elastic_stiffness(span, rise, length, force.tension, material.stiffness)
     return _shallow_stiffness(model, span, rise, material, length, force.tension)
 
@@ -221,9 +221,9 @@ def elastic_energy(chord: float, length: float, tension: float, stiffness: float
 def _cable_energy(model: Model, span: float, rise: float, material: Material, length: float, force: Force) -> float:
     """Energy [J] of a cable of the exact or the weightless model; NaN for the others."""
     weight = material.density * model.gravity
-    if model.code == CATENARY and weight > 0.0:
+    if model.code == codes.CATENARY and weight > 0.0:
         return catenary_energy(span, rise, length, force, weight, material.stiffness)
-    if model.code in (CATENARY, ELASTIC) or weight == 0.0:
+    if model.code in (codes.CATENARY, codes.ELASTIC) or weight == 0.0:
         return elastic_energy(math.sqrt(span * span + rise * rise), length, force.tension, material.stiffness)
     return math.nan
 

@@ -14,7 +14,7 @@ from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.states import chord_tension_at_frame_end, hold_cable
 from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.jit import entry
-from sagline.kernels.memory import block
+from sagline.kernels.memory import Memory, block, vector
 
 ITERATIONS = 3  # of balancing: what the cables' weight sag forces changes little with the tensions
 LEAST = 0.2  # of a tension that was read: balancing takes no more of it away
@@ -48,15 +48,16 @@ def starting_lengths(
     model = model_of(terms)
     count, m = tension.shape
     n = freedom.shape[0]
-    numbers = memory[0]
-    rotation, at = block(numbers, 0, 3, 3)
-    geometry, at = block(numbers, at, GEOMETRY_ROWS, m)
-    along, at = block(numbers, at, m, n)
-    matrix, at = block(numbers, at, n, n)
-    factor, at = block(numbers, at, n, n)
-    tau, sag_force, least = numbers[at : at + m], numbers[at + m : at + 2 * m], numbers[at + 2 * m : at + 3 * m]
-    at += 3 * m
-    six, part = numbers[at : at + 6], numbers[at + 6 : at + 6 + n].reshape((n,))
+    rest = Memory(*memory)
+    rotation, rest = block(rest, 3, 3)
+    geometry, rest = block(rest, GEOMETRY_ROWS, m)
+    along, rest = block(rest, m, n)
+    matrix, rest = block(rest, n, n)
+    factor, rest = block(rest, n, n)
+    wide, rest = block(rest, 3, m)
+    six, rest = vector(rest, 6)
+    part, rest = vector(rest, n)
+    tau, sag_force, least = wide[0], wide[1], wide[2]
     for p in range(count):
         cable_geometry(cables, body, poses[p], rotation, geometry)
         for i in range(m):

@@ -6,11 +6,11 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
+from sagline.kernels import codes
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.over_pulleys import material_at
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula
 
 
@@ -32,7 +32,7 @@ class _FrameEndSlopes(NamedTuple):
 def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
     """Those of cable i, after its forces; zero without a force there."""
     material = material_at(cables, i)
-    gravity = model.gravity if model.code == CATENARY else 0.0
+    gravity = model.gravity if model.code == codes.CATENARY else 0.0
     weight = material.density * gravity
     x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
     if model.behind is None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from sagline.core.arrays import Array, Indices
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.jit import glue
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 
 BESIDE = 6  # readings of a pose beside its load cells: position and rotation in the measuring system's axes
 
@@ -94,38 +94,23 @@ class CalibrationArrays(NamedTuple):
 @glue
 def new_calibration_arrays(memory: Memory, m: int, n: int, readings: int) -> CalibrationArrays:
     """Working memory for m cables, n free motions and so many readings."""
-    numbers = memory.numbers
-    rows, at = block(numbers, 0, CABLE_ROWS, m)
-    rotation, at = block(numbers, at, 3, 3)
-    axes, at = block(numbers, at, 3, 3)
-    stiffness, at = block(numbers, at, 6, 6)
-    factor, at = block(numbers, at, n, n)
-    matrix, at = block(numbers, at, n, n)
-    moved, at = block(numbers, at, readings, 6)
-    ends, at = block(numbers, at, m, 9)
-    shares, at = block(numbers, at, m, 5)
-    by_wrench, at = block(numbers, at, m, 6)
-    by_length, at = block(numbers, at, m, readings)
-    whole, at = block(numbers, at, readings, readings)
-    own, at = block(numbers, at, readings, readings)
-    part, six = numbers[at : at + n], numbers[at + n : at + n + 6]
-    at += n + 6
-    deviation = numbers[at : at + m + BESIDE].reshape((m + BESIDE,))  # which tells when there is too little memory
+    rows, memory = block(memory, CABLE_ROWS, m)
+    rotation, memory = block(memory, 3, 3)
+    axes, memory = block(memory, 3, 3)
+    stiffness, memory = block(memory, 6, 6)
+    factor, memory = block(memory, n, n)
+    matrix, memory = block(memory, n, n)
+    part, memory = vector(memory, n)
+    six, memory = vector(memory, 6)
+    moved, memory = block(memory, readings, 6)
+    ends, memory = block(memory, m, 9)
+    shares, memory = block(memory, m, 5)
+    by_wrench, memory = block(memory, m, 6)
+    by_length, memory = block(memory, m, readings)
+    whole, memory = block(memory, readings, readings)
+    own, memory = block(memory, readings, readings)
+    deviation, memory = vector(memory, m + BESIDE)
     return CalibrationArrays(
-        rows,
-        rotation,
-        axes,
-        stiffness,
-        factor,
-        matrix,
-        part,
-        six,
-        moved,
-        ends,
-        shares,
-        by_wrench,
-        by_length,
-        whole,
-        own,
-        deviation,
-    )
+        rows, rotation, axes, stiffness, factor, matrix, part, six, moved, ends, shares, by_wrench, by_length, whole,
+        own, deviation,
+    )  # fmt: skip

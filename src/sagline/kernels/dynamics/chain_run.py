@@ -9,26 +9,21 @@ from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import progress
 from sagline.kernels.dynamics.drives import Drives, keep_set_points
-from sagline.kernels.dynamics.progress import (
-    LENGTH_AT,
-    READY,
-    WIND_AT,
-    WRENCH_AT,
-    TimeTable,
-    TimeTableArrays,
-    interpolate_table,
-)
 from sagline.kernels.dynamics.rigid_body import CENTER, MASS, VELOCITY, spin
 from sagline.kernels.forward.platform import turned
 from sagline.kernels.jit import glue, kernel
+from sagline.kernels.memory import Memory, block, vector
 
 ROOM = 21
 
 Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], share of a new reading in a load cell's filtered one
 Rules = tuple[int, int, int]  # kind of winches, remembered, loops' stride
 Body = tuple[Array, Array, Array, Array]  # cables, inertia, what of a wrench moves the body, where the given one acts
-Courses = tuple[TimeTableArrays, TimeTableArrays, TimeTableArrays]  # of lengths, wrenches, the wind
+Courses = tuple[
+    progress.TimeTableArrays, progress.TimeTableArrays, progress.TimeTableArrays
+]  # of lengths, wrenches, the wind
 Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
 ChainArrays = tuple[Array, Array, Array, Array, Indices]
 Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes, points
@@ -55,9 +50,9 @@ class ChainRun(NamedTuple):
     free: Array
     handle: Array
     drives: Drives
-    lengths: TimeTable
-    wrenches: TimeTable
-    winds: TimeTable
+    lengths: progress.TimeTable
+    wrenches: progress.TimeTable
+    winds: progress.TimeTable
     state: Array
     rows: Array
     at: Indices
@@ -77,29 +72,22 @@ def chain_run_of(
     kind, remembered, _stride = rules
     step, gravity, _filtering = numbers
     state, rows, now, layers, audit, at, room = kept
-    wide = courses[0][1].shape[1]
-    return ChainRun(
-        _Chains(*chain_arrays),
-        step,
-        gravity,
-        body[0],
-        body[1],
-        body[2],
-        body[3],
-        Drives(kind, remembered > 0, data, now, layers, audit),
-        TimeTable(*courses[0]),
-        TimeTable(*courses[1]),
-        TimeTable(*courses[2]),
-        state,
-        rows,
-        at,
-        room[ROOM : ROOM + wide],
-        room[ROOM + wide : ROOM + 2 * wide],
-        room[0:6],
-        room[6:12],
-        room[12:15],
-        room[15:21],
+    width = courses[0][1].shape[1]
+    memory = Memory(room, at)
+    small, memory = block(memory, 3, 6)
+    wind, memory = vector(memory, 3)
+    targets, memory = vector(memory, width)
+    target_rates, memory = vector(memory, width)
+    lengths, wrenches, winds = (
+        progress.TimeTable(*courses[0]),
+        progress.TimeTable(*courses[1]),
+        progress.TimeTable(*courses[2]),
     )
+    drives = Drives(kind, remembered > 0, data, now, layers, audit)
+    return ChainRun(
+        _Chains(*chain_arrays), step, gravity, body[0], body[1], body[2], body[3], drives, lengths, wrenches, winds,
+        state, rows, at, targets, target_rates, small[0], small[1], wind, small[2],
+    )  # fmt: skip
 
 
 @glue
@@ -115,9 +103,13 @@ def _fill_last_elements(run: ChainRun) -> None:
 def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
     """Fill what is asked of the winches at a time, and what is given of wrench and wind."""
     at = run.at
-    at[LENGTH_AT] = interpolate_table(run.lengths, at[LENGTH_AT], now, shift, run.targets, run.target_rates)
-    at[WRENCH_AT] = interpolate_table(run.wrenches, at[WRENCH_AT], now, 0.0, run.given, run.spare)
-    at[WIND_AT] = interpolate_table(run.winds, at[WIND_AT], now, 0.0, run.wind, run.spare)
+    at[progress.LENGTH_AT] = progress.interpolate_table(
+        run.lengths, at[progress.LENGTH_AT], now, shift, run.targets, run.target_rates
+    )
+    at[progress.WRENCH_AT] = progress.interpolate_table(
+        run.wrenches, at[progress.WRENCH_AT], now, 0.0, run.given, run.spare
+    )
+    at[progress.WIND_AT] = progress.interpolate_table(run.winds, at[progress.WIND_AT], now, 0.0, run.wind, run.spare)
     keep_set_points(run.drives, run.rows, run.targets, run.target_rates)
     _fill_last_elements(run)
 
@@ -158,7 +150,7 @@ def fill_platform_force(run: ChainRun) -> float:
         lifted = row[c.DENSITY] * run.gravity * drives.data[d.BEHIND_RISE, i]
         drives.now[d.AT_FRAME, i], drives.now[d.WHOLE, i] = tension, whole
         drives.now[d.AT_DRUM, i] = d.tension_at_drum(whole, lifted, row[c.STIFFNESS])
-        mean, share = c.mean_tension(chains.pulls[i], n, row), row[c.SMOOTH] if run.at[READY] == 2 else 1.0
+        mean, share = c.mean_tension(chains.pulls[i], n, row), row[c.SMOOTH] if run.at[progress.READY] == 2 else 1.0
         rows[g.TENSION, i] = share * mean + (1.0 - share) * (rows[g.TENSION, i] if share < 1.0 else 0.0)
     for k in range(6):
         free = run.free[k]

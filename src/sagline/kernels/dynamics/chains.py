@@ -12,6 +12,7 @@ from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import chain as c
 from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import progress
 from sagline.kernels.dynamics.chain_run import (
     Body,
     ChainArrays,
@@ -35,23 +36,6 @@ from sagline.kernels.dynamics.drives import (
     store_step_start,
     turn_winches,
 )
-from sagline.kernels.dynamics.progress import (
-    COUNTERS,
-    FAILED,
-    KINETIC,
-    LENGTH_AT,
-    LOST,
-    MOMENT,
-    POTENTIAL,
-    READY,
-    RECORDS,
-    ROUNDING,
-    STEPS,
-    SUPPLIED,
-    has_room,
-    interval_ends,
-    note_events,
-)
 from sagline.kernels.dynamics.rigid_body import (
     CENTER,
     MASS,
@@ -64,7 +48,9 @@ from sagline.kernels.dynamics.rigid_body import (
 )
 from sagline.kernels.jit import entry, glue, kernel
 
-ENDED = COUNTERS  # one counter more than a run without cable mass has: how it ended, FAILED being the cable to blame
+ENDED = (
+    progress.COUNTERS
+)  # one counter more than a run without cable mass has: how it ended, FAILED being the cable to blame
 DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # free nodes of a chain
 GROWTH = 0.5  # of what could have become motion: more than phases that err can invent
@@ -86,7 +72,7 @@ def change_node_count(run: ChainRun, i: int) -> None:
     row, place, speed, n = chains.table[i], chains.place[i], chains.speed[i], chains.counts[i]
     more = 1 if row[c.REST] > row[c.ELEMENT] else -1
     if n + more < FEWEST or n + more + 2 > place.shape[1]:
-        run.at[FAILED], run.at[ENDED] = i + 1, (SHORT if more < 0 else LONG)
+        run.at[progress.FAILED], run.at[ENDED] = i + 1, (SHORT if more < 0 else LONG)
         return
     before, entering_before = _energy_of(run, i)
     if more > 0:
@@ -120,7 +106,7 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
 def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
     """Write down a step, and look whether energy has grown by itself."""
     states, tensions, lengths, energies, _notes, points = records
-    state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[RECORDS]
+    state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
     audit = drives.audit
     kinetic, strain = kinetic_energy(state, run.inertia), 0.0
     raised = run.inertia[MASS] * run.gravity * state[CENTER + 2]
@@ -136,27 +122,27 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
         if drives.kind == d.DRUMS:
             kinetic += 0.5 * drives.data[d.INERTIA, i] * drives.now[d.SPEED, i] * drives.now[d.SPEED, i]
     potential = strain + raised + audit[d.ON_DRUMS]
-    if at[READY] < 2:
-        at[READY] = 2
+    if at[progress.READY] < 2:
+        at[progress.READY] = 2
         audit[d.START] = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST]
     if math.isnan(stock[0]):
         stock[0], stock[1] = kinetic + strain, raised
     invented = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST] - audit[d.START]
     convertible = stock[0] + max(stock[1] - raised, 0.0) + abs(audit[d.SUPPLIED])
-    if not invented <= GROWTH * convertible + ROUNDING * size:
-        at[FAILED], at[ENDED] = blamed + 1, GROWN
+    if not invented <= GROWTH * convertible + progress.ROUNDING * size:
+        at[progress.FAILED], at[ENDED] = blamed + 1, GROWN
     if r < states.shape[0]:
         turning = spin(state, run.inertia)
         for k in range(MOMENTUM):
             states[r, k] = state[k]
         for k in range(3):
             states[r, MOMENTUM + k] = turning[k]
-        energies[r, KINETIC], energies[r, POTENTIAL] = kinetic, potential
-        energies[r, SUPPLIED], energies[r, LOST] = audit[d.SUPPLIED], audit[d.LOST]
+        energies[r, progress.KINETIC], energies[r, progress.POTENTIAL] = kinetic, potential
+        energies[r, progress.SUPPLIED], energies[r, progress.LOST] = audit[d.SUPPLIED], audit[d.LOST]
         for i in range(chains.counts.shape[0]):
             tensions[r, i], lengths[r, i] = drives.now[d.AT_FRAME, i], run.rows[g.LENGTH, i]
             _sample_points(chains.place[i], chains.counts[i], chains.table[i], points[r, i])
-        at[RECORDS] += 1
+        at[progress.RECORDS] += 1
 
 
 @glue
@@ -171,7 +157,7 @@ def _split_step(run: ChainRun, now: float) -> None:
     drift_body(run.state, h)
     free_turn(run.state, run.inertia, h)
     turn_winches(drives, run.cables, rows, run.gravity, h)
-    follow_time_tables(run, now + h, -MOMENT * h)
+    follow_time_tables(run, now + h, -progress.MOMENT * h)
     for i in range(rows.shape[1]):
         row = chains.table[i]
         before = row[c.REST] + (drives.now[d.BEFORE, i] - rows[g.LENGTH, i])
@@ -231,28 +217,30 @@ def run_chains(
     step, gravity, filtering = numbers
     run = chain_run_of(rules, numbers, body, data, courses, kept, chain_arrays)
     drives, rows, at, audit = run.drives, run.rows, run.at, kept[4]
-    if at[READY] == 0:
-        at[READY] = 1
-        begin = audit[d.BEGIN] + at[STEPS] * step
-        follow_time_tables(run, begin, MOMENT * step)
+    if at[progress.READY] == 0:
+        at[progress.READY] = 1
+        begin = audit[d.BEGIN] + at[progress.STEPS] * step
+        follow_time_tables(run, begin, progress.MOMENT * step)
         fill_platform_force(run)
-        note_events(drives, rows, run.cables, at, begin, gravity, records[4])
+        progress.note_events(drives, rows, run.cables, at, begin, gravity, records[4])
         record_chain_step(run, records, stock)
     elif steps == 0:
         record_chain_step(run, records, stock)
     for _ in range(steps):
-        time = audit[d.BEGIN] + at[STEPS] * step
-        if interval_ends(run.lengths, at[LENGTH_AT], time + MOMENT * step):
-            follow_time_tables(run, time, MOMENT * step)  # rates may jump here
+        time = audit[d.BEGIN] + at[progress.STEPS] * step
+        if progress.interval_ends(run.lengths, at[progress.LENGTH_AT], time + progress.MOMENT * step):
+            follow_time_tables(run, time, progress.MOMENT * step)  # rates may jump here
             fill_platform_force(run)
-        if kind == d.DRUMS and at[STEPS] % stride == 0:
+        if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
             close_loops(drives, run.targets, run.target_rates, stride * step)
         _split_step(run, time)
-        at[STEPS] += 1
+        at[progress.STEPS] += 1
         filter_tensions(drives, filtering)
         _change_node_counts(run)
-        note_events(drives, rows, run.cables, at, audit[d.BEGIN] + at[STEPS] * step, gravity, records[4])
-        if at[STEPS] % every == 0:
+        progress.note_events(
+            drives, rows, run.cables, at, audit[d.BEGIN] + at[progress.STEPS] * step, gravity, records[4]
+        )
+        if at[progress.STEPS] % every == 0:
             record_chain_step(run, records, stock)
-        if at[FAILED] > 0 or not has_room(at, records[4], rows.shape[1]):
+        if at[progress.FAILED] > 0 or not progress.has_room(at, records[4], rows.shape[1]):
             break

@@ -6,28 +6,19 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.balance.wrench import components_along, motion_along
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CATENARY
 from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import progress
 from sagline.kernels.dynamics.chain import wind_across
 from sagline.kernels.dynamics.drives import Drives, keep_set_points
-from sagline.kernels.dynamics.progress import (
-    LENGTH_AT,
-    MOMENT,
-    WIND_AT,
-    WRENCH_AT,
-    TimeTable,
-    TimeTableArrays,
-    interpolate_table,
-)
 from sagline.kernels.dynamics.rigid_body import STATE_COLUMNS, VELOCITY, power_of, spin
 from sagline.kernels.forward.platform import unbalance
 from sagline.kernels.jit import glue, kernel
-from sagline.kernels.memory import block
+from sagline.kernels.memory import Memory, block
 
 SPLITTING, RUNGE_KUTTA = 0, 1
 DAMPED, LOADED, BLOWN = 1, 2, 4  # bits of what damps or loads
@@ -37,7 +28,9 @@ ModelTerms = tuple[int, float, float, float, bool | None]  # with gravity; anyth
 Rules = tuple[int, int, int, int, int]  # integrator, kind of winches, remembered, what damps or loads, loops' stride
 Numbers = tuple[float, float, float, float]  # step [s], loss_time [s], air damping [N s/m^2], share of a new reading
 Robot = tuple[Array, Array, Array, Array]  # cables, body, inertia, freedom
-Courses = tuple[TimeTableArrays, TimeTableArrays, TimeTableArrays]  # of lengths, wrenches, the wind
+Courses = tuple[
+    progress.TimeTableArrays, progress.TimeTableArrays, progress.TimeTableArrays
+]  # of lengths, wrenches, the wind
 Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
 Records = tuple[Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes
 
@@ -54,9 +47,9 @@ class MasslessRun(NamedTuple):
     inertia: Array
     freedom: Array
     drives: Drives
-    lengths: TimeTable
-    wrenches: TimeTable
-    winds: TimeTable
+    lengths: progress.TimeTable
+    wrenches: progress.TimeTable
+    winds: progress.TimeTable
     state: Array
     rows: Array
     at: Indices
@@ -84,47 +77,29 @@ def massless_run_of(
     step, loss_time, air, _filtering = numbers
     state, rows, now, layers, audit, at, room = kept
     cables, body, inertia, freedom = robot
-    small, place = block(room, 0, 6, 6)
-    sides, place = block(room, place, 3, STATE_COLUMNS)
-    wide, place = block(room, place, 4, rows.shape[1])
-    both, place = block(room, place, 2, courses[0][1].shape[1])
-    rotation, place = block(room, place, 3, 3)
-    return MasslessRun(
-        Model(*model),
-        work,
-        step,
-        (loss_time, air),
-        cables,
-        body,
-        inertia,
-        freedom,
-        Drives(kind, remembered > 0, data, now, layers, audit),
-        TimeTable(*courses[0]),
-        TimeTable(*courses[1]),
-        TimeTable(*courses[2]),
-        state,
-        rows,
-        at,
-        rotation,
-        small[0],
-        small[1],
-        small[2],
-        small[3],
-        small[4],
-        small[5],
-        both[0],
-        both[1],
-        sides[0],
-        sides[1],
-        sides[2],
-        wide,
+    memory = Memory(room, at)
+    small, memory = block(memory, 6, 6)
+    sides, memory = block(memory, 3, STATE_COLUMNS)
+    wide, memory = block(memory, 4, rows.shape[1])
+    both, memory = block(memory, 2, courses[0][1].shape[1])
+    rotation, memory = block(memory, 3, 3)
+    lengths, wrenches, winds = (
+        progress.TimeTable(*courses[0]),
+        progress.TimeTable(*courses[1]),
+        progress.TimeTable(*courses[2]),
     )
+    drives = Drives(kind, remembered > 0, data, now, layers, audit)
+    return MasslessRun(
+        Model(*model), work, step, (loss_time, air), cables, body, inertia, freedom, drives, lengths, wrenches, winds,
+        state, rows, at, rotation, small[0], small[1], small[2], small[3], small[4], small[5], both[0], both[1],
+        sides[0], sides[1], sides[2], wide,
+    )  # fmt: skip
 
 
 @glue
 def cable_gravity(run: MasslessRun) -> float:
     """Gravity where cables weigh, else 0 [m/s^2]."""
-    return run.model.gravity if run.model.code == CATENARY else 0.0
+    return run.model.gravity if run.model.code == codes.CATENARY else 0.0
 
 
 @kernel
@@ -229,7 +204,9 @@ def damp_cables(
 def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
     """Fill the set points at a time, and the lengths of winches that keep them."""
     at = run.at
-    at[LENGTH_AT] = interpolate_table(run.lengths, at[LENGTH_AT], now, shift, run.targets, run.target_rates)
+    at[progress.LENGTH_AT] = progress.interpolate_table(
+        run.lengths, at[progress.LENGTH_AT], now, shift, run.targets, run.target_rates
+    )
     keep_set_points(run.drives, run.rows, run.targets, run.target_rates)
 
 
@@ -237,12 +214,16 @@ def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
 def fill_forces(run: MasslessRun, now: float) -> None:
     """Fill the force on the platform, -gradient, what is given of it, and the cables' tensions, at a time."""
     at, drives, rows, state = run.at, run.drives, run.rows, run.state
-    fill_set_points(run, now, -MOMENT * run.step)
+    fill_set_points(run, now, -progress.MOMENT * run.step)
     if run.work & LOADED:
-        at[WRENCH_AT] = interpolate_table(run.wrenches, at[WRENCH_AT], now, 0.0, run.given, run.spare)
+        at[progress.WRENCH_AT] = progress.interpolate_table(
+            run.wrenches, at[progress.WRENCH_AT], now, 0.0, run.given, run.spare
+        )
     unbalance(run.model, run.cables, run.body, run.given, state, run.rotation, rows, run.gradient)
     if run.work & BLOWN:
-        at[WIND_AT] = interpolate_table(run.winds, at[WIND_AT], now, 0.0, run.before[:3], run.spare)
+        at[progress.WIND_AT] = progress.interpolate_table(
+            run.winds, at[progress.WIND_AT], now, 0.0, run.before[:3], run.spare
+        )
         for k in range(6):
             run.gradient[k] += run.given[k]
         add_wind_on_cables(run.cables, drives.data[d.DRAG], rows, run.before, run.given)

@@ -11,6 +11,7 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.dynamics import drives as d
+from sagline.kernels.dynamics import progress
 from sagline.kernels.dynamics.drives import (
     add_winch_energy,
     close_loops,
@@ -37,23 +38,6 @@ from sagline.kernels.dynamics.massless import (
     fill_set_points,
     massless_run_of,
 )
-from sagline.kernels.dynamics.progress import (
-    FAILED,
-    KINETIC,
-    LENGTH_AT,
-    LOST,
-    MOMENT,
-    POTENTIAL,
-    READY,
-    RECORDS,
-    RENEWED,
-    ROUNDING,
-    STEPS,
-    SUPPLIED,
-    has_room,
-    interval_ends,
-    note_events,
-)
 from sagline.kernels.dynamics.rigid_body import (
     CENTER,
     MOMENTUM,
@@ -77,24 +61,24 @@ def record_step(run: MasslessRun, records: Records) -> None:
     """Write down a step, and look whether energy has grown by itself."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at
-    audit, row = drives.audit, at[RECORDS]
+    audit, row = drives.audit, at[progress.RECORDS]
     stored, size = platform_energy(run.model, run.cables, run.body, run.none, state, run.rotation, rows)
     kinetic, potential = kinetic_energy(state, run.inertia), stored + audit[d.ON_DRUMS]
     for i in range(rows.shape[1]):
         if drives.kind == d.DRUMS:
             kinetic += 0.5 * drives.data[d.INERTIA, i] * drives.now[d.SPEED, i] * drives.now[d.SPEED, i]
-    if at[READY] < 2:
-        at[READY] = 2
+    if at[progress.READY] < 2:
+        at[progress.READY] = 2
         audit[d.START] = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST]
         audit[d.START_POTENTIAL] = potential
     invented = kinetic + potential - audit[d.SUPPLIED] + audit[d.LOST] - audit[d.START]
     moved = kinetic + abs(potential - audit[d.START_POTENTIAL]) + abs(audit[d.SUPPLIED]) + abs(audit[d.LOST])
     audit[d.MOVED] = max(audit[d.MOVED], moved)
-    if not abs(invented) <= GROWTH * audit[d.MOVED] + ROUNDING * size:
-        at[FAILED] = 1
+    if not abs(invented) <= GROWTH * audit[d.MOVED] + progress.ROUNDING * size:
+        at[progress.FAILED] = 1
         for i in range(rows.shape[1]):
-            if drives.now[d.AT_FRAME, i] > drives.now[d.AT_FRAME, at[FAILED] - 1]:
-                at[FAILED] = i + 1
+            if drives.now[d.AT_FRAME, i] > drives.now[d.AT_FRAME, at[progress.FAILED] - 1]:
+                at[progress.FAILED] = i + 1
     if row < states.shape[0]:
         turning = spin(state, run.inertia)
         for k in range(MOMENTUM):
@@ -104,9 +88,9 @@ def record_step(run: MasslessRun, records: Records) -> None:
         for i in range(rows.shape[1]):
             tensions[row, i] = drives.now[d.AT_FRAME, i]
             lengths[row, i] = rows[g.LENGTH, i]
-        energies[row, KINETIC], energies[row, POTENTIAL] = kinetic, potential
-        energies[row, SUPPLIED], energies[row, LOST] = audit[d.SUPPLIED], audit[d.LOST]
-        at[RECORDS] += 1
+        energies[row, progress.KINETIC], energies[row, progress.POTENTIAL] = kinetic, potential
+        energies[row, progress.SUPPLIED], energies[row, progress.LOST] = audit[d.SUPPLIED], audit[d.LOST]
+        at[progress.RECORDS] += 1
 
 
 @glue
@@ -193,17 +177,17 @@ def splitting_step(run: MasslessRun, now: float) -> None:
 def _start_run(run: MasslessRun, records: Records, room: Array) -> None:
     """Look at where a run begins, or goes on after something happened to it."""
     at, now = run.at, run.drives.now
-    time = run.drives.audit[d.BEGIN] + at[STEPS] * run.step
-    at[READY] = 1
+    time = run.drives.audit[d.BEGIN] + at[progress.STEPS] * run.step
+    at[progress.READY] = 1
     for k in range(room.shape[0]):
         room[k] = 0.0
     fill_forces(run, time)
-    fill_set_points(run, time, MOMENT * run.step)
+    fill_set_points(run, time, progress.MOMENT * run.step)
     fill_damping(run)
-    if at[STEPS] == 0:
+    if at[progress.STEPS] == 0:
         for i in range(now.shape[1]):
             now[d.FILTERED, i] = now[d.AT_FRAME, i]
-    note_events(run.drives, run.rows, run.cables, at, time, cable_gravity(run), records[4])
+    progress.note_events(run.drives, run.rows, run.cables, at, time, cable_gravity(run), records[4])
     record_step(run, records)
 
 
@@ -242,31 +226,40 @@ def run(
     step, filtering = numbers[0], numbers[3]
     moving = massless_run_of(model, rules, numbers, robot, data, courses, kept)
     drives, rows, at, audit = moving.drives, moving.rows, moving.at, kept[4]
-    if at[READY] == 0:
+    if at[progress.READY] == 0:
         _start_run(moving, records, kept[6])
     elif steps == 0:
         record_step(moving, records)
     for _ in range(steps):
-        time = audit[d.BEGIN] + at[STEPS] * step
-        if interval_ends(moving.lengths, at[LENGTH_AT], time + MOMENT * step) or at[RENEWED] > 0:
-            at[RENEWED] = 0
-            fill_set_points(moving, time, MOMENT * step)  # rates may jump here
-        if kind == d.DRUMS and at[STEPS] % stride == 0:
+        time = audit[d.BEGIN] + at[progress.STEPS] * step
+        if (
+            progress.interval_ends(moving.lengths, at[progress.LENGTH_AT], time + progress.MOMENT * step)
+            or at[progress.RENEWED] > 0
+        ):
+            at[progress.RENEWED] = 0
+            fill_set_points(moving, time, progress.MOMENT * step)  # rates may jump here
+        if kind == d.DRUMS and at[progress.STEPS] % stride == 0:
             close_loops(drives, moving.targets, moving.target_rates, stride * step)
         if integrator == SPLITTING:
             splitting_step(moving, time)
         else:
             runge_kutta_step(moving, time)
-        at[STEPS] += 1
+        at[progress.STEPS] += 1
         filter_tensions(drives, filtering)
-        note_events(
-            drives, rows, moving.cables, at, audit[d.BEGIN] + at[STEPS] * step, cable_gravity(moving), records[4]
+        progress.note_events(
+            drives,
+            rows,
+            moving.cables,
+            at,
+            audit[d.BEGIN] + at[progress.STEPS] * step,
+            cable_gravity(moving),
+            records[4],
         )
-        if every > 0 and at[STEPS] % every == 0:
+        if every > 0 and at[progress.STEPS] % every == 0:
             record_step(moving, records)
-            if at[FAILED] > 0:
+            if at[progress.FAILED] > 0:
                 break
-        if every > 0 and not has_room(at, records[4], rows.shape[1]):
+        if every > 0 and not progress.has_room(at, records[4], rows.shape[1]):
             break
     if every == 0 and steps > 0:
         record_step(moving, records)

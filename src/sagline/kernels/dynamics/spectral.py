@@ -229,14 +229,7 @@ def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
 
 @entry
 def spectral_matrices(
-    strings: Array,
-    omega: float,
-    rule: Rule,
-    points: Array,
-    plane: Array,
-    normal: Array,
-    carried: Array,
-    still: Array,
+    strings: Array, omega: float, rule: Rule, points: Array, plane: Array, normal: Array, carried: Array, still: Array
 ) -> None:
     """Matrices of m cables whose eigenvalues are the squares of their angular frequencies with both ends held.
 

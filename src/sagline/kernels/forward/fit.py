@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.balance.wrench import components_along
@@ -18,7 +18,6 @@ from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.over_pulleys import chord_at, material_at
 from sagline.kernels.cable.pulley import Wrap, behind_cable, pulley_at, straight_behind
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CABLE_NO_TENSION, FORWARD_FITTED, FORWARD_NO_LENGTHS, FORWARD_NOT_CONVERGED, STRAIGHT
 from sagline.kernels.forward.newton import solve_step
 from sagline.kernels.forward.platform import add_force, step_pose
 from sagline.kernels.forward.problem import (
@@ -142,17 +141,17 @@ def fit_poses(
     free, arcs, start, pose = motions
     copy_pose(batch.starts[0], start)
     for p in range(count):
-        clear_solution(answer, p, FORWARD_NO_LENGTHS, CABLE_NO_TENSION)
+        clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, codes.CABLE_NO_TENSION)
         if math.isnan(batch.lengths[p, 0]):
             continue
         if not chained:
             copy_pose(row_of(batch.starts, p), start)
-        problem = problem_at(Model(STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
+        problem = problem_at(Model(codes.STRAIGHT, 0.0, 0.0, 0.0, None), batch, p, free, arcs)
         copy_pose(start, pose)
         answer.numbers[p, ENERGY], answer.numbers[p, ITERATIONS], fitted = _fit_pose(
             problem, batch.lengths[p], pose, space
         )
-        answer.pose_statuses[p] = FORWARD_FITTED if fitted else FORWARD_NOT_CONVERGED
+        answer.pose_statuses[p] = codes.FORWARD_FITTED if fitted else codes.FORWARD_NOT_CONVERGED
         copy_pose(pose, answer.poses[p])
         if fitted:
             copy_pose(pose, start)

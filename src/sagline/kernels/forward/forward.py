@@ -8,24 +8,13 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Codes, Indices
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.eigenvalues import extreme_eigenvalues
 from sagline.kernels.algebra.factors import factor_positive
 from sagline.kernels.balance.wrench import components_along, is_rotation, symmetric_part
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.over_pulleys import behind_at
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import (
-    CATENARY,
-    ELASTIC,
-    FORWARD_LOOSE,
-    FORWARD_NO_LENGTHS,
-    FORWARD_NOT_CONVERGED,
-    FORWARD_OVERSTRETCHED,
-    FORWARD_SINGULAR,
-    FORWARD_SOLVED,
-    FORWARD_UNSTABLE,
-)
 from sagline.kernels.forward.newton import BALANCED, descend, newton_from, polish, predict
 from sagline.kernels.forward.platform import platform_energy, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import (
@@ -63,8 +52,8 @@ PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # ways to the equilibrium, the later
 def _stability(low: float, high: float) -> int:
     """Stability of an equilibrium from its extreme stiffnesses."""
     if low < -FLAT * high:
-        return FORWARD_UNSTABLE
-    return FORWARD_SOLVED if low > FLAT * high else FORWARD_SINGULAR
+        return codes.FORWARD_UNSTABLE
+    return codes.FORWARD_SOLVED if low > FLAT * high else codes.FORWARD_SINGULAR
 
 
 @glue
@@ -74,12 +63,12 @@ def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> in
     strain = 0.0
     for i in range(cables.shape[0]):
         tension = rows[g.TENSION, i]
-        half_weight = 0.0 if model.code == ELASTIC else 0.5 * cables[i, tables.DENSITY] * model.gravity
+        half_weight = 0.0 if model.code == codes.ELASTIC else 0.5 * cables[i, tables.DENSITY] * model.gravity
         taut += 1 if tension > half_weight * rows[g.CHORD, i] else 0
         strain = max(strain, tension / cables[i, tables.STIFFNESS])
     if strain > OVERSTRETCHED:
-        return FORWARD_OVERSTRETCHED
-    return FORWARD_LOOSE if taut < min(needed, cables.shape[0]) else FORWARD_SOLVED
+        return codes.FORWARD_OVERSTRETCHED
+    return codes.FORWARD_LOOSE if taut < min(needed, cables.shape[0]) else codes.FORWARD_SOLVED
 
 
 @glue
@@ -154,8 +143,8 @@ def _fill_stability(
     numbers[STIFFNESS_MIN] = low
     status = _stability(low, high)
     if not components_along(problem.free, space.gradient, space.part) <= BALANCED * size * problem.unit:
-        status = FORWARD_NOT_CONVERGED
-    elif status == FORWARD_SOLVED:
+        status = codes.FORWARD_NOT_CONVERGED
+    elif status == codes.FORWARD_SOLVED:
         status = _support_status(model, cables, space.rows, arcs.shape[0])
     return status
 
@@ -219,7 +208,7 @@ def forward_poses(
     copy_pose(batch.starts[0], start)
     for p in range(count):
         if math.isnan(batch.lengths[p, 0]):
-            clear_solution(answer, p, FORWARD_NO_LENGTHS, 0)
+            clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, 0)
             continue
         if not chained:  # an answer must not depend on the sample before
             copy_pose(row_of(batch.starts, p), start)
@@ -227,7 +216,9 @@ def forward_poses(
             for i in range(m):
                 kept.rows[g.PARAMETER, i] = math.nan
         problem = problem_at(Model(code, k_h, k_p, 0.0, behind), batch, p, free, arcs)
-        exact = Model(ELASTIC if code == ELASTIC else CATENARY, 0.0, 0.0, problem.model.gravity, behind)
+        exact = Model(
+            codes.ELASTIC if code == codes.ELASTIC else codes.CATENARY, 0.0, 0.0, problem.model.gravity, behind
+        )
         steps, size = _find_pose(problem, exact, batch.lengths[p], start, kept, space, pose)
         status = _fill_stability(problem, pose, arcs, size, space, answer.numbers[p])
         _fill_residuals(batch.freedom, space.gradient, answer.numbers[p])
@@ -236,6 +227,6 @@ def forward_poses(
         copy_pose(pose, answer.poses[p])
         _store_sample(problem, kept.rows, p, answer.results, answer.statuses)
         kept.last[0] = math.nan
-        if status != FORWARD_NOT_CONVERGED:
+        if status != codes.FORWARD_NOT_CONVERGED:
             copy_pose(pose, start)
             _store_chain(kept, pose, problem.wrench)

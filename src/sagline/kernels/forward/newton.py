@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive, solve_general, solve_lower, solve_upper
 from sagline.kernels.balance.wrench import components_along, matrix_along, norm, symmetric_part
 from sagline.kernels.cable import geometry as g
@@ -17,7 +17,6 @@ from sagline.kernels.cable.over_pulleys import end_motion_per_length, material_a
 from sagline.kernels.cable.slopes import Pair, force_by_length, force_change
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CATENARY, ELASTIC
 from sagline.kernels.forward.platform import add_force, platform_energy, platform_stiffness, step_pose, unbalance
 from sagline.kernels.forward.problem import LAST_WRENCH, ForwardArrays, PoseProblem, copy_pose
 from sagline.kernels.jit import glue, kernel
@@ -113,7 +112,7 @@ def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, spa
 
     The rows know the new lengths afterwards.
     """
-    known = problem.model.code == CATENARY or problem.model.code == ELASTIC
+    known = problem.model.code == codes.CATENARY or problem.model.code == codes.ELASTIC
     for k in range(tables.POSE_COLUMNS):
         known = known and last[k] == start[k]
     if known:

@@ -10,7 +10,7 @@ from sagline.kernels import tables
 from sagline.kernels.balance.wrench import is_rotation
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 
 UNIT_SHARE = 0.2  # of the mean length: the displacement that counts as much as a rotation by 1 rad
 
@@ -87,15 +87,15 @@ class ForwardArrays(NamedTuple):
 def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[ForwardArrays, Memory]:
     """Working memory, of which rows and factor are remembered, and the memory that is left."""
     n = factor.shape[0]
-    numbers = memory.numbers
-    rotation, at = block(numbers, 0, 3, 3)
-    sixes, at = block(numbers, at, 8, 6)
-    matrix, at = block(numbers, at, n, n)
-    part, step = numbers[at : at + n], numbers[at + n : at + 2 * n]
-    at += 2 * n
-    trial = numbers[at : at + tables.POSE_COLUMNS]
-    space = ForwardArrays(rows, rotation, sixes[0], sixes[1:7], matrix, factor, part, step, sixes[7], trial)
-    return space, Memory(numbers[at + tables.POSE_COLUMNS :], memory.counters)
+    rotation, memory = block(memory, 3, 3)
+    gradient, memory = vector(memory, 6)
+    stiffness, memory = block(memory, 6, 6)
+    matrix, memory = block(memory, n, n)
+    part, memory = vector(memory, n)
+    step, memory = vector(memory, n)
+    motion, memory = vector(memory, 6)
+    trial, memory = vector(memory, tables.POSE_COLUMNS)
+    return ForwardArrays(rows, rotation, gradient, stiffness, matrix, factor, part, step, motion, trial), memory
 
 
 class _Motions(NamedTuple):
@@ -110,9 +110,9 @@ class _Motions(NamedTuple):
 @glue
 def new_motions(memory: Memory, n: int) -> tuple[_Motions, Memory]:
     """Work arrays for n free motions, and the memory that is left."""
-    rows, at = block(memory.numbers, 0, 2 * n, 6)
-    poses, at = block(memory.numbers, at, 2, tables.POSE_COLUMNS)
-    return _Motions(rows[:n], rows[n:], poses[0], poses[1]), Memory(memory.numbers[at:], memory.counters)
+    rows, memory = block(memory, 2 * n, 6)
+    poses, memory = block(memory, 2, tables.POSE_COLUMNS)
+    return _Motions(rows[:n], rows[n:], poses[0], poses[1]), memory
 
 
 @glue

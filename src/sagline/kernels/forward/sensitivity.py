@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Indices
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.cable.over_pulleys import material_at
@@ -13,11 +13,10 @@ from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import STRAIGHT
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
 from sagline.kernels.forward.problem import ForwardTerms, SampleArrays, Samples, row_of
 from sagline.kernels.jit import entry, formula, glue
-from sagline.kernels.memory import block
+from sagline.kernels.memory import Memory, block, vector
 
 # which datum changes
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
@@ -80,12 +79,11 @@ def describe_states(
     batch = Samples(*given)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
-    numbers = memory[0]
-    rotation, at = block(numbers, 0, 3, 3)
-    rows, at = block(numbers, at, CABLE_ROWS, m)
-    gradient = numbers[at : at + 6]
+    rotation, rest = block(Memory(*memory), 3, 3)
+    rows, rest = block(rest, CABLE_ROWS, m)
+    gradient, rest = vector(rest, 6)
     for p in range(count):
-        if code == STRAIGHT or math.isnan(batch.lengths[p, 0]):
+        if code == codes.STRAIGHT or math.isnan(batch.lengths[p, 0]):
             matrices[p] = math.nan
             blocks[p] = math.nan
             slopes[p] = math.nan

@@ -130,14 +130,7 @@ def _square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> 
 
 @kernel
 def _least_of_pair(
-    one: Array,
-    other: Array,
-    i: int,
-    j: int,
-    precision: float,
-    enough: float,
-    pieces: Array,
-    waiting: Array,
+    one: Array, other: Array, i: int, j: int, precision: float, enough: float, pieces: Array, waiting: Array
 ) -> tuple[float, float, float, float]:
     """Least distance of a cable from another or a box [m], a proved lower bound, and where.
 

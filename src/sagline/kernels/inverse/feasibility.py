@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Codes, Flags, Indices
-from sagline.kernels import tables
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import START, STRIP_ROWS
 from sagline.kernels.balance.setting import (
     Balance,
@@ -21,21 +21,6 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, new_cables
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import new_curves, sag_forces_at
-from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import (
-    CABLE_NOT_CONVERGED,
-    CABLE_SOLVED,
-    CABLE_TOO_SLACK,
-    CHORD_TENSION,
-    FRAME_END_TENSION,
-    POSE_BORDERLINE,
-    POSE_INFEASIBLE,
-    POSE_NO_CHORD,
-    POSE_NOT_CONVERGED,
-    POSE_NOT_COVERED,
-    POSE_SOLVED,
-    POSE_TOO_SLACK,
-)
 from sagline.kernels.inverse.iterations import limits_admit_tensions, linearize_ends
 from sagline.kernels.inverse.poses import (
     Answers,
@@ -44,10 +29,12 @@ from sagline.kernels.inverse.poses import (
     ModelTerms,
     Robots,
     measure_balance,
+    model_at,
+    platform_at,
     write_solution,
 )
 from sagline.kernels.jit import entry, glue
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.bracket import component_along, decide_feasibility
 from sagline.kernels.tension.least_change import Demand, TensionChange, norm_of_part
 from sagline.kernels.tension.margin import capacity_margin
@@ -92,26 +79,23 @@ def decide_poses(
             whether a limit of a cable stands against the needed wrench, (N, m).
     """
     limits = TensionLimits(*limit_terms)
-    freedom, bodies, robots = robot_terms
+    freedom, _bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
     brackets, reliefs, farkas, blocking = verdicts
     n = freedom.shape[0]
     m = statuses.shape[1]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, n)
-    rows, at = block(rest.numbers, 0, 2 * n + 3, m)
-    vectors, at = block(rest.numbers, at, 3, n)
-    rest = Memory(rest.numbers[at:], rest.counters)
+    rows, rest = block(rest, 2 * n + 3, m)
+    vectors, rest = block(rest, 3, n)
     weight, change = rows[2 * n], TensionChange(rows[2 * n + 1], rows[2 * n + 2], vectors[0], vectors[1])
     for i in range(m):
         weight[i] = 1.0
     translations = translation_count(freedom)
     for p in which:
-        body = bodies[min(p, bodies.shape[0] - 1)]
-        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
-        platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
-        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
-        set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance)
+        platform = platform_at(robot_terms, poses, wrenches, p)
+        model = model_at(model_terms, platform.body)
+        set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance)
         if not limits_admit_tensions(cables):
             brackets[p, PROVED], brackets[p, ENOUGH] = math.inf, math.inf
             for i in range(m):
@@ -127,18 +111,18 @@ def decide_poses(
         curves, left = new_curves(model, cables, statuses[p], rest)
         status, brackets[p, PROVED], brackets[p, ENOUGH], proved = decide_feasibility(curves, demand, change, left)
         sag_forces_at(curves, change.tau, change.sag_force)
-        if status == POSE_SOLVED:
+        if status == codes.POSE_SOLVED:
             status = _pose_status(statuses[p])
-        if status == POSE_SOLVED and not covers:
-            status = POSE_NOT_COVERED
-        if status != POSE_SOLVED and status != POSE_INFEASIBLE and status != POSE_BORDERLINE:
+        if status == codes.POSE_SOLVED and not covers:
+            status = codes.POSE_NOT_COVERED
+        if status != codes.POSE_SOLVED and status != codes.POSE_INFEASIBLE and status != codes.POSE_BORDERLINE:
             brackets[p, PROVED] = brackets[p, ENOUGH] = math.nan
-        if status == POSE_SOLVED:
+        if status == codes.POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
             write_solution(True, model, cables, balance, results, p)
         else:
             for i in range(m):
-                statuses[p, i] = CABLE_SOLVED
+                statuses[p, i] = codes.CABLE_SOLVED
         pose_statuses[p] = status
         for k in range(n):
             supplied = demand.right[k]
@@ -147,23 +131,23 @@ def decide_poses(
             needed[p, k] = supplied if k < translations else supplied * lever
             farkas[p, k] = math.nan
             reliefs[p, k] = math.nan
-            if status != POSE_SOLVED and brackets[p, ENOUGH] < math.inf:
+            if status != codes.POSE_SOLVED and brackets[p, ENOUGH] < math.inf:
                 reliefs[p, k] = change.residual[k] if k < translations else 0.0
-        if status == POSE_INFEASIBLE and proved:
+        if status == codes.POSE_INFEASIBLE and proved:
             _write_proof(demand, change, lever, farkas[p])
-        if status == POSE_INFEASIBLE or status == POSE_BORDERLINE:
+        if status == codes.POSE_INFEASIBLE or status == codes.POSE_BORDERLINE:
             _block_cables(cables, demand, change, blocking[p])
 
 
 @glue
 def _pose_status(statuses: Codes) -> int:
     """Status of a pose whose tensions balance, from those of its cables (m,)."""
-    gravest = CABLE_SOLVED
+    gravest = codes.CABLE_SOLVED
     for i in range(statuses.size):
         gravest = max(gravest, statuses[i])
-    if gravest == CABLE_TOO_SLACK:
-        return POSE_TOO_SLACK
-    return POSE_NOT_CONVERGED if gravest == CABLE_NOT_CONVERGED else POSE_SOLVED
+    if gravest == codes.CABLE_TOO_SLACK:
+        return codes.POSE_TOO_SLACK
+    return codes.POSE_NOT_CONVERGED if gravest == codes.CABLE_NOT_CONVERGED else codes.POSE_SOLVED
 
 
 @glue
@@ -259,13 +243,13 @@ def polygon_of_pose(
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, freedom.shape[0])
     platform = Platform(freedom, bodies[0], robots[0], pose, wrench)
-    model = Model(model_terms[0], model_terms[1], model_terms[2], bodies[0, tables.GRAVITY], None)
+    model = model_at(model_terms, bodies[0])
     set_pose(model, TensionLimits(*limit_terms), distribution.variable, distribution.weight, platform, cables, balance)
     if not math.isnan(tensions[0]):
         for i in range(m):
             cables.tau[i] = tensions[i]
             cables.sag_force[i] = sag_forces[i]
-        if distribution.variable == FRAME_END_TENSION:
+        if distribution.variable == codes.FRAME_END_TENSION:
             linearize_ends(model, distribution, cables, balance)
     fill_needed_wrench(platform, cables, balance)
     start_from_minimum_norm(balance)
@@ -298,24 +282,20 @@ def margins_of_poses(
 ) -> None:
     """Fill the capacity margins [N] (N,) of poses at given sag forces (N, m); NaN where there are none."""
     limits = TensionLimits(*limit_terms)
-    freedom, bodies, robots = robot_terms
+    freedom, _bodies, robots = robot_terms
     count, m = sag_forces.shape
     n = freedom.shape[0]
     cables, rest = new_cables(Memory(*memory), m, robots_have_machine(robots))
     balance, rest = new_balance(rest, m, n)
-    weights, at = block(rest.numbers, 0, 1, m)
-    weight = weights[0]
-    rest = Memory(rest.numbers[at:], rest.counters)
+    weight, rest = vector(rest, m)
     for i in range(m):
         weight[i] = 1.0
     translations = translation_count(freedom)
     for p in range(count):
         margins[p] = math.nan
-        body = bodies[min(p, bodies.shape[0] - 1)]
-        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
-        platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
-        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
-        placed = set_pose(model, limits, CHORD_TENSION, weight, platform, cables, balance) != POSE_NO_CHORD
+        platform = platform_at(robot_terms, poses, wrenches, p)
+        model = model_at(model_terms, platform.body)
+        placed = set_pose(model, limits, codes.CHORD_TENSION, weight, platform, cables, balance) != codes.POSE_NO_CHORD
         if placed and not math.isnan(sag_forces[p, 0]):
             for i in range(m):
                 cables.sag_force[i] = sag_forces[p, i]

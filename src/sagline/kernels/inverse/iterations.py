@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Codes
+from sagline.kernels import codes
 from sagline.kernels.balance.setting import (
     Balance,
     Platform,
@@ -19,18 +20,6 @@ from sagline.kernels.balance.setting import (
 from sagline.kernels.cable.cables import Cables, chord_of, material_of, pulley_of
 from sagline.kernels.cable.states import NEAR, frame_end_tension, solve_cable_states
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import (
-    CABLE_NOT_CONVERGED,
-    CABLE_TOO_SLACK,
-    CATENARY,
-    FRAME_END_TENSION,
-    HORIZONTAL_TENSION,
-    POSE_INFEASIBLE,
-    POSE_NOT_CONVERGED,
-    POSE_SINGULAR,
-    POSE_SOLVED,
-    POSE_TOO_SLACK,
-)
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nearest, set_reference, share_nearest
 from sagline.kernels.tension.other_methods import distribute_by_other_method
@@ -77,7 +66,7 @@ def distribute_and_solve_cables(
     solved = False
     fill_needed_wrench(platform, cables, balance)
     possible = limits_admit_tensions(cables)
-    status = POSE_NOT_CONVERGED if possible else POSE_INFEASIBLE
+    status = codes.POSE_NOT_CONVERGED if possible else codes.POSE_INFEASIBLE
     for k in range(ITERATIONS if possible else 0):
         start_from_minimum_norm(balance)
         if work is None:
@@ -90,25 +79,25 @@ def distribute_and_solve_cables(
             status = distribute_by_other_method(
                 distribution, balance.bounds, balance.offset, balance.null, near, work, balance.tension
             )
-        if status != POSE_SOLVED:
+        if status != codes.POSE_SOLVED:
             break
         moved, largest = take_tensions(cables, balance)
         gravest = solve_cable_states(model, cables, not solved, solved and moved < NEAR, statuses)
-        if gravest == CABLE_TOO_SLACK or gravest == CABLE_NOT_CONVERGED:
-            status = POSE_TOO_SLACK if gravest == CABLE_TOO_SLACK else POSE_NOT_CONVERGED
+        if gravest == codes.CABLE_TOO_SLACK or gravest == codes.CABLE_NOT_CONVERGED:
+            status = codes.POSE_TOO_SLACK if gravest == codes.CABLE_TOO_SLACK else codes.POSE_NOT_CONVERGED
             break
-        status = POSE_NOT_CONVERGED
-        converged = model.code != CATENARY or sag_force_change(cables) <= CONVERGED + 1e-15 * largest
-        if work is None or distribution.variable != FRAME_END_TENSION:
+        status = codes.POSE_NOT_CONVERGED
+        converged = model.code != codes.CATENARY or sag_force_change(cables) <= CONVERGED + 1e-15 * largest
+        if work is None or distribution.variable != codes.FRAME_END_TENSION:
             if converged:
-                status = POSE_SOLVED
+                status = codes.POSE_SOLVED
                 break
         else:
             if converged and solved and moved <= TENSION_CONVERGED:
-                status = POSE_SOLVED
+                status = codes.POSE_SOLVED
                 break
             if not linearize_ends(model, distribution, cables, balance):
-                status = POSE_SINGULAR
+                status = codes.POSE_SINGULAR
                 break
             set_reference(distribution, balance.offset, balance.null, near)
             reset_work_arrays(work)
@@ -166,9 +155,9 @@ def store_tensions(
     """Keep the tensions, in the variable they were shared in, for the pose that follows."""
     for i in range(cables.tau.size):
         near.previous[i] = cables.tau[i]
-        if distribution.variable == HORIZONTAL_TENSION:
+        if distribution.variable == codes.HORIZONTAL_TENSION:
             near.previous[i] = cables.tau[i] * cables.cosine[i]
-        elif work is not None and distribution.variable == FRAME_END_TENSION:
+        elif work is not None and distribution.variable == codes.FRAME_END_TENSION:
             near.previous[i] = frame_end_tension(
                 model, chord_of(cables, i), material_of(cables, i), pulley_of(cables, i), cables.tau[i]
             )

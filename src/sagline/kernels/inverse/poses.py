@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Codes, Indices
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.functions import angle
 from sagline.kernels.balance.setting import Balance, Platform, TensionLimits, fill_needed_wrench, new_balance, set_pose
 from sagline.kernels.balance.wrench import is_rotation
@@ -17,7 +17,6 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import Cables, material_of, new_cables, pulley_of
 from sagline.kernels.cable.pulley import Wrap, behind_cable, robots_have_machine
 from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import CABLE_SOLVED, CATENARY, CLOSEST, POSE_NO_CHORD, POSE_SINGULAR, POSE_SOLVED
 from sagline.kernels.inverse.iterations import distribute_and_solve_cables, store_tensions
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
@@ -32,6 +31,20 @@ DistributionTerms = tuple[int, float, int, Array, Array]  # Distribution
 LimitTerms = tuple[int, float]  # Limits
 Robots = tuple[Array, Array, Array]  # freedom, bodies, robots
 Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residuals, needed, pose_statuses
+
+
+@glue
+def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platform:
+    """The platform of pose p; robots and wrenches are one for all poses or one a pose."""
+    freedom, bodies, cables = robots
+    body, cable_rows = bodies[min(p, bodies.shape[0] - 1)], cables[min(p, cables.shape[0] - 1)]
+    return Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
+
+
+@glue
+def model_at(terms: ModelTerms, body: Array) -> Model:
+    """Cable model in the gravity of a body."""
+    return Model(terms[0], terms[1], terms[2], body[tables.GRAVITY], None)
 
 
 @entry
@@ -73,7 +86,7 @@ def inverse_poses(
     """
     distribution = Distribution(*distribution_terms)
     limits = TensionLimits(*limit_terms)
-    freedom, bodies, robots = robot_terms
+    freedom, _bodies, robots = robot_terms
     results, statuses, residuals, needed, pose_statuses = answers
     m = statuses.shape[1]
     n = freedom.shape[0]
@@ -83,28 +96,26 @@ def inverse_poses(
     near, rest = new_reference_point(rest, previous, m - n)
     others = None if otherwise is None else new_work_arrays(distribution.method, rest, m, m - n)
     for p in range(first, last):
-        body = bodies[min(p, bodies.shape[0] - 1)]
-        wrench = wrenches[min(p, wrenches.shape[0] - 1)]
-        platform = Platform(freedom, body, robots[min(p, robots.shape[0] - 1)], poses[p], wrench)
-        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
+        platform = platform_at(robot_terms, poses, wrenches, p)
+        model = model_at(model_terms, platform.body)
         for i in range(m):
-            statuses[p, i] = CABLE_SOLVED
+            statuses[p, i] = codes.CABLE_SOLVED
         status = set_pose(model, limits, distribution.variable, distribution.weight, platform, cables, balance)
-        if status == POSE_SOLVED:
+        if status == codes.POSE_SOLVED:
             status = distribute_and_solve_cables(
                 model, distribution, platform, cables, balance, near, others, statuses[p]
             )
-        if status == POSE_SOLVED:
+        if status == codes.POSE_SOLVED:
             measure_balance(platform, cables, balance, residuals[p])
-            if distribution.method == CLOSEST:
+            if distribution.method == codes.CLOSEST:
                 store_tensions(model, distribution, cables, others, near)
         else:
             residuals[p, FORCE] = residuals[p, MOMENT] = math.nan
         for k in range(n):
-            supplied = status != POSE_NO_CHORD and status != POSE_SINGULAR
+            supplied = status != codes.POSE_NO_CHORD and status != codes.POSE_SINGULAR
             needed[p, k] = balance.right[k] if supplied else math.nan
         pose_statuses[p] = status
-        write_solution(status == POSE_SOLVED, model, cables, balance, results, p)
+        write_solution(status == codes.POSE_SOLVED, model, cables, balance, results, p)
 
 
 @glue
@@ -152,7 +163,7 @@ def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p:
         tension = cables.last_sag_force  # where the cables leave; nobody asks for the sag forces before any more
         for i in range(m):
             tension[i] = cables.tau[i]
-        if model.code == CATENARY:
+        if model.code == codes.CATENARY:
             for i in range(m):
                 x, z = cables.free_tau[i] * cables.free_cosine[i], cables.free_tau[i] * cables.free_sine[i]
                 length = cables.ratio[i] * cables.free_chord[i]

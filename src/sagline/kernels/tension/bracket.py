@@ -14,6 +14,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
+from sagline.kernels import codes
 from sagline.kernels.algebra.factors import factorize, orthogonal_factor, pseudo_inverse
 from sagline.kernels.cable.sag_forces import (
     LOOSEST,
@@ -25,9 +26,8 @@ from sagline.kernels.cable.sag_forces import (
     sag_force_range,
     slopes_at,
 )
-from sagline.kernels.codes import CATENARY, POSE_BORDERLINE, POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
 
 PLENTY = 1e6  # of the largest force at hand: more than any cable carries that has no limit
@@ -52,10 +52,10 @@ class _Search(NamedTuple):
 @glue
 def _new_search(memory: Memory, m: int) -> tuple[_Search, Memory]:
     """Work arrays for m cables, and the memory that is left."""
-    tops, at = block(memory.numbers, 0, 1, m)
-    ranges, at = block(memory.numbers, at, DEPTH, RANGE_ROWS * m)
-    search = _Search(tops[0], ranges.reshape((DEPTH, RANGE_ROWS, m)))
-    return search, Memory(memory.numbers[at:], memory.counters)
+    tops, memory = vector(memory, m)
+    ranges, memory = block(memory, DEPTH, RANGE_ROWS * m)
+    search = _Search(tops, ranges.reshape((DEPTH, RANGE_ROWS, m)))
+    return search, memory
 
 
 @glue
@@ -131,8 +131,8 @@ def _narrow_free(
         count += 1 if range_[LEAST, i] < change.tau[i] < range_[LARGEST, i] else 0
     if count == 0 or count > n:
         return True
-    rows, at = block(memory.numbers, 0, 2 * count + n + 2, n)
-    diagonals, at = block(memory.numbers, at, 2, count)
+    rows, memory = block(memory, 2 * count + n + 2, n)
+    diagonals, memory = block(memory, 2, count)
     reduced, inverse = rows[:count], rows[count : 2 * count]
     slopes_at(curves, change.tau, tops, curves.cables.slackness)
     count = 0
@@ -196,7 +196,7 @@ def _first_range(curves: Curves, size: float, range_: Array) -> None:
     cables = curves.cables
     for i in range(cables.low.size):
         low, high = cables.low[i], cables.high[i]
-        sags = curves.model.code == CATENARY and cables.half_weight[i] > 0.0
+        sags = curves.model.code == codes.CATENARY and cables.half_weight[i] > 0.0
         if high == math.inf:
             high = max(low, cables.stiffness[i] if sags else PLENTY * size)
         if sags:
@@ -245,10 +245,9 @@ def decide_feasibility(
     """
     n, m = demand.matrix.shape
     search, rest = _new_search(memory, m)
-    kept, at = block(rest.numbers, 0, 1, m)
-    tau, at = block(rest.numbers, at, 3, max(m, n))
-    rest = Memory(rest.numbers[at:], rest.counters)
-    trial = TensionChange(tau[0, :m], kept[0], tau[1, :n], tau[2, :n])
+    sag_force, rest = vector(rest, m)
+    tau, rest = block(rest, 3, max(m, n))
+    trial = TensionChange(tau[0, :m], sag_force, tau[1, :n], tau[2, :n])
     _first_range(curves, demand.size, search.ranges[0])
     find_extrema(curves, search.ranges[0, LEAST], search.ranges[0, LARGEST], rest)
     for i in range(m):
@@ -259,7 +258,7 @@ def decide_feasibility(
         range_ = search.ranges[top]
         left, balanced = _approach_demand(curves, demand, range_, trial, rest)
         if node == 0 and not (demand.size < math.inf and left == left):
-            return POSE_NOT_CONVERGED, 0.0, math.inf, False
+            return codes.POSE_NOT_CONVERGED, 0.0, math.inf, False
         if node == 0 or (balanced and left < enough):
             for i in range(m):
                 change.tau[i] = trial.tau[i]
@@ -268,13 +267,13 @@ def decide_feasibility(
         if balanced:
             enough = min(enough, left)
         if balanced and left <= FEASIBLE * demand.size:
-            return POSE_SOLVED, 0.0, 0.0, False
+            return codes.POSE_SOLVED, 0.0, 0.0, False
         spare = _spare_capacity(curves, demand, range_, trial.direction, search.tops)
         if node == 0:
             for k in range(n):
                 change.direction[k] = trial.direction[k]
             if spare < 0.0:
-                return POSE_INFEASIBLE, -spare if left < math.inf else math.inf, enough, True
+                return codes.POSE_INFEASIBLE, -spare if left < math.inf else math.inf, enough, True
         _, before = _least_certain(curves, range_)
         possible = spare >= 0.0 and _narrow_range(curves, demand, range_, trial.direction, spare, search.tops)
         possible = possible and _narrow_free(curves, demand, range_, trial, search.tops, rest)
@@ -288,5 +287,5 @@ def decide_feasibility(
         else:
             top -= 1
             if top < 0:
-                return POSE_INFEASIBLE, 0.0, enough, False
-    return POSE_BORDERLINE, 0.0, enough, False
+                return codes.POSE_INFEASIBLE, 0.0, enough, False
+    return codes.POSE_BORDERLINE, 0.0, enough, False

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.linear_program import LP_SOLVED, lowest_point
-from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.tension.norms import program_status
@@ -25,28 +25,28 @@ def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) 
     """Move the point (r,) to the analytic center, from that of the iteration before if there was one."""
     corners, labels, known = work.corners, work.labels, work.known
     if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
-        return POSE_SOLVED
+        return codes.POSE_SOLVED
     known[0] = 0
     r, m = null.shape
     if r > 2:
         status = deepest_point(bounds, null, work, point)
-        if status != POSE_SOLVED:
+        if status != codes.POSE_SOLVED:
             return status
     else:
         count = feasible_corners(bounds, null, corners, labels)
         if count == 0:
-            return POSE_INFEASIBLE
+            return codes.POSE_INFEASIBLE
         for k in range(count):
             if labels[k] >= 2 * m:
-                return POSE_UNBOUNDED
+                return codes.POSE_UNBOUNDED
         x, y = centroid(corners, count)
         point[0] = x
         if r == 2:
             point[1] = y
     if not _analytic_center(bounds, null, work.rest, point):
-        return POSE_NOT_CONVERGED
+        return codes.POSE_NOT_CONVERGED
     known[0] = 1
-    return POSE_SOLVED
+    return codes.POSE_SOLVED
 
 
 @kernel
@@ -66,11 +66,9 @@ def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
 def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) -> int:
     """Fill the point (r,) whose tensions keep farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
-    rows, at = block(work.rest.numbers, 0, r + 1, 2 * m)
-    halves, at = block(
-        work.rest.numbers, at, STRIP_ROWS, 2 * m
-    )  # every side one of its own, which depth makes narrower
-    vectors, at = block(work.rest.numbers, at, 2, r + 1)
+    rows, memory = block(work.rest, r + 1, 2 * m)
+    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # every side one of its own, which depth makes narrower
+    vectors, memory = block(memory, 2, r + 1)
     cost, found = vectors[0], vectors[1]
     for i in range(m):
         for k in range(r):
@@ -87,7 +85,7 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
     outcome = lowest_point(rows, halves, cost, slack, work.basis, found)
     for k in range(r):
         point[k] = found[k]
-    return POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else program_status(outcome)
+    return codes.POSE_INFEASIBLE if outcome == LP_SOLVED and found[r] < -slack else program_status(outcome)
 
 
 @kernel
@@ -100,8 +98,8 @@ def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -
     Returns whether the center was found.
     """
     r, m = null.shape
-    vectors, at = block(memory.numbers, 0, 2, r)
-    curve, at = block(memory.numbers, at, r, r)
+    vectors, memory = block(memory, 2, r)
+    curve, memory = block(memory, r, r)
     slope, step = vectors[0], vectors[1]
     largest = largest_bound(bounds)
     for _ in range(NEWTON_STEPS):

@@ -24,7 +24,7 @@ from sagline.kernels.algebra.factors import (
 from sagline.kernels.algebra.nearest_point import ActiveSet, nearest_point, new_active_set
 from sagline.kernels.cable.sag_forces import Curves, sag_forces_at, slopes_at
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 
 NEWTON_STEPS = 40
 HALVINGS = 12
@@ -78,26 +78,26 @@ class _Tangents(NamedTuple):
 def _new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[_Tangents, Memory]:
     """Work arrays for a step with so many hard rows, and the memory that is left."""
     d = m - hard
-    numbers = memory.numbers
-    wide, at = block(numbers, 0, n + 2 * hard + (m + 1) + d + STRIP_ROWS + 4, m)
-    reduced = wide[n:]
-    q = reduced[hard:]
-    inverse = q[m + 1 :]
-    rows = inverse[hard:]
-    bounds = rows[d:]
-    others = bounds[STRIP_ROWS:]
-    diagonals, at = block(numbers, at, 2, hard)
-    soft, at = block(numbers, at, n - hard, d)
-    normal, at = block(numbers, at, d, d)
-    unknowns, at = block(numbers, at, 3, d)
-    left, at = block(numbers, at, 2, n)
-    held, rest = new_active_set(Memory(numbers[at:], memory.counters), d)
-    held.labels[0] = 0
+    matrix, memory = block(memory, n, m)
+    reduced, memory = block(memory, hard, m)
+    diagonals, memory = block(memory, 2, hard)
+    q, memory = block(memory, m + 1, m)
+    inverse, memory = block(memory, hard, m)
+    soft, memory = block(memory, n - hard, d)
+    normal, memory = block(memory, d, d)
+    rows, memory = block(memory, d, m)
+    bounds, memory = block(memory, STRIP_ROWS, m)
+    unknowns, memory = block(memory, 3, d)
+    wide, memory = block(memory, 4, m)
+    multipliers, memory = vector(memory, n)
+    residual, memory = vector(memory, n)
+    active, memory = new_active_set(memory, d)
+    active.labels[0] = 0
     tangents = _Tangents(
-        wide[:n], reduced[:hard], diagonals, q[: m + 1], inverse[:hard], soft, normal, rows[:d], bounds[:STRIP_ROWS],
-        unknowns, held, others[0], others[1], left[1], (others[2], others[3], left[0]),
+        matrix, reduced, diagonals, q, inverse, soft, normal, rows, bounds, unknowns, active, wide[0], wide[1],
+        multipliers, (wide[2], wide[3], residual),
     )  # fmt: skip
-    return tangents, rest
+    return tangents, memory
 
 
 @glue

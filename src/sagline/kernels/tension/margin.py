@@ -107,9 +107,9 @@ def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
         memory: To work in.
     """
     n, m = matrix.shape
-    frame, at = block(memory.numbers, 0, n, n)
-    triangle, at = block(memory.numbers, at, n, n)
-    chosen, _ = counters(memory, 0, n - 1)
+    frame, memory = block(memory, n, n)
+    triangle, memory = block(memory, n, n)
+    chosen, memory = counters(memory, n - 1)
     for c in range(n - 1):
         chosen[c] = c
     normal = frame[n - 1]

@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
 from sagline.kernels.algebra.nearest_point import ActiveSet, nearest_point, new_active_set
-from sagline.kernels.codes import CLOSEST, POSE_INFEASIBLE, POSE_SOLVED, QUADRATIC_PROGRAM
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block
 
@@ -39,9 +39,9 @@ class ReferencePoint(NamedTuple):
 @glue
 def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[ReferencePoint, Memory]:
     """Work arrays for r redundant cables, and the memory that is left."""
-    rows, at = block(memory.numbers, 0, 2, r)
-    held, rest = new_active_set(Memory(memory.numbers[at:], memory.counters), r)
-    return ReferencePoint(previous, rows[0], held, rows[1]), rest
+    rows, memory = block(memory, 2, r)
+    held, memory = new_active_set(memory, r)
+    return ReferencePoint(previous, rows[0], held, rows[1]), memory
 
 
 @glue
@@ -50,7 +50,7 @@ def set_reference(distribution: Distribution, offset: Array, null: Array, near: 
 
     offset: of the distribution's variable (m,).
     """
-    from_before = distribution.method == CLOSEST and not math.isnan(near.previous[0])
+    from_before = distribution.method == codes.CLOSEST and not math.isnan(near.previous[0])
     for k in range(null.shape[0]):
         near.reference[k] = 0.0
         for i in range(null.shape[1]):
@@ -83,17 +83,17 @@ def share_nearest(bounds: Array, null: Array, near: ReferencePoint, tension: Arr
     set_point(bounds, null, near.reference, tension)
     if satisfies_limits(bounds, tension, 0.0):
         near.held.labels[0] = 0
-        return POSE_SOLVED
+        return codes.POSE_SOLVED
     slack = TOLERANCE * largest_bound(bounds)
     if null.shape[0] == 0:
-        return POSE_SOLVED if satisfies_limits(bounds, tension, slack) else POSE_INFEASIBLE
+        return codes.POSE_SOLVED if satisfies_limits(bounds, tension, slack) else codes.POSE_INFEASIBLE
     if not nearest_point(null, bounds, near.reference, slack, near.held, near.point):
-        return POSE_INFEASIBLE
+        return codes.POSE_INFEASIBLE
     set_point(bounds, null, near.point, tension)
-    return POSE_SOLVED
+    return codes.POSE_SOLVED
 
 
 @glue
 def is_nearest(distribution: Distribution) -> bool:
     """True if a method is a projection onto a reference."""
-    return distribution.method <= QUADRATIC_PROGRAM
+    return distribution.method <= codes.QUADRATIC_PROGRAM

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Indices
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, STRIP_ROWS, TOLERANCE, largest_bound, most_violated_bound
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
 from sagline.kernels.algebra.linear_program import LP_GAVE_UP, LP_SOLVED, LP_UNBOUNDED, Basis, lowest_point
 from sagline.kernels.algebra.nearest_point import nearest_point
-from sagline.kernels.codes import POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.jit import formula, glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.nearest import ReferencePoint
 
 TIED = 1e-10  # of the largest tension: sums that differ by less are the same; of the largest weight: none
@@ -24,10 +24,10 @@ TIED = 1e-10  # of the largest tension: sums that differ by less are the same; o
 def program_status(outcome: int) -> int:
     """Status of the pose from a linear program's outcome."""
     if outcome == LP_SOLVED:
-        return POSE_SOLVED
+        return codes.POSE_SOLVED
     if outcome == LP_UNBOUNDED:
-        return POSE_UNBOUNDED
-    return POSE_NOT_CONVERGED if outcome == LP_GAVE_UP else POSE_INFEASIBLE
+        return codes.POSE_UNBOUNDED
+    return codes.POSE_NOT_CONVERGED if outcome == LP_GAVE_UP else codes.POSE_INFEASIBLE
 
 
 @formula
@@ -45,8 +45,7 @@ def _is_tied(basis: Basis) -> bool:
 def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory) -> int:
     """Fill the point (r,) of near whose tensions have the least sum; of several the one nearest to the reference."""
     r, m = null.shape
-    costs, at = block(memory.numbers, 0, 1, r)
-    cost = costs[0]
+    cost, memory = vector(memory, r)
     for k in range(r):
         cost[k] = 0.0
         for i in range(m):
@@ -56,10 +55,10 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
         basis.labels[0] = -1
         return program_status(outcome)
     if not _is_tied(basis):
-        return POSE_SOLVED
-    rows, at = block(memory.numbers, at, r, m + 1)
-    tied, at = block(memory.numbers, at, STRIP_ROWS, m + 1)
-    found, at = block(memory.numbers, at, 1, r)
+        return codes.POSE_SOLVED
+    rows, memory = block(memory, r, m + 1)
+    tied, memory = block(memory, STRIP_ROWS, m + 1)
+    found, memory = vector(memory, r)
     least = 0.0
     for k in range(r):
         rows[k, m] = cost[k]
@@ -71,10 +70,10 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
             tied[row, i] = bounds[row, i]
     largest = largest_bound(bounds)
     tied[START, m], tied[LOW, m], tied[HIGH, m] = 0.0, -math.inf, least + TIED * largest
-    if nearest_point(rows, tied, near.reference, TOLERANCE * largest, near.held, found[0]):
+    if nearest_point(rows, tied, near.reference, TOLERANCE * largest, near.held, found):
         for k in range(r):
-            near.point[k] = found[0, k]
-    return POSE_SOLVED
+            near.point[k] = found[k]
+    return codes.POSE_SOLVED
 
 
 @kernel
@@ -86,10 +85,10 @@ def share_lowest_maximum(
     The program's last unknown is the largest tension.
     """
     r, m = null.shape
-    rows, at = block(memory.numbers, 0, r + 1, 2 * m)
-    wide, at = block(memory.numbers, at, STRIP_ROWS, 2 * m)
-    lower, at = block(memory.numbers, at, STRIP_ROWS, m)
-    vectors, at = block(memory.numbers, at, 3, r + 1)
+    rows, memory = block(memory, r + 1, 2 * m)
+    wide, memory = block(memory, STRIP_ROWS, 2 * m)
+    lower, memory = block(memory, STRIP_ROWS, m)
+    vectors, memory = block(memory, 3, r + 1)
     cost, found, nearest = vectors[0], vectors[1], vectors[2, :r]
     for i in range(m):
         for k in range(r):
@@ -108,11 +107,11 @@ def share_lowest_maximum(
     outcome = lowest_point(rows, wide, cost, TOLERANCE * largest, basis, found)
     if outcome != LP_SOLVED:
         basis.labels[0] = -1
-        return POSE_INFEASIBLE if program_status(outcome) == POSE_INFEASIBLE else POSE_NOT_CONVERGED
+        return codes.POSE_INFEASIBLE if program_status(outcome) == codes.POSE_INFEASIBLE else codes.POSE_NOT_CONVERGED
     for k in range(r):
         near.point[k] = found[k]
     if not _is_tied(basis):
-        return POSE_SOLVED
+        return codes.POSE_SOLVED
     for i in range(m):
         for row in range(STRIP_ROWS):
             lower[row, i] = bounds[row, i]
@@ -121,7 +120,7 @@ def share_lowest_maximum(
     if nearest_point(null, lower, near.reference, TOLERANCE * largest, near.held, nearest):
         for k in range(r):
             near.point[k] = nearest[k]
-    return POSE_SOLVED
+    return codes.POSE_SOLVED
 
 
 STEPS = 200
@@ -141,21 +140,20 @@ def share_by_norm(
     point = near.point
     slack = TOLERANCE * largest_bound(bounds)
     if known[0] > 0:
-        lasts, _ = block(memory.numbers, 0, 1, point.size)
-        last = lasts[0]
+        last, _ = vector(memory, point.size)
         for k in range(point.size):
             last[k] = point[k]
         kept = nearest_point(null, bounds, last, slack, near.held, point)
         if kept and _lowest_p_norm(p, p, bounds, offset, null, near, memory):
-            return POSE_SOLVED
+            return codes.POSE_SOLVED
     known[0] = 0
     near.held.labels[0] = 0
     if not nearest_point(null, bounds, near.reference, slack, near.held, point):
-        return POSE_INFEASIBLE
+        return codes.POSE_INFEASIBLE
     if not _lowest_p_norm(min(4.0, p), p, bounds, offset, null, near, memory):
-        return POSE_NOT_CONVERGED
+        return codes.POSE_NOT_CONVERGED
     known[0] = 1
-    return POSE_SOLVED
+    return codes.POSE_SOLVED
 
 
 @formula
@@ -243,10 +241,10 @@ def _lowest_p_norm(
     """
     r, m = null.shape
     point = near.point
-    vectors, at = block(memory.numbers, 0, 4, r)
+    vectors, memory = block(memory, 4, r)
     slope, target, trial, goal = vectors[0], vectors[1], vectors[2], vectors[3]
-    curve, at = block(memory.numbers, at, r, r)
-    turned, at = block(memory.numbers, at, r, m)
+    curve, memory = block(memory, r, r)
+    turned, memory = block(memory, r, m)
     largest = largest_bound(bounds)
     slack = TOLERANCE * largest
     exponent = first

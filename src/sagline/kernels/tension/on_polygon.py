@@ -14,8 +14,8 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array, Indices
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, box_radius, largest_bound, most_violated_bound
-from sagline.kernels.codes import POLYGON_WALK, POSE_INFEASIBLE, POSE_NOT_CONVERGED, POSE_SOLVED, POSE_UNBOUNDED
 from sagline.kernels.jit import kernel
 from sagline.kernels.memory import Memory, block, counters
 from sagline.kernels.tension.nearest import ReferencePoint
@@ -65,9 +65,9 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     """
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
-    lines, _ = block(memory.numbers, 0, 2 * m, 3)
+    lines, memory = block(memory, 2 * m, 3)
     _limit_lines(bounds, null, lines)
-    met, _ = counters(memory, 0, 2 * m)  # 1 for a limit that counts
+    met, memory = counters(memory, 2 * m)  # 1 for a limit that counts
     a, b = most_independent(null)
     line = 2 * a
     # the parallelogram's corner from which line a runs counter-clockwise: inside on its left
@@ -138,30 +138,30 @@ def distribute_on_polygon(
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
     if count == 0 or not polygon_again(bounds, null, corners, labels, count):
-        if method == POLYGON_WALK and r == 2:
+        if method == codes.POLYGON_WALK and r == 2:
             count = walk_polygon(bounds, null, work.rest, corners, labels)
         else:
             count = feasible_corners(bounds, null, corners, labels)
     known[0] = count if r == 2 else 0
     if count <= 0:
-        return POSE_INFEASIBLE if count == 0 else POSE_NOT_CONVERGED
+        return codes.POSE_INFEASIBLE if count == 0 else codes.POSE_NOT_CONVERGED
     reference = near.reference
     x = reference[0]
     y = reference[1] if r == 2 else 0.0
-    if method == POLYGON_WALK and parameter == WALK_SUM:
+    if method == codes.POLYGON_WALK and parameter == WALK_SUM:
         x, y = lowest_corner(bounds, null, corners, count, x, y)
-    elif method == POLYGON_WALK and parameter == WALK_NORM:
+    elif method == codes.POLYGON_WALK and parameter == WALK_NORM:
         if most_violated_bound(null, bounds, reference, 0.0, True) >= 0:
             x, y = nearest_corner_point(corners, count, x, y)
     else:
         for k in range(count):
             if labels[k] >= 2 * m:
-                return POSE_UNBOUNDED
+                return codes.POSE_UNBOUNDED
         x, y = centroid(corners, count)
     near.point[0] = x
     if r == 2:
         near.point[1] = y
-    return POSE_SOLVED
+    return codes.POSE_SOLVED
 
 
 @kernel

@@ -6,21 +6,9 @@ The closed forms are near the middle of the limits, without a search; they do no
 from __future__ import annotations
 
 from sagline.core.arrays import Array
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, largest_bound
 from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
-from sagline.kernels.codes import (
-    ANALYTIC_CENTER,
-    CENTROID,
-    CLOSED_FORM,
-    LOWEST_MAXIMUM,
-    LOWEST_SUM,
-    P_NORM,
-    POLYGON_WALK,
-    POSE_INFEASIBLE,
-    POSE_NOT_COVERED,
-    POSE_SOLVED,
-    PUNCTURE,
-)
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.tension.centers import share_at_center
@@ -45,7 +33,7 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
     slack = TOLERANCE * largest_bound(bounds)
     for i in range(m):
         tension[i] = bounds[START, i]
-    if method == PUNCTURE and satisfies_limits(bounds, tension, slack):
+    if method == codes.PUNCTURE and satisfies_limits(bounds, tension, slack):
         return True
     for k in range(r):
         share = 0.0
@@ -53,11 +41,11 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
             share += null[k, i] * 0.5 * (bounds[LOW, i] + bounds[HIGH, i])
         for i in range(m):
             tension[i] += null[k, i] * share
-    if method == CLOSED_FORM:
+    if method == codes.CLOSED_FORM:
         return satisfies_limits(bounds, tension, slack)
     if not _hold_violated(bounds, null, slack, memory, tension):
         return False
-    if method == PUNCTURE:
+    if method == codes.PUNCTURE:
         _puncture(bounds, tension)
     return True
 
@@ -69,8 +57,8 @@ def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, ten
     Works on the tensions, by orthogonal steps in the null space; a cable once held stays there.
     """
     r, m = null.shape
-    held, at = block(memory.numbers, 0, r + 1, r)
-    triangle, at = block(memory.numbers, at, r + 1, r + 1)
+    held, memory = block(memory, r + 1, r)
+    triangle, memory = block(memory, r + 1, r + 1)
     for count in range(r + 1):
         worst = slack
         cable = -1
@@ -132,26 +120,26 @@ def distribute_by_other_method(
     Ties go to the tensions nearest to the reference.
     """
     method, parameter = distribution.method, distribution.parameter
-    status = POSE_SOLVED
+    status = codes.POSE_SOLVED
     if null.shape[0] == 0:
         set_point(bounds, null, near.reference, tension)
         kept = satisfies_limits(bounds, tension, TOLERANCE * largest_bound(bounds))
-        status = POSE_SOLVED if kept else POSE_INFEASIBLE
-    elif CLOSED_FORM <= method <= PUNCTURE:
+        status = codes.POSE_SOLVED if kept else codes.POSE_INFEASIBLE
+    elif codes.CLOSED_FORM <= method <= codes.PUNCTURE:
         if not share_near_middle(method, bounds, null, work.rest, tension):
             status = share_nearest(bounds, null, near, tension)
-            status = POSE_NOT_COVERED if status == POSE_SOLVED else status
+            status = codes.POSE_NOT_COVERED if status == codes.POSE_SOLVED else status
     else:
-        if method == LOWEST_MAXIMUM:
+        if method == codes.LOWEST_MAXIMUM:
             status = share_lowest_maximum(bounds, offset, null, near, work.basis, work.rest)
-        elif method == LOWEST_SUM:
+        elif method == codes.LOWEST_SUM:
             status = share_lowest_sum(bounds, null, near, work.basis, work.rest)
-        elif method == P_NORM:
+        elif method == codes.P_NORM:
             status = share_by_norm(parameter, bounds, offset, null, near, work.known, work.rest)
-        elif method == ANALYTIC_CENTER:
+        elif method == codes.ANALYTIC_CENTER:
             status = share_at_center(bounds, null, near.point, work)
-        elif method == CENTROID or method == POLYGON_WALK:
+        elif method == codes.CENTROID or method == codes.POLYGON_WALK:
             status = distribute_on_polygon(method, parameter, bounds, null, near, work)
-        if status == POSE_SOLVED:
+        if status == codes.POSE_SOLVED:
             set_point(bounds, null, near.point, tension)
     return status

@@ -11,9 +11,9 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
+from sagline.kernels import codes
 from sagline.kernels.algebra.bounds import HIGH, LOW, START, TOLERANCE, box_radius, inward, largest_bound, side_of
 from sagline.kernels.algebra.linear_program import Basis, new_basis
-from sagline.kernels.codes import LOWEST_SUM
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
@@ -244,12 +244,11 @@ class WorkArrays(NamedTuple):
 def new_work_arrays(method: int, memory: Memory, m: int, r: int) -> WorkArrays:
     """Work arrays for m cables, r of them redundant."""
     corner_count = 2 * m + SPARE_CORNERS
-    corners, at = block(memory.numbers, 0, corner_count, 2)
-    known, after = counters(memory, 0, 1)
-    labels, after = counters(memory, after, corner_count)
-    rest = Memory(memory.numbers[at:], memory.counters[after:])
-    basis, rest = new_basis(rest, r if method == LOWEST_SUM else r + 1)
-    return WorkArrays(corners, labels, known, basis, rest)
+    corners, memory = block(memory, corner_count, 2)
+    known, memory = counters(memory, 1)
+    labels, memory = counters(memory, corner_count)
+    basis, memory = new_basis(memory, r if method == codes.LOWEST_SUM else r + 1)
+    return WorkArrays(corners, labels, known, basis, memory)
 
 
 @glue

@@ -43,11 +43,11 @@ def proves_inside(
     Also fills centered.give with what the set of wrenches alone changes of each tension [N].
     """
     n, m = place.matrix.shape
-    inverse, at = block(memory.numbers, 0, m, n)
-    change, at = block(memory.numbers, at, m, m)
-    hanging, at = block(memory.numbers, at, m, m)
-    rows, at = block(memory.numbers, at, 7, m)
-    slopes, _ = block(memory.numbers, at, MOTIONS + 2, 6)
+    inverse, memory = block(memory, m, n)
+    change, memory = block(memory, m, m)
+    hanging, memory = block(memory, m, m)
+    rows, memory = block(memory, 7, m)
+    slopes, memory = block(memory, MOTIONS + 2, 6)
     slack, sum_, trial, low, sag_force, size, weight = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5], rows[6]
     along, coefficients = slopes[MOTIONS], slopes[MOTIONS + 1]
     tau = centered.tau
@@ -167,10 +167,10 @@ def proves_outside(
     giving more than nothing along it.
     """
     n, m = place.matrix.shape
-    wide, at = block(memory.numbers, 0, 7 + MOTIONS, m)
-    turns, at = block(memory.numbers, at, MOTIONS, n)
-    slopes, at = block(memory.numbers, at, 2 * MOTIONS + 2, 6)
-    vectors, at = block(memory.numbers, at, 2, n)
+    wide, memory = block(memory, 7 + MOTIONS, m)
+    turns, memory = block(memory, MOTIONS, n)
+    slopes, memory = block(memory, 2 * MOTIONS + 2, 6)
+    vectors, memory = block(memory, 2, n)
     give, value, bend, spread = wide[0], wide[1], wide[2], wide[3]
     each = wide[7:]
     full, direction = slopes[2 * MOTIONS], slopes[2 * MOTIONS + 1]

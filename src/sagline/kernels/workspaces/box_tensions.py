@@ -12,11 +12,10 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.algebra.factors import factor_positive, solve_lower, solve_upper
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.sag_forces import LOOSEST, Curves, sag_forces_at
-from sagline.kernels.codes import CATENARY, LIMITS_OF_CHORD
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
@@ -47,11 +46,11 @@ class Centered(NamedTuple):
 @glue
 def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
     """Work arrays for m cables and n rows, and the memory that is left; the tensions are not known yet."""
-    wide, at = block(memory.numbers, 0, 6, m)
-    thin, at = block(memory.numbers, at, 3 + n, n)
+    wide, memory = block(memory, 6, m)
+    thin, memory = block(memory, 3 + n, n)
     centered = Centered(wide[0], wide[1], wide[2], wide[3], wide[4], wide[5], thin[0], thin[1], thin[3:], thin[2])
     centered.tau[0] = math.nan
-    return centered, Memory(memory.numbers[at:], memory.counters)
+    return centered, memory
 
 
 @kernel
@@ -191,7 +190,7 @@ def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges
         ranges.high[i] = ranges.highest[i] = high
         if has_sag(curves, i):
             loosest = cables.half_weight[i] / LOOSEST
-            if quantity != LIMITS_OF_CHORD:
+            if quantity != codes.LIMITS_OF_CHORD:
                 _move_limits(place, curves, i, ranges)
             ranges.lowest[i] = max(ranges.lowest[i], loosest)
             ranges.low[i] = max(ranges.low[i], loosest)
@@ -332,7 +331,7 @@ def center_tensions(
 
     Returns the square of what they leave [N^2], and the smoothing.
     """
-    iterations = ITERATIONS if curves.model.code == CATENARY else 1
+    iterations = ITERATIONS if curves.model.code == codes.CATENARY else 1
     square, smoothing = 0.0, 0.0
     for i in range(centered.tau.size):
         if not centered.low[i] < centered.tau[i] < centered.high[i]:

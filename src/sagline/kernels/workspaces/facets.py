@@ -50,12 +50,12 @@ class Facets(NamedTuple):
 @glue
 def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
     """Work arrays for n free motions and m cables, and the memory that is left."""
-    table, at = block(memory.numbers, 0, n, m + 7)
-    others, at = block(memory.numbers, at, m - n, n)
-    minors, at = block(memory.numbers, at, n, 1 << n)
-    basis, used = counters(memory, 0, n)
-    chosen, used = counters(memory, used, n + 1)
-    return Facets(table, others, minors, basis, chosen), Memory(memory.numbers[at:], memory.counters[used:])
+    table, memory = block(memory, n, m + 7)
+    others, memory = block(memory, m - n, n)
+    minors, memory = block(memory, n, 1 << n)
+    basis, memory = counters(memory, n)
+    chosen, memory = counters(memory, n + 1)
+    return Facets(table, others, minors, basis, chosen), memory
 
 
 @glue

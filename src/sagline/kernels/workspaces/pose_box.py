@@ -45,15 +45,14 @@ class CablesInBox(NamedTuple):
 @glue
 def new_cables_in_box(memory: Memory, m: int, n: int) -> tuple[CablesInBox, Memory]:
     """Work arrays for m cables and n free motions, and the memory that is left."""
-    numbers = memory.numbers
-    rows, at = block(numbers, 0, n, 6)
-    wide, at = block(numbers, at, 6 + n + 3 + 5, m)
-    slopes, at = block(numbers, at, MOTIONS, 6 * m)
+    rows, memory = block(memory, n, 6)
+    wide, memory = block(memory, 6 + n + 3 + 5, m)
+    slopes, memory = block(memory, MOTIONS, 6 * m)
     spans = wide[9 + n :]
     place = CablesInBox(
         rows, wide[:6], wide[6 : 6 + n], wide[6 + n : 9 + n], slopes, spans[0], spans[1], spans[2], spans[3], spans[4]
     )
-    return place, Memory(numbers[at:], memory.counters)
+    return place, memory
 
 
 @kernel

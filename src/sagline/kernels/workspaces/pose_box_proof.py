@@ -15,8 +15,7 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.sag_forces import new_curves
-from sagline.kernels.cable.terms import Model
-from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots
+from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_at
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block
 from sagline.kernels.workspaces.box_proofs import Precision, proves_inside, proves_outside
@@ -77,14 +76,13 @@ def prove_boxes(
     verdicts, statuses = answers
     body, robot = bodies[0], robots[0]
     n, m = freedom.shape[0], robot.shape[0]
-    model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
+    model = model_at(model_terms, body)
     cables, rest = new_cables(Memory(*memory), m, False)
     place, rest = new_cables_in_box(rest, m, n)
     centered, rest = new_centered(rest, m, n)
     curves, rest = new_curves(model, cables, statuses, rest)
-    rows, at = block(rest.numbers, 0, g.GEOMETRY_ROWS + 6, m)
-    small, at = block(rest.numbers, at, 6, 6)
-    rest = Memory(rest.numbers[at:], rest.counters)
+    rows, rest = block(rest, g.GEOMETRY_ROWS + 6, m)
+    small, rest = block(rest, 6, 6)
     geometry, spans = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS :]
     ranges, taken = Ranges(spans[0], spans[1], spans[2], spans[3], spans[4]), spans[5]
     rotation, center, wrench, direction = small[:3, :3], small[3, :3], small[4], small[5]

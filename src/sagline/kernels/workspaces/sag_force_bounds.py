@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 
 from sagline.core.arrays import Array
+from sagline.kernels import codes
 from sagline.kernels.cable.cables import Cables
 from sagline.kernels.cable.sag_forces import LOOSEST, Curves, Section, find_extrema, sag_force_range, sag_forces_at
-from sagline.kernels.codes import CATENARY
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory
 
@@ -39,7 +39,7 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
     """
     cables = curves.cables
     m = cables.low.size
-    exact = curves.model.code == CATENARY
+    exact = curves.model.code == codes.CATENARY
     for i in range(m):
         bands[LOW, i] = cables.low[i]
         bands[HIGH, i] = cables.high[i]
@@ -126,7 +126,7 @@ def _slack_rate(x: float) -> float:
 @formula
 def has_sag(curves: Curves, i: int) -> bool:
     """True if a cable's sag force depends on its tension."""
-    return curves.model.code == CATENARY and curves.cables.half_weight[i] > 0.0
+    return curves.model.code == codes.CATENARY and curves.cables.half_weight[i] > 0.0
 
 
 @kernel
@@ -136,7 +136,7 @@ def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float
     way: how far its platform end may be from where the curves are [m]; tension: least chord tension [N].
     """
     cables = curves.cables
-    if curves.model.code != CATENARY:
+    if curves.model.code != codes.CATENARY:
         return abs(cables.sag_force[i]) / cables.chord[i]
     per_length = cables.half_weight[i] / cables.chord[i]
     if per_length == 0.0:

@@ -16,7 +16,7 @@ import math
 from typing import NamedTuple
 
 from sagline.core.arrays import Array, Codes, Indices
-from sagline.kernels import tables
+from sagline.kernels import codes, tables
 from sagline.kernels.balance.setting import TensionLimits, place_cables
 from sagline.kernels.balance.wrench import fill_structure_matrix, is_rotation, rows_along_freedom
 from sagline.kernels.cable import geometry as g
@@ -24,17 +24,9 @@ from sagline.kernels.cable.cables import new_cables
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.pulley import robots_have_machine
 from sagline.kernels.cable.sag_forces import new_curves
-from sagline.kernels.cable.terms import Model
-from sagline.kernels.codes import (
-    MARGIN_FEASIBLE,
-    MARGIN_INFEASIBLE,
-    MARGIN_NO_CHORD,
-    MARGIN_OPEN,
-    MARGIN_SINGULAR,
-    MARGIN_TOO_SLACK,
-)
+from sagline.kernels.inverse.poses import LimitTerms, ModelTerms, Robots, model_at
 from sagline.kernels.jit import entry, formula, glue, kernel
-from sagline.kernels.memory import Memory, block
+from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.workspaces.facets import (
     DEPENDENT,
     LIMIT,
@@ -89,9 +81,6 @@ BEYOND = 1e300  # for the inverse of no length at all: what is multiplied by it 
 
 VALUE, BELOW, ABOVE = 0, 1, 2  # rows of the margins (3, N) [N]
 
-ModelTerms = tuple[int, float, float]  # code, k_h, k_p
-LimitTerms = tuple[int, float]  # Limits
-Robots = tuple[Array, Array, Array]  # freedom, bodies, robots
 MarginMemory = tuple[Array, Indices, Codes]
 Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 6), cables (N,), statuses (N,)
 
@@ -146,12 +135,11 @@ def signed_margins(
     cables, rest = new_cables(Memory(memory[0], memory[1]), m, robots_have_machine(robots))
     facets, rest = new_facets(rest, n, m)
     wrenches, rest = new_set(set_terms, rest)
-    rotation, at = block(rest.numbers, 0, 3, 3)
-    found, at = block(rest.numbers, at, 1, 3)
-    points, at = block(rest.numbers, at, 2, 6)
-    measured, at = block(rest.numbers, at, 1, FACET_SIZE)
-    rows, at = block(rest.numbers, at, g.GEOMETRY_ROWS + BAND_ROWS + COUNT_ROWS, m)
-    rest = Memory(rest.numbers[at:], rest.counters)
+    rotation, rest = block(rest, 3, 3)
+    found, rest = vector(rest, 3)
+    points, rest = block(rest, 2, 6)
+    measured, rest = vector(rest, FACET_SIZE)
+    rows, rest = block(rest, g.GEOMETRY_ROWS + BAND_ROWS + COUNT_ROWS, m)
     geometry, bands = rows[: g.GEOMETRY_ROWS], rows[g.GEOMETRY_ROWS : g.GEOMETRY_ROWS + BAND_ROWS]
     counted = rows[g.GEOMETRY_ROWS + BAND_ROWS :]
     for p in range(first, last):
@@ -160,29 +148,29 @@ def signed_margins(
         for k in range(6):
             directions[p, k] = 0.0
         body, robot = bodies[p * bodies.shape[0] // count], robots[p * robots.shape[0] // count]
-        model = Model(model_terms[0], model_terms[1], model_terms[2], body[tables.GRAVITY], None)
+        model = model_at(model_terms, body)
         cable_geometry(robot, body, poses[p], rotation, geometry)
         if not place_cables(model, limits, robot, geometry, cables):
-            statuses[p] = MARGIN_NO_CHORD
+            statuses[p] = codes.MARGIN_NO_CHORD
             continue
         fill_structure_matrix(geometry, counted[COLUMN:])
         lever = arms[1][p * arms[1].size // count]
         _fill_facet_table(freedom, counted[COLUMN:], lever, facets.table)
         if not choose_basis(facets, n, m, lever):
-            statuses[p] = MARGIN_SINGULAR
+            statuses[p] = codes.MARGIN_SINGULAR
             continue
         curves, left = new_curves(model, cables, memory[2], rest)
         if not fill_bands(curves, bands, left):
-            statuses[p] = MARGIN_TOO_SLACK
+            statuses[p] = codes.MARGIN_TOO_SLACK
             continue
         place_set(set_terms, body, inertias[p * inertias.shape[0] // count], rotation, wrenches)
         endless = _fill_weights(body, set_terms[0], geometry, bands, counted, points)
         counts = _FacetWeights(counted, points, bands[HIGH], endless, arms[0][p * arms[0].size // count], lever)
-        _measure_all_facets(facets, n, m, counts, wrenches, measured[0], found[0], directions[p])
+        _measure_all_facets(facets, n, m, counts, wrenches, measured, found, directions[p])
         for k in range(3):
-            values[k, p] = found[0, k]
-        limiting[p] = _limiting_cable(counts, directions[p]) if found[0, VALUE] < math.inf else -1
-        statuses[p] = _margin_status(found[0])
+            values[k, p] = found[k]
+        limiting[p] = _limiting_cable(counts, directions[p]) if found[VALUE] < math.inf else -1
+        statuses[p] = _margin_status(found)
 
 
 @glue
@@ -425,5 +413,5 @@ def _limiting_cable(counts: _FacetWeights, direction: Array) -> int:
 def _margin_status(margin: Array) -> int:
     """Status of a bracket (3,)."""
     if margin[BELOW] >= 0.0:
-        return MARGIN_FEASIBLE
-    return MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else MARGIN_OPEN
+        return codes.MARGIN_FEASIBLE
+    return codes.MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else codes.MARGIN_OPEN

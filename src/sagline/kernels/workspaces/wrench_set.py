@@ -113,9 +113,9 @@ class WrenchSetArrays(NamedTuple):
 @glue
 def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSetArrays, Memory]:
     """Work arrays for what differs from pose to pose, and the memory that is left."""
-    own, at = block(memory.numbers, 0, 9, 6)
+    own, memory = block(memory, 9, 6)
     wrenches = WrenchSetArrays(own, terms[2], terms[3], terms[4], terms[5])
-    return wrenches, Memory(memory.numbers[at:], memory.counters)
+    return wrenches, memory
 
 
 @glue
