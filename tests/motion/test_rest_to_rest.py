@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from sagline import InvalidValueError, Path, Pose, quintic_path, septic_path
-from sagline.motion.segments import QUINTIC, SEPTIC, Profile
+from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile
 from tests.motion.differences import angular_velocity, slope
 from tests.refusal import refused
 from tests.tiers import extended
@@ -103,7 +103,7 @@ def test_at_a_waypoint_the_jerk_of_a_quintic_is_that_of_the_segment_that_begins(
 
 
 @pytest.mark.parametrize(("make", "profile"), [(quintic_path, QUINTIC), (septic_path, SEPTIC)])
-def test_peaks_and_derivatives_of_a_profile(make: Maker, profile: Profile) -> None:
+def test_peaks_and_derivatives_of_a_profile(make: Maker, profile: RestProfile) -> None:
     path = make([(0.0, 0.0, 0.0), (3.0, 4.0, 0.0)], durations=2.0, rate=5000.0)
     assert peak(path, "twist", slice(3)) == pytest.approx(profile.peak_speed * 5.0 / 2.0, rel=1e-12)
     assert peak(path, "twist_rate", slice(3)) == pytest.approx(profile.peak_acceleration * 5.0 / 4.0, rel=1e-6)

@@ -14,7 +14,7 @@ from sagline.cables.problem import Problem
 from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array, Codes, checked, kernel_input, locked, number
 from sagline.core.errors import InvalidValueError
-from sagline.core.indices import length_of, part_of
+from sagline.core.indices import batch_length, part_of
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.core.status import Status
@@ -247,7 +247,7 @@ class CableState(Result):
 
     def __len__(self) -> int:
         """Length of the first axis."""
-        return length_of(self.shape, "state of a single cable")
+        return batch_length(self.shape, "state of a single cable")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
         """The state of a part of the cables, along the first axis.

@@ -37,7 +37,7 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
-from sagline.kernels.calibration.terms import Readings
+from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.robot import Robot
 
@@ -72,7 +72,7 @@ def whitened_at(
         along = state.lengths[part]
         counts = counts_at(machine.drums, along)
     slopes = winch_slopes(machine.robot, parameters, counts, along)
-    readings = Readings(reported, log.cells[part], log.positions[part], log.rotations[part])
+    readings = PoseReadings(reported, log.cells[part], log.positions[part], log.rotations[part])
     turning = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     turn = left_jacobian(state.numbers[turning]) if turning[0] >= 0 else None
     if direction is not None and turn is not None:

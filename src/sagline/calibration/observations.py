@@ -14,7 +14,7 @@ from sagline.core.arrays import Array, kernel_input, locked
 from sagline.core.progress import blocks
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.observe import observe
-from sagline.kernels.calibration.terms import BESIDE, Readings, SensingArrays
+from sagline.kernels.calibration.terms import BESIDE, PoseReadings, SensingArrays
 from sagline.kernels.forward.problem import ForwardTerms
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import has_routing
@@ -172,7 +172,7 @@ def machine_of(
 def whitened_rows(
     machine: MachineTerms,
     parameters: Parameters,
-    readings: Readings,
+    readings: PoseReadings,
     slopes: Array,
     poses: Array,
     lengths: Array,
@@ -223,7 +223,7 @@ def predicted_rows(
     counts = None if machine.drums is None else counts_at(machine.drums, lengths)
     slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)
     aligned = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))
-    readings = Readings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), aligned)
+    readings = PoseReadings(lengths, np.zeros(lengths.shape), np.zeros((count, 3)), aligned)
     rows = whitened_rows(machine, parameters, readings, slopes, poses, lengths)
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
@@ -270,7 +270,7 @@ def reference_of(robot: Robot, model: CableModel, sensors: Sensors) -> Reference
     return Reference(model, machine_of(robot, model, parameters, exact, np.zeros(robot.cable_count)), parameters)
 
 
-def misfit_at(reference: Reference, readings: Readings, pose: Array, lengths: Array) -> tuple[Array, Array]:
+def misfit_at(reference: Reference, readings: PoseReadings, pose: Array, lengths: Array) -> tuple[Array, Array]:
     """Readings less predictions at one equilibrium [N, m, rad], (m + 6,), NaN for none; slopes by length (m + 6, m)."""
     slopes = np.zeros((SLOPES, 1, lengths.shape[1]))
     rows = whitened_rows(reference.machine, reference.parameters, readings, slopes, pose, lengths)

@@ -15,7 +15,7 @@ from sagline.calibration.log import reading_deviations
 from sagline.calibration.observations import NO_LOAD, Reference, misfit_at, reference_of
 from sagline.calibration.problem import FitProblem, SearchState, reported_lengths
 from sagline.core.arrays import Array, Flags, Indices, locked
-from sagline.kernels.calibration.terms import Readings
+from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 
 CHANCE: Final = 0.01  # of one outlier among all poses of a log that has none
@@ -74,7 +74,7 @@ class _Case(NamedTuple):
 
     reference: Reference
     deviation: Array
-    readings: Readings
+    readings: PoseReadings
     pose: Array
     lengths: Array
     read: Flags
@@ -175,7 +175,7 @@ def outliers_in(
     found: list[Outlier] = []
     for k, row in zip(which.tolist(), rows.tolist(), strict=True):
         one = slice(k, k + 1)
-        readings = Readings(reported[one], log.cells[one], log.positions[one], log.rotations[one])
+        readings = PoseReadings(reported[one], log.cells[one], log.positions[one], log.rotations[one])
         case = _Case(reference, deviation, readings, state.poses[one], state.lengths[one], read[k])
         found += _outliers_at(case, row, count)
     return tuple(found)

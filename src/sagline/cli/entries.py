@@ -256,8 +256,16 @@ ENTRIES = {
         _Entry(MODES, "dynamics.spectral.interpolate", 2, 9.0, _modes, after=VIBRATION),
         _Entry(LOSSES, "dynamics.spectral.stretch_matrices", 2, 1.0, _losses, after=MODES),
         _Entry(ANSWERS, "dynamics.collocation.dynamic_stiffnesses", 3, 6.0, _stiffness_with_losses, 2, MODES),
-        _Entry(SIMULATION, "dynamics.motion.run", 65, 16.0, lambda sl: sl.simulate(_hanging_state(sl), duration=0.01)),
-        _Entry(SIMULATION_OVER_PULLEYS, "dynamics.motion.run", 33, 14.0, _simulation_over_pulleys, 2, SIMULATION),
+        _Entry(
+            SIMULATION,
+            "dynamics.motion.run_massless",
+            65,
+            16.0,
+            lambda sl: sl.simulate(_hanging_state(sl), duration=0.01),
+        ),
+        _Entry(
+            SIMULATION_OVER_PULLEYS, "dynamics.motion.run_massless", 33, 14.0, _simulation_over_pulleys, 2, SIMULATION
+        ),
         _Entry(PERIODS, "dynamics.period.begin_period", 1, 1.0, _period, after=SIMULATION),
         _Entry(CHAINS, "dynamics.chains.run_chains", 44, 17.0, _chains),
     )

@@ -33,7 +33,7 @@ def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
     return chosen if chosen.size else chosen.astype(np.int64)  # an empty list has no kind
 
 
-def length_of(shape: tuple[int, ...], single: str) -> int:
+def batch_length(shape: tuple[int, ...], single: str) -> int:
     """Number of entries along the first axis of a batch.
 
     shape: of the batch; () for a single entry; single: what a single entry is called, "single pose" for instance.

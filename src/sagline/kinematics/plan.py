@@ -16,7 +16,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.motion.path import Path
 from sagline.robot.batch import first_of
 from sagline.robot.equilibrium import Equilibrium
-from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words, out_of_plane
+from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, out_of_plane, turn_in_words
 from sagline.tension.method import TensionMethod
 
 
@@ -156,8 +156,9 @@ class Plan(Result, Saved):
         if not np.linalg.norm(turn) > ROUNDING:
             return ()
         return (
-            f"the platform is turned by {in_words(turn[0])}, which motion_pattern {robot.motion_pattern} does not do: "
-            "what holds it so is not in the balance; correct the pose, or give the robot another motion_pattern",
+            f"the platform is turned by {turn_in_words(turn[0])}, which motion_pattern {robot.motion_pattern} does "
+            "not do: what holds it so is not in the balance; correct the pose, or give the robot another "
+            "motion_pattern",
         )
 
     def _out_of_plane(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, Flags, checked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.motion.path import Path
-from sagline.motion.segments import QUINTIC, SEPTIC, Profile, Segments
+from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile, Segments
 from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
@@ -121,7 +121,7 @@ def septic_path(
 
 
 def _rest_to_rest(
-    profile: Profile,
+    profile: RestProfile,
     waypoints: Pose | Sequence[Pose] | ArrayLike,
     durations: ArrayLike | None,
     limits: tuple[float | None, float | None, float | None, float | None],

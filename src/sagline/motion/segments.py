@@ -15,7 +15,7 @@ from sagline.robot.pose import Pose
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class RestProfile:
     """A polynomial that goes from 0 to 1 while s goes from 0 to 1, as smooth at both ends as its degree allows.
 
     With u = s (1 - s) its slope is c u^k, so that its first k derivatives vanish at both ends; the degree is 2 k + 1.
@@ -32,7 +32,7 @@ class Profile:
     tail: tuple[float, ...]
 
     @classmethod
-    def of_order(cls, order: int) -> Profile:
+    def of_order(cls, order: int) -> RestProfile:
         """The profile whose first `order` derivatives vanish at both ends."""
         k = order
         scale = factorial(2 * k + 1) // factorial(k) ** 2
@@ -72,8 +72,8 @@ class Profile:
         return self.slope * u**k, second, third
 
 
-QUINTIC: Final = Profile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
-SEPTIC: Final = Profile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
+QUINTIC: Final = RestProfile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
+SEPTIC: Final = RestProfile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
 
 STILL = 1e-9  # m and rad: a shorter move is the rounding of a waypoint
@@ -94,7 +94,7 @@ class Segments:
             leads to cos(a/2) q + sin(a/2) side.
     """
 
-    profile: Profile
+    profile: RestProfile
     start: Array
     move: Array
     turn: Array
@@ -102,7 +102,7 @@ class Segments:
     side_quaternion: Array
 
     @classmethod
-    def between(cls, stops: Pose, profile: Profile) -> Segments:
+    def between(cls, stops: Pose, profile: RestProfile) -> Segments:
         """The segments from each pose of a batch to the next."""
         move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
         if np.array_equal(kept, stops.quaternion[1:]):  # nothing turns: the axis is never asked for

@@ -66,7 +66,7 @@ def cables(given: Cable, count: int) -> Cable:
     return given if given.linear_density.shape == (count,) else given.replace(**fields)
 
 
-def winches(given: Winch | None, frame: Array) -> Winch | None:
+def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
     """The winches, one a cable, or None; dead cable follows from guides that lead to the frame anchors (m, 3)."""
     winch = optional(given, Winch, "winches")
     return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
@@ -145,7 +145,7 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
     return locked(unit(normal))
 
 
-def tension_limits(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
+def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
     """Lower and upper tension limits [N], (m,); none negative, no lower one above its upper one."""
     lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
     upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)

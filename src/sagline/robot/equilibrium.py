@@ -10,7 +10,7 @@ import numpy as np
 from sagline.cables.model import CableModel, CableState
 from sagline.core.arrays import Array, Codes, locked
 from sagline.core.errors import InvalidValueError
-from sagline.core.indices import length_of, part_of
+from sagline.core.indices import batch_length, part_of
 from sagline.core.results import Result
 from sagline.kernels import tables
 from sagline.robot.batch import (
@@ -133,7 +133,7 @@ class Equilibrium(Result):
 
     def __len__(self) -> int:
         """Number of poses in a batch."""
-        return length_of(self.pose.shape, "single equilibrium")
+        return batch_length(self.pose.shape, "single equilibrium")
 
     def __getitem__(self, index: Index) -> Equilibrium:
         """One pose of a batch, or a part of the batch.

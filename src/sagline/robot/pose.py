@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from sagline.core.arrays import Array, checked, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import given, reduced, rule
-from sagline.core.indices import length_of, part_of
+from sagline.core.indices import batch_length, part_of
 from sagline.core.memory import check_memory
 
 if TYPE_CHECKING:
@@ -237,7 +237,7 @@ class Pose:
 
     def __len__(self) -> int:
         """Number of poses in a batch."""
-        return length_of(self.shape, "single pose")
+        return batch_length(self.shape, "single pose")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> Pose:
         """One pose of a batch, or a part of the batch; slices share the batch's memory where they can.

@@ -33,7 +33,7 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
     size = np.linalg.norm(turn, axis=1)
     if (outside := np.flatnonzero(size > ROUNDING)).size:
         k = int(outside[0])
-        value = f"turned by {in_words(turn[k])} from {item}[0]"
+        value = f"turned by {turn_in_words(turn[k])} from {item}[0]"
         allowed = "a turn about plane_normal" if pattern in ROTATING else "no turn"
         step = "Give the robot another motion_pattern, or correct the poses."
         raise InvalidValueError(f"{item}[{k}]", value, f"{allowed}, by motion_pattern {pattern}", step)
@@ -60,7 +60,7 @@ def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
     return turn
 
 
-def in_words(turn: Array) -> str:
+def turn_in_words(turn: Array) -> str:
     """A turn as a person reads it.
 
     turn: sine of half the angle times the axis, shape (3,), more than zero.

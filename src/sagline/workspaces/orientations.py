@@ -16,7 +16,7 @@ from sagline.core.numbers import n
 from sagline.core.results import set_fields
 from sagline.robot.pattern import PLANAR, ROTATING
 from sagline.robot.pose import Pose
-from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, in_words
+from sagline.robot.reach import LEVEL, ROUNDING, forbidden_turn, turn_in_words
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class Orientations:
         turn = self.quaternion[0, :3]
         if np.linalg.norm(turn) <= ROUNDING:
             return "level"
-        return f"turned by {in_words(turn * np.copysign(1.0, self.quaternion[0, 3]))}"
+        return f"turned by {turn_in_words(turn * np.copysign(1.0, self.quaternion[0, 3]))}"
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Need]]:
         """Pickle bit for bit."""
@@ -186,7 +186,7 @@ def _check_turns(robot: Robot, given: Orientations) -> None:
     if wrong.size:
         k = int(wrong[0])
         allowed = "a turn about plane_normal" if robot.motion_pattern in ROTATING else "no turn"
-        value, step = f"a turn by {in_words(turns[k])}", "Leave it out, or give the robot another motion_pattern."
+        value, step = f"a turn by {turn_in_words(turns[k])}", "Leave it out, or give the robot another motion_pattern."
         raise InvalidValueError(
             f"orientations[{k}]", value, f"{allowed}, by motion_pattern {robot.motion_pattern}", step
         )

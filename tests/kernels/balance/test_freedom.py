@@ -18,7 +18,7 @@ turns = from_python(kernels.is_rotation)
 components_along = from_python(kernels.components_along)
 symmetric_part = from_python(kernels.symmetric_part)
 matrix_along = from_python(kernels.matrix_along)
-spread = from_python(kernels.motion_along)
+spread = from_python(kernels.fill_motion_of_components)
 
 
 @pytest.mark.parametrize("pattern", FREEDOMS)

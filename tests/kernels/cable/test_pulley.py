@@ -24,7 +24,7 @@ behind_cable = from_python(pulley.behind_cable)
 solve_cable_state = from_python(states.solve_cable_state)
 free_span, free_rise = from_python(pulley.free_span), from_python(pulley.free_rise)
 from_tension = from_python(models.from_tension)
-cable_forces = from_python(forces.cable_forces)
+cable_forces = from_python(forces.forces_from_lengths)
 series = from_python(over_pulleys.stiffness_in_series)
 
 GRAVITY = 9.81

@@ -12,7 +12,7 @@ from sagline.kernels.tension import margin
 from tests.kernels.compiled import from_python, memory
 from tests.tiers import wide
 
-capacity_margin = from_python(margin.capacity_margin)
+capacity_margin = from_python(margin.zonotope_margin)
 next_choice = from_python(margin.next_choice)
 extend = from_python(margin.extend_frame)
 complete = from_python(margin.complete_frame)

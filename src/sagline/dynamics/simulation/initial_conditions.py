@@ -13,7 +13,7 @@ from sagline.core.arguments import brief
 from sagline.core.arrays import Array, checked, exactly, locked, number
 from sagline.core.errors import InvalidValueError
 from sagline.kernels import codes
-from sagline.kernels.dynamics.progress import TimeTableArrays
+from sagline.kernels.dynamics.progress import CubicTableArrays
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.status import PoseStatus
 from sagline.kinematics.winding import without_guides
@@ -56,7 +56,7 @@ class TimeTable:
         return cls(time, value, np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(rate[1:]))
 
     @property
-    def arrays(self) -> TimeTableArrays:
+    def arrays(self) -> CubicTableArrays:
         """As kernels take it: read-only, C-contiguous."""
         time, value, begin, end = (
             locked(np.ascontiguousarray(array, dtype=np.float64).view())

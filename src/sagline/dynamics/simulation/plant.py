@@ -80,7 +80,7 @@ class Plant:
         cable_mass: As `simulate` takes it.
     """
 
-    kernel: ClassVar[Any] = staticmethod(motion.run)
+    kernel: ClassVar[Any] = staticmethod(motion.run_massless)
     cable_mass: ClassVar[str] = "none"
 
     def __init__(self, robot: Robot, model: CableModel, pose: Pose, twist: Array, length: Array, data: Array) -> None:

@@ -139,7 +139,7 @@ class Simulator:
         inputs = (self._length_table, self._wrench_table, TimeTable.constant(np.zeros(3)))
         self._records = Records(0, m).arrays
         self._arguments = plant.arguments(rules, numbers, inputs)
-        self._run: Any = machine_code(motion.run, (*self._arguments, self._records, 0, 0))
+        self._run: Any = machine_code(motion.run_massless, (*self._arguments, self._records, 0, 0))
         self._cells = LoadCells(given.robot, whole_number(seed, "seed", 0, MOST_SEED), plant.now[d.FILTERED])
         stretch = 1.0 + plant.data[d.WINDING_STRAIN]
         places = (plant.now[d.WOUND], np.ones(m)) if kind == d.DRUMS else (plant.rows[LENGTH], stretch)
@@ -147,7 +147,7 @@ class Simulator:
         frame = (locked(given.robot.center_of_mass @ plant.axes), plant.turn_back)
         self._platform = np.empty(body.STATE_COLUMNS)
         self._seen: tuple[Any, ...] = (plant.state, locked(plant.inertia.view()), *frame, self._platform)
-        self._look: Any = machine_code(body.platform_of, self._seen)
+        self._look: Any = machine_code(body.platform_state, self._seen)
         self._reading = self._new_reading()
         self._run(*self._arguments, self._records, 0, 0)
         self._read()

@@ -69,7 +69,7 @@ def components_along(free: Array, full: Array, part: Array) -> float:
 
 
 @formula
-def motion_along(free: Array, part: Array, motion: Array) -> None:
+def fill_motion_of_components(free: Array, part: Array, motion: Array) -> None:
     """Fill the motion (6,) that components (n,) along the free motions stand for."""
     for a in range(6):
         motion[a] = 0.0

@@ -91,7 +91,7 @@ def _has_converged(rows: Array, i: int) -> bool:
 
 
 @formula
-def cable_forces(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
+def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
 
     Cables over pulleys are solved in passes, as cables that start where the chord touches; docs/model.md, section 10.

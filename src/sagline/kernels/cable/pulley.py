@@ -52,7 +52,7 @@ class Change(NamedTuple):
     dead: float
 
 
-class Motion(NamedTuple):
+class EndMotion(NamedTuple):
     """Of the platform end in the cable's plane, at a fixed force on it."""
 
     x: float
@@ -210,8 +210,8 @@ def _length_behind_by(
 
 @kernel
 def end_by(
-    pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: Motion
-) -> Motion:
+    pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: EndMotion
+) -> EndMotion:
     """Motion of the platform end at a fixed force on it per change of a cable's data; docs/model.md, section 10.
 
     by_weight: how it moves by w alone at a fixed free length [m^2/N].
@@ -229,7 +229,7 @@ def end_by(
     softer = -free * change.stiffness / (material.stiffness * material.stiffness)
     x = softer * force.horizontal + by_weight.x * change.weight
     z = softer * (force.vertical - 0.5 * weight * free) + by_weight.z * change.weight
-    return Motion(
+    return EndMotion(
         x + feed * along_x + change.radius * (1.0 - pulley.entry * along_z),
         z + feed * along_z + change.radius * pulley.entry * along_x,
     )

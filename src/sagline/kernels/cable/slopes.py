@@ -9,13 +9,13 @@ from sagline.kernels import codes
 from sagline.kernels.algebra.functions import atanhc_excess
 from sagline.kernels.cable.catenary import slack_series
 from sagline.kernels.cable.models import shallow_sag_force
-from sagline.kernels.cable.pulley import Change, Motion, Pulley, end_by
+from sagline.kernels.cable.pulley import Change, EndMotion, Pulley, end_by
 from sagline.kernels.cable.stiffness import shallow_slopes
 from sagline.kernels.cable.terms import Force, Material, Model, PlaneStiffness
 from sagline.kernels.jit import formula
 
 
-class Pair(NamedTuple):
+class PlaneVector(NamedTuple):
     """Horizontal and vertical part in the cable's plane."""
 
     x: float
@@ -25,34 +25,38 @@ class Pair(NamedTuple):
 class _ForceSlopes(NamedTuple):
     """Derivatives of the force on the platform end: dT/dL [N/m], dT/d(rho) [N m/kg], dT/d(EA) [1]."""
 
-    by_length: Pair
-    by_density: Pair
-    by_stiffness: Pair
+    by_length: PlaneVector
+    by_density: PlaneVector
+    by_stiffness: PlaneVector
 
 
 class _MachineSlopes(NamedTuple):
     """Derivatives of the force on the platform end by R and the dead cable [N/m]."""
 
-    by_radius: Pair
-    by_dead: Pair
+    by_radius: PlaneVector
+    by_dead: PlaneVector
 
 
 @formula
-def force_change(plane: PlaneStiffness, end: Pair) -> Pair:
+def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
     """Change of force where the free end would move so and is held: minus stiffness times motion."""
-    return Pair(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
+    return PlaneVector(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
 
 
 @formula
-def _catenary_by_length(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
+def _catenary_by_length(
+    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
+) -> PlaneVector:
     """Motion of P1's end for a meter of cable at fixed force: it enters at the frame end, along the tangent there."""
     vertical_a = vertical - weight * length
     grown = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a) + 1.0 / stiffness
-    return Pair(grown * horizontal, grown * vertical_a)
+    return PlaneVector(grown * horizontal, grown * vertical_a)
 
 
 @formula
-def _catenary_by_weight(horizontal: float, vertical: float, length: float, weight: float, stiffness: float) -> Pair:
+def _catenary_by_weight(
+    horizontal: float, vertical: float, length: float, weight: float, stiffness: float
+) -> PlaneVector:
     """Motion of P1's end by the weight per length at fixed force [m^2/N]."""
     vertical_a = vertical - weight * length
     tension_a = math.hypot(horizontal, vertical_a)
@@ -70,22 +74,22 @@ def _catenary_by_weight(horizontal: float, vertical: float, length: float, weigh
         x_w = 2.0 * horizontal * length * (bend * u_w - (1.0 + excess) * total_w / total) / total
     middle = vertical - 0.5 * weight * length
     z_w = -0.5 * length * length * (1.0 / stiffness + 2.0 / total) - 2.0 * middle * length * total_w / (total * total)
-    return Pair(x_w, z_w)
+    return PlaneVector(x_w, z_w)
 
 
 @formula
 def force_by_length(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
-) -> Pair:
+) -> PlaneVector:
     """dT/dL [N/m] of a cable of the exact or the weightless model; zero where a weightless one is slack."""
     weight = material.density * model.gravity
     if model.code == codes.CATENARY and weight > 0.0:
         end = _catenary_by_length(force.horizontal, force.vertical, length, weight, material.stiffness)
         return force_change(plane, end)
     if force.tension == 0.0:
-        return Pair(0.0, 0.0)
+        return PlaneVector(0.0, 0.0)
     along = -material.stiffness / (length * length)  # of tau, over the chord's x and z
-    return Pair(along * span, along * rise)
+    return PlaneVector(along * span, along * rise)
 
 
 @formula
@@ -99,9 +103,9 @@ def _shallow_force_slopes(
     sine = rise / chord
     sag_force = shallow_sag_force(model, chord, 1.0)
     return _ForceSlopes(
-        Pair(slopes.by_length * cosine, slopes.by_length * sine),
-        Pair(slopes.by_density * cosine, slopes.by_density * sine + sag_force),
-        Pair(slopes.by_stiffness * cosine, slopes.by_stiffness * sine),
+        PlaneVector(slopes.by_length * cosine, slopes.by_length * sine),
+        PlaneVector(slopes.by_density * cosine, slopes.by_density * sine + sag_force),
+        PlaneVector(slopes.by_stiffness * cosine, slopes.by_stiffness * sine),
     )
 
 
@@ -119,12 +123,14 @@ def force_slopes(
     if model.code == codes.CATENARY and weight > 0.0:
         by_weight = force_change(plane, _catenary_by_weight(horizontal, vertical, length, weight, stiffness))
         soft = -length / (stiffness * stiffness)
-        stretched = Pair(soft * horizontal, soft * (vertical - 0.5 * weight * length))
+        stretched = PlaneVector(soft * horizontal, soft * (vertical - 0.5 * weight * length))
         return _ForceSlopes(
-            by_length, Pair(model.gravity * by_weight.x, model.gravity * by_weight.z), force_change(plane, stretched)
+            by_length,
+            PlaneVector(model.gravity * by_weight.x, model.gravity * by_weight.z),
+            force_change(plane, stretched),
         )
     along = tension / (stiffness * math.hypot(span, rise))
-    return _ForceSlopes(by_length, Pair(0.0, 0.0), Pair(along * span, along * rise))
+    return _ForceSlopes(by_length, PlaneVector(0.0, 0.0), PlaneVector(along * span, along * rise))
 
 
 @formula
@@ -136,12 +142,12 @@ def slopes_over(
     free: unstrained length of the free span [m].
     """
     weight = 0.0 if model.code == codes.ELASTIC else material.density * model.gravity
-    by_weight = Motion(0.0, 0.0)
+    by_weight = EndMotion(0.0, 0.0)
     if weight > 0.0:
         x, z = _catenary_by_weight(force.horizontal, force.vertical, free, weight, material.stiffness)
-        by_weight = Motion(x, z)
+        by_weight = EndMotion(x, z)
     if force.horizontal == 0.0 and force.vertical == weight * free:  # no force at P
-        none = Pair(0.0, 0.0)
+        none = PlaneVector(0.0, 0.0)
         return _ForceSlopes(none, none, none), _MachineSlopes(none, none)
     heavier = model.gravity if weight > 0.0 else 0.0
     length = end_by(pulley, material, weight, force, free, Change(1.0, 0.0, 0.0, 0.0, 0.0), by_weight)
@@ -151,9 +157,11 @@ def slopes_over(
     dead = end_by(pulley, material, weight, force, free, Change(0.0, 0.0, 0.0, 0.0, 1.0), by_weight)
     return (
         _ForceSlopes(
-            force_change(plane, Pair(length.x, length.z)),
-            force_change(plane, Pair(density.x, density.z)),
-            force_change(plane, Pair(stiffness.x, stiffness.z)),
+            force_change(plane, PlaneVector(length.x, length.z)),
+            force_change(plane, PlaneVector(density.x, density.z)),
+            force_change(plane, PlaneVector(stiffness.x, stiffness.z)),
         ),
-        _MachineSlopes(force_change(plane, Pair(radius.x, radius.z)), force_change(plane, Pair(dead.x, dead.z))),
+        _MachineSlopes(
+            force_change(plane, PlaneVector(radius.x, radius.z)), force_change(plane, PlaneVector(dead.x, dead.z))
+        ),
     )

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from sagline.core.arrays import Array
 from sagline.kernels.algebra.factors import solve_lower, solve_upper
-from sagline.kernels.balance.wrench import components_along, is_rotation, motion_along
+from sagline.kernels.balance.wrench import components_along, fill_motion_of_components, is_rotation
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.over_pulleys import material_at
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
+from sagline.kernels.cable.slopes import PlaneVector, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.calibration import kinds
@@ -70,7 +70,7 @@ def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, 
     components_along(free, wrench, space.part)
     solve_lower(space.factor, space.part)
     solve_upper(space.factor, space.part)
-    motion_along(free, space.part, motion)
+    fill_motion_of_components(free, space.part, motion)
 
 
 @formula
@@ -149,7 +149,7 @@ def _tension_by_force(shares: Array, i: int, force: Triple) -> float:
 
 
 @formula
-def _in_world_axes(rows: Array, i: int, pair: Pair) -> Triple:
+def _in_world_axes(rows: Array, i: int, pair: PlaneVector) -> Triple:
     """A vector of a cable's plane in world axes."""
     return pair.x * rows[g.AZIMUTH_X, i], pair.x * rows[g.AZIMUTH_Y, i], pair.z
 
@@ -173,7 +173,14 @@ def _add_force_change(
 
 @kernel
 def _add_parameter_change(
-    sought: Unknowns, row: int, i: int, gain: float, pair: Pair, alone: float, space: CalibrationArrays, slopes: Slopes
+    sought: Unknowns,
+    row: int,
+    i: int,
+    gain: float,
+    pair: PlaneVector,
+    alone: float,
+    space: CalibrationArrays,
+    slopes: Slopes,
 ) -> None:
     """Add to a column what a datum of cable i does: to the force on its platform end, and to its tension alone."""
     at = sought.where[row, i]

@@ -31,8 +31,8 @@ from sagline.kernels.calibration.terms import (
     CalibrationArrays,
     Linearization,
     LinearizationArrays,
+    PoseReadings,
     ReadingArrays,
-    Readings,
     Sensing,
     SensingArrays,
     Slopes,
@@ -41,7 +41,7 @@ from sagline.kernels.calibration.terms import (
     new_calibration_arrays,
 )
 from sagline.kernels.forward.platform import Triple, platform_stiffness, turned, unbalance
-from sagline.kernels.forward.problem import ForwardTerms, SampleArrays, Samples, row_of
+from sagline.kernels.forward.problem import ForwardSamples, ForwardTerms, SampleArrays, row_of
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory
 
@@ -135,7 +135,7 @@ def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Tripl
 @glue
 def _fill_residual(
     sensing: Sensing,
-    readings: Readings,
+    readings: PoseReadings,
     p: int,
     pose: Array,
     from_system: Triple,
@@ -170,14 +170,14 @@ def observe(
 
     Args:
         model: Cable model, the exact or the weightless one, as of `forward_poses`.
-        given: `Samples`, its starts the poses, which are equilibria at the lengths.
+        given: `ForwardSamples`, its starts the poses, which are equilibria at the lengths.
         sensing: `Sensing`.
-        reading_arrays: `Readings`.
+        reading_arrays: `PoseReadings`.
         unknown_arrays: `Unknowns`.
         memory: `memory_for` as many cables.
         found: `Linearization`, filled.
     """
-    batch, sensors, readings = Samples(*given), Sensing(*sensing), Readings(*reading_arrays)
+    batch, sensors, readings = ForwardSamples(*given), Sensing(*sensing), PoseReadings(*reading_arrays)
     sought, answer = Unknowns(*unknown_arrays), Linearization(*found)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape

@@ -30,7 +30,7 @@ class Sensing(NamedTuple):
     target: Array  # platform frame [m], (3,)
 
 
-class Readings(NamedTuple):
+class PoseReadings(NamedTuple):
     """Readings at N poses; without readings a residual is zero; NaN where a sensor gave none."""
 
     lengths: Array  # that the winches say [m], (N, m)

@@ -22,7 +22,7 @@ Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], share of a ne
 Rules = tuple[int, int, int]  # kind of winches, remembered, loops' stride
 Body = tuple[Array, Array, Array, Array]  # cables, inertia, what of a wrench moves the body, where the given one acts
 Courses = tuple[
-    progress.TimeTableArrays, progress.TimeTableArrays, progress.TimeTableArrays
+    progress.CubicTableArrays, progress.CubicTableArrays, progress.CubicTableArrays
 ]  # of lengths, wrenches, the wind
 Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
 ChainArrays = tuple[Array, Array, Array, Array, Indices]
@@ -50,9 +50,9 @@ class ChainRun(NamedTuple):
     free: Array
     handle: Array
     drives: Drives
-    lengths: progress.TimeTable
-    wrenches: progress.TimeTable
-    winds: progress.TimeTable
+    lengths: progress.CubicTable
+    wrenches: progress.CubicTable
+    winds: progress.CubicTable
     state: Array
     rows: Array
     at: Indices
@@ -79,9 +79,9 @@ def chain_run_of(
     targets, memory = vector(memory, width)
     target_rates, memory = vector(memory, width)
     lengths, wrenches, winds = (
-        progress.TimeTable(*courses[0]),
-        progress.TimeTable(*courses[1]),
-        progress.TimeTable(*courses[2]),
+        progress.CubicTable(*courses[0]),
+        progress.CubicTable(*courses[1]),
+        progress.CubicTable(*courses[2]),
     )
     drives = Drives(kind, remembered > 0, data, now, layers, audit)
     return ChainRun(

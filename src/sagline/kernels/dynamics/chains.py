@@ -202,12 +202,13 @@ def run_chains(
             what it carries of the chains; inertia; a projection (6, 6) onto its free motions; and in these axes the
             place that the given wrench is about, (3,).
         data: Of the drives, (DATA_ROWS, m).
-        courses: Of lengths, of wrenches and of the wind's velocity, as in `motion.run`.
+        courses: Of lengths, of wrenches and of the wind's velocity, as in `motion.run_massless`.
         kept: As there, with one counter more, and ROOM numbers to work in, with
             two for every number of the course of lengths.
         chain_arrays: `Chains`, in and out.
         stock: Energies of the start that could become motion, (2,), in and out; NaN at first.
-        records: Filled as in `motion.run`; and points of the cables (R, m, points, 3) at equal material steps from the
+        records: Filled as in `motion.run_massless`; and points of the cables (R, m, points, 3) at equal material steps
+        from the
             exit on.
         steps: How many steps to take, fewer where there is no room left for the notes of another. With 0 the state at
             hand is recorded.

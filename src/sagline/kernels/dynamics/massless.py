@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sagline.core.arrays import Array, Indices
 from sagline.kernels import codes, tables
-from sagline.kernels.balance.wrench import components_along, motion_along
+from sagline.kernels.balance.wrench import components_along, fill_motion_of_components
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model
@@ -29,14 +29,14 @@ Rules = tuple[int, int, int, int, int]  # integrator, kind of winches, remembere
 Numbers = tuple[float, float, float, float]  # step [s], loss_time [s], air damping [N s/m^2], share of a new reading
 Robot = tuple[Array, Array, Array, Array]  # cables, body, inertia, freedom
 Courses = tuple[
-    progress.TimeTableArrays, progress.TimeTableArrays, progress.TimeTableArrays
+    progress.CubicTableArrays, progress.CubicTableArrays, progress.CubicTableArrays
 ]  # of lengths, wrenches, the wind
 Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
 Records = tuple[Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes
 
 
 class MasslessRun(NamedTuple):
-    """State and arrays of a run, as in `motion.run`."""
+    """State and arrays of a run, as in `motion.run_massless`."""
 
     model: Model
     work: int
@@ -47,9 +47,9 @@ class MasslessRun(NamedTuple):
     inertia: Array
     freedom: Array
     drives: Drives
-    lengths: progress.TimeTable
-    wrenches: progress.TimeTable
-    winds: progress.TimeTable
+    lengths: progress.CubicTable
+    wrenches: progress.CubicTable
+    winds: progress.CubicTable
     state: Array
     rows: Array
     at: Indices
@@ -72,7 +72,7 @@ class MasslessRun(NamedTuple):
 def massless_run_of(
     model: ModelTerms, rules: Rules, numbers: Numbers, robot: Robot, data: Array, courses: Courses, kept: Kept
 ) -> MasslessRun:
-    """State and arrays of a run from the arguments of `motion.run`."""
+    """State and arrays of a run from the arguments of `motion.run_massless`."""
     _integrator, kind, remembered, work, _stride = rules
     step, loss_time, air, _filtering = numbers
     state, rows, now, layers, audit, at, room = kept
@@ -84,9 +84,9 @@ def massless_run_of(
     both, memory = block(memory, 2, courses[0][1].shape[1])
     rotation, memory = block(memory, 3, 3)
     lengths, wrenches, winds = (
-        progress.TimeTable(*courses[0]),
-        progress.TimeTable(*courses[1]),
-        progress.TimeTable(*courses[2]),
+        progress.CubicTable(*courses[0]),
+        progress.CubicTable(*courses[1]),
+        progress.CubicTable(*courses[2]),
     )
     drives = Drives(kind, remembered > 0, data, now, layers, audit)
     return MasslessRun(
@@ -131,7 +131,7 @@ def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
     """Take from a wrench what the platform's guides carry."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
-        motion_along(freedom, part, wrench)
+        fill_motion_of_components(freedom, part, wrench)
 
 
 @kernel

@@ -192,7 +192,7 @@ def _start_run(run: MasslessRun, records: Records, room: Array) -> None:
 
 
 @entry
-def run(
+def run_massless(
     model: ModelTerms,
     rules: Rules,
     numbers: Numbers,

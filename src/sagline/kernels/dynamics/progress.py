@@ -13,10 +13,10 @@ from sagline.kernels.jit import formula, glue, kernel
 
 MOMENT = 1e-6  # of a step: instants that are nearer are the same
 
-TimeTableArrays = tuple[Array, Array, Array, Array]  # a Course as it comes from Python
+CubicTableArrays = tuple[Array, Array, Array, Array]  # a Course as it comes from Python
 
 
-class TimeTable(NamedTuple):
+class CubicTable(NamedTuple):
     """n numbers in time: a cubic on every interval, by its values and rates at both ends; held before and after."""
 
     time: Array  # instants [s], (K,), increasing
@@ -26,7 +26,7 @@ class TimeTable(NamedTuple):
 
 
 @formula
-def interpolate_table(course: TimeTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
+def interpolate_table(course: CubicTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
     """Fill values and rates (n,) at a time, from a course whose interval at or before it is known; returns that now.
 
     shift: a moment by which the interval is looked for earlier or later: at an instant of the course that before it is
@@ -55,7 +55,7 @@ def interpolate_table(course: TimeTable, at: int, now: float, shift: float, valu
 
 
 @glue
-def interval_ends(course: TimeTable, at: int, moment: float) -> bool:
+def interval_ends(course: CubicTable, at: int, moment: float) -> bool:
     """True if the current interval ends by a moment and another follows."""
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]
 

@@ -124,7 +124,7 @@ def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
 
 
 @entry
-def platform_of(state: Array, inertia: Array, center: Array, turn: Array, out: Array) -> None:
+def platform_state(state: Array, inertia: Array, center: Array, turn: Array, out: Array) -> None:
     """Fill what the platform's own frame does: position of its origin, quaternion, velocity and angular velocity (13,).
 
     Args:

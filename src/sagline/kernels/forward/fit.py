@@ -24,11 +24,11 @@ from sagline.kernels.forward.problem import (
     ENERGY,
     ITERATIONS,
     ForwardArrays,
+    ForwardSamples,
     LastEquilibrium,
     LastEquilibriumArrays,
     PoseProblem,
     SampleArrays,
-    Samples,
     SolutionArrays,
     Solutions,
     clear_solution,
@@ -134,11 +134,10 @@ def fit_poses(
     found: SolutionArrays,
 ) -> None:
     """Fit every sample in turn; arguments as of `forward_poses`. Forces are NaN, energy is half the sum of squares."""
-    batch, answer, kept = Samples(*given), Solutions(*found), LastEquilibrium(*chain)
+    batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)
     count, m = batch.lengths.shape
     space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
-    motions, rest = new_motions(rest, batch.freedom.shape[0])
-    free, arcs, start, pose = motions
+    free, arcs, start, pose = new_motions(rest, batch.freedom.shape[0])
     copy_pose(batch.starts[0], start)
     for p in range(count):
         clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, codes.CABLE_NO_TENSION)

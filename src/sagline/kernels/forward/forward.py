@@ -25,12 +25,12 @@ from sagline.kernels.forward.problem import (
     MOMENT_RESIDUAL,
     STIFFNESS_MIN,
     ForwardArrays,
+    ForwardSamples,
     ForwardTerms,
     LastEquilibrium,
     LastEquilibriumArrays,
     PoseProblem,
     SampleArrays,
-    Samples,
     SolutionArrays,
     Solutions,
     clear_solution,
@@ -194,17 +194,16 @@ def forward_poses(
         model: Cable model and the empirical one's constants; the shallow ones go downhill as exact cables and are
             polished as what they are. Whether anything may be behind the cables: True, or None for never.
         chained: Whether each sample starts where the last solved one ended, the first at starts[0].
-        given: `Samples`.
+        given: `ForwardSamples`.
         chain: `LastEquilibrium`; a chain of samples continues from it where it starts at the remembered pose.
         memory: `memory_for` as many cables.
         found: `Solutions`, filled.
     """
-    batch, answer, kept = Samples(*given), Solutions(*found), LastEquilibrium(*chain)
+    batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)
-    motions, rest = new_motions(rest, batch.freedom.shape[0])
-    free, arcs, start, pose = motions
+    free, arcs, start, pose = new_motions(rest, batch.freedom.shape[0])
     copy_pose(batch.starts[0], start)
     for p in range(count):
         if math.isnan(batch.lengths[p, 0]):

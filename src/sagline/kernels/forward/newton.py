@@ -14,7 +14,7 @@ from sagline.kernels.algebra.factors import factor_positive, solve_general, solv
 from sagline.kernels.balance.wrench import components_along, matrix_along, norm, symmetric_part
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.over_pulleys import end_motion_per_length, material_at
-from sagline.kernels.cable.slopes import Pair, force_by_length, force_change
+from sagline.kernels.cable.slopes import PlaneVector, force_by_length, force_change
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.forward.platform import add_force, platform_energy, platform_stiffness, step_pose, unbalance
@@ -88,7 +88,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
         if model.behind is not None:
             x, z, _gives = end_motion_per_length(model, cables, rows, i)
-            slope = force_change(plane_of(rows, i), Pair(x, z))
+            slope = force_change(plane_of(rows, i), PlaneVector(x, z))
         else:
             material, force = material_at(cables, i), force_of(rows, i)
             slope = force_by_length(model, span, rise, material, length, force, plane_of(rows, i))

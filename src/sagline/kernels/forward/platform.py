@@ -10,9 +10,9 @@ import math
 
 from sagline.core.arrays import Array
 from sagline.kernels import tables
-from sagline.kernels.balance.wrench import motion_along
+from sagline.kernels.balance.wrench import fill_motion_of_components
 from sagline.kernels.cable import geometry as g
-from sagline.kernels.cable.forces import cable_forces
+from sagline.kernels.cable.forces import forces_from_lengths
 from sagline.kernels.cable.geometry import cable_geometry
 from sagline.kernels.cable.stiffness import energy_of_cables, plane_of, stiffnesses_in_plane
 from sagline.kernels.cable.terms import Model
@@ -32,7 +32,7 @@ def unbalance(
     is to be compared with.
     """
     cable_geometry(cables, body, pose, rotation, rows)
-    cable_forces(model, cables, rows, model.behind)
+    forces_from_lengths(model, cables, rows, model.behind)
     weight = body[tables.MASS] * model.gravity
     for k in range(6):
         gradient[k] = -wrench[k]
@@ -147,7 +147,7 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
 @kernel
 def step_pose(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
     """Fill the pose after a step (n,) along the free motions, and that step as a motion (6,)."""
-    motion_along(free, step, motion)
+    fill_motion_of_components(free, step, motion)
     moved_pose(body, pose, motion, moved)
 
 

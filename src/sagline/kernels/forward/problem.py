@@ -28,7 +28,7 @@ SolutionArrays = tuple[Array, Array, Codes, Array, Codes]
 LastEquilibriumArrays = tuple[Array, Array, Array]
 
 
-class Samples(NamedTuple):
+class ForwardSamples(NamedTuple):
     """A batch of N samples to solve."""
 
     freedom: Array  # rows that pick the free motions, (n, 6)
@@ -98,21 +98,13 @@ def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[Forw
     return ForwardArrays(rows, rotation, gradient, stiffness, matrix, factor, part, step, motion, trial), memory
 
 
-class _Motions(NamedTuple):
-    """The free motions of the sample at hand, and the poses on its way."""
-
-    free: Array  # in the units of steps, (n, 6)
-    arcs: Array  # in those by which stiffnesses are compared, (n, 6)
-    start: Array  # pose row to begin at
-    pose: Array  # pose row that is found
-
-
 @glue
-def new_motions(memory: Memory, n: int) -> tuple[_Motions, Memory]:
-    """Work arrays for n free motions, and the memory that is left."""
-    rows, memory = block(memory, 2 * n, 6)
+def new_motions(memory: Memory, n: int) -> tuple[Array, Array, Array, Array]:
+    """Free motions (n, 6) in the units of steps and in those by which stiffnesses are compared, and two pose rows."""
+    free, memory = block(memory, n, 6)
+    arcs, memory = block(memory, n, 6)
     poses, memory = block(memory, 2, tables.POSE_COLUMNS)
-    return _Motions(rows[:n], rows[n:], poses[0], poses[1]), memory
+    return free, arcs, poses[0], poses[1]
 
 
 @glue
@@ -122,7 +114,7 @@ def row_of(array: Array, p: int) -> Array:
 
 
 @glue
-def problem_at(model: Model, given: Samples, p: int, free: Array, arcs: Array) -> PoseProblem:
+def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: Array) -> PoseProblem:
     """Sample p of a batch as a problem; the model's gravity becomes that of its body. Fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)

@@ -10,11 +10,11 @@ from sagline.kernels.cable import geometry as g
 from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.cable.over_pulleys import material_at
 from sagline.kernels.cable.pulley import pulley_at
-from sagline.kernels.cable.slopes import Pair, force_slopes, slopes_over
+from sagline.kernels.cable.slopes import PlaneVector, force_slopes, slopes_over
 from sagline.kernels.cable.stiffness import force_of, plane_of
 from sagline.kernels.cable.terms import Model
 from sagline.kernels.forward.platform import end_stiffness, platform_stiffness, unbalance
-from sagline.kernels.forward.problem import ForwardTerms, SampleArrays, Samples, row_of
+from sagline.kernels.forward.problem import ForwardSamples, ForwardTerms, SampleArrays, row_of
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory, block, vector
 
@@ -24,7 +24,7 @@ DATA = 5
 
 
 @formula
-def _fill_in_world_axes(pair: Pair, rows: Array, i: int, vector: Array) -> None:
+def _fill_in_world_axes(pair: PlaneVector, rows: Array, i: int, vector: Array) -> None:
     """Fill a vector (3,) of a cable's plane in world axes."""
     vector[0] = pair.x * rows[g.AZIMUTH_X, i]
     vector[1] = pair.x * rows[g.AZIMUTH_Y, i]
@@ -69,14 +69,14 @@ def describe_states(
 
     Args:
         model: Cable model and the empirical one's constants; whether anything may be behind the cables, or None.
-        given: `Samples`, its starts the poses.
+        given: `ForwardSamples`, its starts the poses.
         memory: `memory_for` as many cables.
         matrices: Filled: stiffness of the platform, (N, 6, 6).
         blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
         slopes: Filled: dT of every cable by its data, (N, DATA, m, 3).
         levers: Filled: from the center of mass to the platform ends, (N, m, 3).
     """
-    batch = Samples(*given)
+    batch = ForwardSamples(*given)
     code, k_h, k_p, behind = model
     count, m = batch.lengths.shape
     rotation, rest = block(Memory(*memory), 3, 3)

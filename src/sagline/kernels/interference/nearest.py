@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sagline.core.arrays import Array
-from sagline.kernels.interference.shapes import FIRST, HALF, LAST, LEVEL, PLACE, in_axes, outside, point, slopes
+from sagline.kernels.interference.shapes import FIRST, HALF, LAST, LEVEL, PLACE, in_box_axes, outside, point, slopes
 from sagline.kernels.jit import kernel
 
 STEPS = 30
@@ -86,11 +86,11 @@ def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[flo
 def _box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
     """Squared distance of a cable's point from a box [m^2] and where a Newton step leads to, within the range."""
     x, y, z = point(curve, s)
-    px, py, pz = in_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
+    px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])
     dx, dz, dx2, dz2 = slopes(curve, s)
-    ux, uy, uz = in_axes(box, dx * curve[LEVEL], dx * curve[LEVEL + 1], dz)
-    vx, vy, vz = in_axes(box, dx2 * curve[LEVEL], dx2 * curve[LEVEL + 1], dz2)
+    ux, uy, uz = in_box_axes(box, dx * curve[LEVEL], dx * curve[LEVEL + 1], dz)
+    vx, vy, vz = in_box_axes(box, dx2 * curve[LEVEL], dx2 * curve[LEVEL + 1], dz2)
     slope = ex * ux + ey * uy + ez * uz
     bend = 0.0
     if ex != 0.0:

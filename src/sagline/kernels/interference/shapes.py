@@ -139,7 +139,7 @@ def between_segments(one: Array, other: Array) -> tuple[float, float, float, flo
 
 
 @kernel
-def in_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+def in_box_axes(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A vector in a box's axes."""
     return (
         box[AXES] * x + box[AXES + 3] * y + box[AXES + 6] * z,
@@ -157,8 +157,8 @@ def outside(coordinate: float, half: float) -> float:
 @kernel
 def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
     """Squared distance of a segment from a box, a lower bound of it [m^2], and the share of the segment where."""
-    px, py, pz = in_axes(box, segment[0] - box[PLACE], segment[1] - box[PLACE + 1], segment[2] - box[PLACE + 2])
-    dx, dy, dz = in_axes(box, segment[3] - segment[0], segment[4] - segment[1], segment[5] - segment[2])
+    px, py, pz = in_box_axes(box, segment[0] - box[PLACE], segment[1] - box[PLACE + 1], segment[2] - box[PLACE + 2])
+    dx, dy, dz = in_box_axes(box, segment[3] - segment[0], segment[4] - segment[1], segment[5] - segment[2])
     hx, hy, hz = box[HALF], box[HALF + 1], box[HALF + 2]
     low, high, t = 0.0, 1.0, 0.5
     ex = ey = ez = 0.0
@@ -195,7 +195,7 @@ def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
 @kernel
 def nearest_in_box(box: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """The point of a box that is nearest to a point [m]."""
-    px, py, pz = in_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
+    px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])
     return (
         x - (box[AXES] * ex + box[AXES + 1] * ey + box[AXES + 2] * ez),

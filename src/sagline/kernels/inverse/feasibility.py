@@ -37,7 +37,7 @@ from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.bracket import component_along, decide_feasibility
 from sagline.kernels.tension.least_change import Demand, TensionChange, norm_of_part
-from sagline.kernels.tension.margin import capacity_margin
+from sagline.kernels.tension.margin import zonotope_margin
 from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
@@ -300,4 +300,4 @@ def margins_of_poses(
             for i in range(m):
                 cables.sag_force[i] = sag_forces[p, i]
             fill_needed_wrench(platform, cables, balance)
-            margins[p] = capacity_margin(balance.matrix, balance.right, cables.low, cables.high, translations, rest)
+            margins[p] = zonotope_margin(balance.matrix, balance.right, cables.low, cables.high, translations, rest)

@@ -11,7 +11,6 @@ The shortfall lies between the gap of the first proof and what the least change 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from sagline.core.arrays import Array
 from sagline.kernels import codes
@@ -40,22 +39,6 @@ STANDSTILL = 0.7  # sag forces that stay this uncertain do not grow more certain
 # Rows of a range (RANGE_ROWS, m): least and largest tensions, and the sag forces at them.
 LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3
 RANGE_ROWS = 4
-
-
-class _Search(NamedTuple):
-    """State of the search."""
-
-    tops: Array  # the most each cable gives along a direction [N], (m,)
-    ranges: Array  # those that wait, the last one is next, (DEPTH, RANGE_ROWS, m)
-
-
-@glue
-def _new_search(memory: Memory, m: int) -> tuple[_Search, Memory]:
-    """Work arrays for m cables, and the memory that is left."""
-    tops, memory = vector(memory, m)
-    ranges, memory = block(memory, DEPTH, RANGE_ROWS * m)
-    search = _Search(tops, ranges.reshape((DEPTH, RANGE_ROWS, m)))
-    return search, memory
 
 
 @glue
@@ -244,18 +227,20 @@ def decide_feasibility(
     the shortfall [N]; whether the direction alone proves infeasibility, over the whole first range.
     """
     n, m = demand.matrix.shape
-    search, rest = _new_search(memory, m)
+    tops, rest = vector(memory, m)  # the most each cable gives along a direction [N]
+    waiting, rest = block(rest, DEPTH, RANGE_ROWS * m)
+    ranges = waiting.reshape((DEPTH, RANGE_ROWS, m))  # those that wait, the last one is next
     sag_force, rest = vector(rest, m)
     tau, rest = block(rest, 3, max(m, n))
     trial = TensionChange(tau[0, :m], sag_force, tau[1, :n], tau[2, :n])
-    _first_range(curves, demand.size, search.ranges[0])
-    find_extrema(curves, search.ranges[0, LEAST], search.ranges[0, LARGEST], rest)
+    _first_range(curves, demand.size, ranges[0])
+    find_extrema(curves, ranges[0, LEAST], ranges[0, LARGEST], rest)
     for i in range(m):
         trial.tau[i] = change.tau[i]
     enough = math.inf
     top = 0
     for node in range(NODES):
-        range_ = search.ranges[top]
+        range_ = ranges[top]
         left, balanced = _approach_demand(curves, demand, range_, trial, rest)
         if node == 0 and not (demand.size < math.inf and left == left):
             return codes.POSE_NOT_CONVERGED, 0.0, math.inf, False
@@ -268,21 +253,21 @@ def decide_feasibility(
             enough = min(enough, left)
         if balanced and left <= FEASIBLE * demand.size:
             return codes.POSE_SOLVED, 0.0, 0.0, False
-        spare = _spare_capacity(curves, demand, range_, trial.direction, search.tops)
+        spare = _spare_capacity(curves, demand, range_, trial.direction, tops)
         if node == 0:
             for k in range(n):
                 change.direction[k] = trial.direction[k]
             if spare < 0.0:
                 return codes.POSE_INFEASIBLE, -spare if left < math.inf else math.inf, enough, True
         _, before = _least_certain(curves, range_)
-        possible = spare >= 0.0 and _narrow_range(curves, demand, range_, trial.direction, spare, search.tops)
-        possible = possible and _narrow_free(curves, demand, range_, trial, search.tops, rest)
+        possible = spare >= 0.0 and _narrow_range(curves, demand, range_, trial.direction, spare, tops)
+        possible = possible and _narrow_free(curves, demand, range_, trial, tops, rest)
         if possible:
             worst, after = _least_certain(curves, range_)
             if after > STANDSTILL * before or worst < 0:
                 if worst < 0 or top + 1 >= DEPTH:
                     break
-                _split_range(curves, search.ranges, top, worst, trial.tau[worst])
+                _split_range(curves, ranges, top, worst, trial.tau[worst])
                 top += 1
         else:
             top -= 1

@@ -95,7 +95,7 @@ def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tup
 
 
 @kernel
-def capacity_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
+def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
     """Largest force [N] in any direction that can be added to the needed wrench; negative where it is not feasible.
 
     Args:
