@@ -22,7 +22,7 @@ from sagline.kernels.memory import Memory, block, memory_for
 from sagline.kernels.tension.nearest import Distribution, new_reference_point, share_nearest
 from sagline.kernels.tension.other_methods import distribute_by_other_method
 from sagline.kernels.tension.polygon import new_work_arrays, reset_work_arrays
-from sagline.tension.options import kernel_options, takes_default_kernel
+from sagline.tension.method import kernel_options, takes_default_kernel
 from tests.tension.reference import presets, random_poses
 from tests.tension.test_verdicts import sampled, unproved
 

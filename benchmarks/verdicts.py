@@ -12,7 +12,7 @@ from benchmarks.measure import Row, best_seconds, one_core, show
 from sagline.core.arrays import Array
 from sagline.kinematics.inverse_rows import decide_rows, solve_inverse_rows
 from sagline.statics.tables import pose_rows
-from sagline.tension.options import kernel_options
+from sagline.tension.method import kernel_options
 from tests.tension.reference import BORDER_ROBOTS, found_border, random_poses
 
 POSES = 2000

@@ -132,6 +132,7 @@ from .optimization.moving import MovingAnchors as MovingAnchors
 from .optimization.moving import moving_anchors as moving_anchors
 from .robot.catalogue import robot_names as robot_names
 from .robot.equilibrium import Equilibrium as Equilibrium
+from .robot.inertia import without_cables as without_cables
 from .robot.pose import Pose as Pose
 from .robot.pose import PoseBox as PoseBox
 from .robot.robot import Robot as Robot
@@ -148,7 +149,6 @@ from .statics.stiffness import Stiffness as Stiffness
 from .statics.stiffness import modes as modes
 from .statics.stiffness import stiffness as stiffness
 from .sweep.file import load_sweep as load_sweep
-from .tension.broken import without_cables as without_cables
 from .tension.margin import capacity_margin as capacity_margin
 from .tension.margin import limit_margin as limit_margin
 from .tension.method import TensionMethod as TensionMethod

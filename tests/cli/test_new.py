@@ -17,7 +17,7 @@ import sagline as sl
 from sagline.cables.rope import ROPES
 from sagline.cli.main import app
 from sagline.cli.new import ROPE_NAMES, grid
-from sagline.robot.design import Design
+from sagline.robot.catalogue import Design
 from tests.tiers import extended
 
 

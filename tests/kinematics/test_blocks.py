@@ -11,7 +11,8 @@ import pytest
 
 import sagline as sl
 from sagline.kinematics import confirm as confirming
-from sagline.kinematics import forward_rows, start
+from sagline.kinematics import forward as forwarding
+from sagline.kinematics import forward_rows
 from sagline.kinematics import inverse_rows as inverting
 from tests.effort import slowness
 from tests.tiers import extended
@@ -22,7 +23,7 @@ LENGTHS = sl.inverse(ROBOT, PATH).unstrained_length
 
 
 def in_blocks_of(samples: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (forward_rows, start):
+    for module in (forward_rows, forwarding):
         monkeypatch.setattr(module, "BLOCK", samples * ROBOT.cable_count)
 
 

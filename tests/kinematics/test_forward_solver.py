@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import sagline as sl
+from sagline.kinematics.forward import search
 from sagline.kinematics.forward_rows import ForwardRows
-from sagline.kinematics.start import search
 from tests.kinematics.feasible import box_poses, feasible_plan
 
 COGIRO = sl.load_robot("cogiro")

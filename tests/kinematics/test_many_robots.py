@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 import sagline as sl
 from sagline.core.arrays import Array, locked
+from sagline.kinematics.forward import outside_limits
 from sagline.kinematics.forward_rows import solve_forward_rows
-from sagline.kinematics.start import outside_limits
 from tests.kinematics.feasible import box_poses, feasible_plan, moved, pose_rows
 from tests.refusal import refused
 from tests.tiers import extended, wide

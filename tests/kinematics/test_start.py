@@ -6,8 +6,8 @@ from scipy.spatial.transform import Rotation
 
 import sagline as sl
 from sagline.core.arrays import locked
+from sagline.kinematics.forward import centered_positions, outside_limits, start_quaternions, starting_positions
 from sagline.kinematics.forward_rows import solve_forward_rows
-from sagline.kinematics.start import centered_positions, outside_limits, start_quaternions, starting_positions
 from tests.kinematics.feasible import pose_rows
 
 COGIRO = sl.load_robot("cogiro")

@@ -12,7 +12,7 @@ import sagline as sl
 from sagline.robot.batch import pulley_centers
 from sagline.robot.reach import bounds
 from sagline.share.machine import model_data
-from sagline.statics.chords import chord_geometry
+from sagline.statics.tables import chord_geometry
 from sagline.viewer.snapshot import Snapshot
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended

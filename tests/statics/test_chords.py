@@ -6,7 +6,7 @@ import pytest
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.kernels.cable import geometry
-from sagline.statics.chords import chord_geometry, touching_angle
+from sagline.statics.tables import chord_geometry, touching_angle
 
 RADIUS = 0.2
 BASE = sl.load_robot("article-suspended")

@@ -15,7 +15,7 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.kernels.calibration.starting_lengths import starting_lengths
 from sagline.kernels.memory import memory_for
-from sagline.kinematics.start import search
+from sagline.kinematics.forward import search
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows

@@ -27,8 +27,8 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.errors import InvalidValueError
 from sagline.core.progress import Progress, blocks
 from sagline.kernels.calibration import kinds
+from sagline.kinematics.forward import search
 from sagline.kinematics.forward_rows import solve_forward_rows
-from sagline.kinematics.start import search
 from sagline.robot.pose import Pose
 
 STRANGE: Final = 1e-9  # probability of a sum of squares that noise does not reach

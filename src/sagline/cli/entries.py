@@ -85,7 +85,7 @@ def _verdicts(sl: Any) -> None:
     from sagline.kernels.codes import POSE_INFEASIBLE
     from sagline.kinematics.inverse_rows import InverseRows, decide_rows
     from sagline.statics.tables import pose_rows
-    from sagline.tension.options import kernel_options
+    from sagline.tension.method import kernel_options
 
     robot = sl.load_robot(ROBOT)
     found = InverseRows.empty(1, robot.cable_count, robot.degrees_of_freedom, behind=False)
@@ -96,7 +96,7 @@ def _verdicts(sl: Any) -> None:
 
 def _polygon(sl: Any) -> None:
     from sagline.kinematics.polygon import polygon_at
-    from sagline.tension.options import kernel_options
+    from sagline.tension.method import kernel_options
 
     robot, state = sl.load_robot(ROBOT), _unknown_state(sl)
     options = kernel_options(robot, sl.Catenary(), sl.MinimumNorm())
@@ -274,6 +274,6 @@ ENTRIES = {
 
 def needed_for(tension: TensionMethod) -> tuple[str, ...]:
     """Entries of the inverse kinematics with a tension distribution method."""
-    from sagline.tension.options import takes_default_kernel
+    from sagline.tension.method import takes_default_kernel
 
     return (INVERSE,) if takes_default_kernel(tension) else (INVERSE, SHARING)

@@ -21,7 +21,7 @@ from sagline.files.writing import write_text
 if TYPE_CHECKING:
     from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
-    from sagline.robot.design import Design
+    from sagline.robot.catalogue import Design
     from sagline.robot.pose import Pose, PoseBox
     from sagline.robot.robot import Robot
 
@@ -146,7 +146,7 @@ def _design(name: str, said: dict[str, str]) -> Design:
     """The design from the answers so far; valid values replace those that are not known yet."""
     from sagline.cables.rope import ROPES
     from sagline.cli.values import quantity
-    from sagline.robot.design import COUNTS, LAYOUTS, Design
+    from sagline.robot.catalogue import COUNTS, LAYOUTS, Design
 
     frame = _edges(said["frame"], "frame")
     layout = said.get("layout", LAYOUTS[0])
@@ -166,7 +166,7 @@ def _design(name: str, said: dict[str, str]) -> Design:
 
 
 def _count(text: str, layout: str) -> int:
-    from sagline.robot.design import COUNTS
+    from sagline.robot.catalogue import COUNTS
 
     if not re.fullmatch(r"[0-9]{1,3}", text.strip()):
         allowed = " or ".join(map(str, COUNTS.get(layout, (6, 7, 8))))
@@ -217,7 +217,7 @@ def _header(said: dict[str, str]) -> str:
 def _explained(robot: Robot, design: Design, middle: Plan) -> tuple[list[str], float]:
     """Lines on the robot, and the feasible share of the poses in the middle of its frame."""
     from sagline.cables.rope import ROPES, SAFETY
-    from sagline.robot.design import SLACK_LIMIT
+    from sagline.robot.catalogue import SLACK_LIMIT
 
     share = float(middle.feasible.mean())
     density, stiffness = float(robot.cables.linear_density[0]), float(robot.cables.axial_stiffness[0])

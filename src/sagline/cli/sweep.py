@@ -94,7 +94,7 @@ def sweep(
 
 
 def _entries(request: Request) -> tuple[str, ...]:
-    from sagline.tension.options import takes_default_kernel
+    from sagline.tension.method import takes_default_kernel
 
     return (INVERSE, *[SHARING] * (not takes_default_kernel(request.tension)), VERDICTS)
 

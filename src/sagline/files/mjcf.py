@@ -28,7 +28,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.batch import dead_cable, outward, points_on_pulleys, pulley_centers, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.chords import refuse_missing_chords, touching_angle
+from sagline.statics.tables import refuse_missing_chords, touching_angle
 
 NOTE = (
     "Its pulleys are cylinders that stand as the platform has turned them at the pose it starts from, and do not "

@@ -15,9 +15,8 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.memory import check_memory
 from sagline.core.results import Result
 from sagline.kernels.forward.problem import ENERGY
-from sagline.kinematics.forward import checked_lengths
+from sagline.kinematics.forward import checked_lengths, from_orientations, start_quaternions
 from sagline.kinematics.forward_rows import ForwardRows, ForwardSolution
-from sagline.kinematics.start import from_orientations, start_quaternions
 from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.kinematics.winding import iterate_routing
 from sagline.robot.pattern import PLANAR, ROTATING

@@ -17,9 +17,8 @@ from sagline.kernels.forward.forward import forward_poses
 from sagline.kernels.forward.problem import FORCE_RESIDUAL, FORWARD_NUMBERS, MOMENT_RESIDUAL, STIFFNESS_MIN
 from sagline.kernels.memory import memory_for
 from sagline.kinematics.caller import copy_in, copy_out
-from sagline.kinematics.forward import dead_only
+from sagline.kinematics.forward import dead_only, search
 from sagline.kinematics.forward_rows import new_chain
-from sagline.kinematics.start import search
 from sagline.kinematics.status import STABLE, ForwardStatus
 from sagline.kinematics.winding import without_guides
 from sagline.robot.batch import dead_cable, has_routing

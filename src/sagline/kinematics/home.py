@@ -20,8 +20,7 @@ from sagline.robot.drum import warmth
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
-from sagline.statics.chords import refuse_missing_chords
-from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_missing_chords
 
 _CATENARY = Catenary()
 MISSED: Final = 1e-9  # of a tension: a cable that misses it by more cannot have it

@@ -28,11 +28,9 @@ from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import external_wrench, inertial_wrench
-from sagline.statics.chords import refuse_missing_chords
-from sagline.statics.tables import pose_rows
-from sagline.tension.method import TensionMethod, Variable, shared_tension
+from sagline.statics.tables import pose_rows, refuse_missing_chords
+from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
 from sagline.tension.methods import Closest
-from sagline.tension.options import kernel_options
 
 STANDING: Final = 1e-7  # of the fastest cable's rate: slower ones stand, rates are good to 1e-8
 _CATENARY = Catenary()

@@ -14,8 +14,7 @@ from sagline.kernels.inverse.poses import Answers, inverse_poses
 from sagline.kernels.memory import memory_for
 from sagline.robot.batch import Robots, first_of, has_routing
 from sagline.statics.tables import robot_terms
-from sagline.tension.method import TensionMethod
-from sagline.tension.options import Options, takes_default_kernel
+from sagline.tension.method import Options, TensionMethod, takes_default_kernel
 
 UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # what the iterations leave open
 BLOCK = 1 << 12  # poses solved at once: a tenth of a second at most, after which an interrupt is heard

@@ -27,9 +27,8 @@ from sagline.kinematics.winding import without_guides
 from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
-from sagline.tension.method import TensionMethod
+from sagline.tension.method import TensionMethod, kernel_options, takes_default_kernel
 from sagline.tension.methods import Closest
-from sagline.tension.options import kernel_options, takes_default_kernel
 
 _STATUSES = tuple(sorted(PoseStatus))  # by code; a lookup costs a tenth of a conversion
 # takes exactly so many real numbers, quicker than an array takes a tuple

@@ -20,9 +20,8 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import pose_rows, robot_terms
-from sagline.tension.method import Variable
+from sagline.tension.method import Options, Variable, check_sharing, kernel_options
 from sagline.tension.methods import Centroid, MinimumNorm
-from sagline.tension.options import Options, check_sharing, kernel_options
 from sagline.tension.polygon import Side, TensionPolygon
 
 MERGED = 1e-10  # of the largest tension: corners closer than this are one

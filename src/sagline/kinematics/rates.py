@@ -19,9 +19,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.routing import with_routing
 from sagline.statics.balance import inertial_wrench
 from sagline.statics.tables import pose_rows
-from sagline.tension.method import TensionMethod, shared_tension
+from sagline.tension.method import TensionMethod, kernel_options, shared_tension
 from sagline.tension.methods import Closest
-from sagline.tension.options import kernel_options
 
 SHARE = 1e-5  # of the time in which the motion changes: differences over it are good to 1e-9
 LONGEST = 1e-2  # of the time between samples

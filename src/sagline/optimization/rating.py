@@ -25,8 +25,8 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.stiffness import compliance_of
 from sagline.statics.tables import body_table, cable_table, pose_rows
+from sagline.tension.method import kernel_options
 from sagline.tension.methods import MinimumNorm
-from sagline.tension.options import kernel_options
 from sagline.workspaces.levels import middle_wrench
 from sagline.workspaces.margin_rows import MarginRows, mean_arms
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet

@@ -1,4 +1,4 @@
-"""Inertia matrices of simple bodies, and of loaded platforms, about their center of mass [kg m^2]."""
+"""Inertia of simple bodies, and robots with another mass or fewer cables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sagline.core.arguments import instance, whole_number
 from sagline.core.arrays import Array
+from sagline.core.errors import InvalidValueError
+from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
@@ -36,3 +39,37 @@ def with_mass(robot: Robot, mass: float) -> Robot:
     mass: of the platform with its load [kg], > 0.
     """
     return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))
+
+
+def without_cables(robot: Robot, *cables: int) -> Robot:
+    """The robot that is left when cables break: what they weighed on the platform is left out too.
+
+    Args:
+        robot: The whole robot.
+        cables: Indices of the broken cables, 0 to m - 1.
+
+    Returns:
+        A robot with the other cables, in their order; everything else unchanged.
+
+    Raises:
+        InvalidValueError: If an index names no cable, or no cable is left.
+
+    Examples:
+        >>> import sagline as sl
+        >>> robot = sl.load_robot("cogiro")
+        >>> sl.without_cables(robot, 3).cable_count
+        7
+    """
+    kept = np.ones(instance(robot, Robot, "robot").cable_count, dtype=bool)
+    for cable in cables:
+        kept[whole_number(cable, "cable", 0, robot.cable_count - 1)] = False
+    if not kept.any():
+        raise InvalidValueError("cables", "all that the robot has", "fewer", "Leave one cable at least.")
+    return robot.replace(
+        frame_anchors=robot.frame_anchors[kept],
+        platform_anchors=robot.platform_anchors[kept],
+        cables=robot.cables._part(kept, kept.shape),
+        winches=None if robot.winches is None else robot.winches._part(kept),
+        tension_min=robot.tension_min[kept],
+        tension_max=robot.tension_max[kept],
+    )

@@ -19,7 +19,7 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.batch import dead_cable, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.chords import chord_geometry
+from sagline.statics.tables import chord_geometry
 
 if TYPE_CHECKING:
     from sagline.viewer.session import Session

@@ -16,7 +16,7 @@ from sagline.kernels.cable import geometry as rows
 from sagline.robot.batch import Robots, bodies_of, first_of, one_a_pose
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.chords import chord_geometry, refuse_missing_chords
+from sagline.statics.tables import chord_geometry, refuse_missing_chords
 
 
 def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike, twist_rate: ArrayLike) -> Array:

@@ -23,9 +23,8 @@ from sagline.kinematics.winding import without_guides
 from sagline.robot.pose import Pose
 from sagline.robot.reach import check_reach
 from sagline.robot.robot import Robot
-from sagline.tension.method import TensionMethod
+from sagline.tension.method import TensionMethod, kernel_options
 from sagline.tension.methods import MinimumNorm
-from sagline.tension.options import kernel_options
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.wrench_sets import WrenchSet, load_of
 

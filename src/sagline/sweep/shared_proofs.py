@@ -16,7 +16,7 @@ from sagline.kernels import codes
 from sagline.kinematics.inverse_rows import UNDECIDED, InverseRows, Verdicts, decide_rows
 from sagline.robot.batch import has_routing
 from sagline.robot.robot import Robot
-from sagline.tension.options import Options
+from sagline.tension.method import Options
 
 ITERATIONS: Final = 32  # loads of each pose whose proofs are tried on the others
 TRUST: Final = 1e-8  # of the forces at hand: ten times of what a verdict takes for none; rounding is far below

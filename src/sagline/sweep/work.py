@@ -21,7 +21,7 @@ from sagline.robot.robot import Robot
 from sagline.sweep.folder import SweepFolder, TaskSize, check_made_here, open_folder
 from sagline.sweep.request import Request, RequestBox, SweepArray, variables_of
 from sagline.sweep.shared_proofs import proofs_of
-from sagline.tension.options import kernel_options
+from sagline.tension.method import kernel_options
 from sagline.workspaces.margin import MarginStatus
 from sagline.workspaces.margin_rows import MarginRows
 

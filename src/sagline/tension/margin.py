@@ -12,7 +12,7 @@ from sagline.kernels.memory import memory_for
 from sagline.robot.batch import first_of, limits_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import pose_rows, robot_terms
-from sagline.tension.options import LIMITS_OF
+from sagline.tension.method import LIMITS_OF
 
 BLOCK = 1 << 12  # poses at once: a tenth of a second, after which an interrupt is heard
 

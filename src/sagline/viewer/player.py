@@ -13,7 +13,7 @@ from sagline.core.arrays import Array
 from sagline.robot.batch import dead_cable, pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.statics.chords import touching_angle
+from sagline.statics.tables import touching_angle
 from sagline.viewer import shapes
 from sagline.viewer.readout import block, cable_table, pose_line
 from sagline.viewer.snapshot import Snapshot

@@ -18,7 +18,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds as bounds
 from sagline.robot.robot import Robot
-from sagline.statics.chords import touching_angle
+from sagline.statics.tables import touching_angle
 
 POINTS = 41  # along a hanging cable: an odd number, so that dashes end as they begin
 WRAP_POINTS = 16  # along the cable on a pulley

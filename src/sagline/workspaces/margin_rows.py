@@ -20,7 +20,7 @@ from sagline.kernels.workspaces.wrench_set import SetTerms
 from sagline.robot.batch import bodies_of, first_of, together
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
-from sagline.tension.options import LIMITS_OF
+from sagline.tension.method import LIMITS_OF
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
 BLOCK = 1 << 13  # poses at once: a tenth of a second, after which an interrupt is heard

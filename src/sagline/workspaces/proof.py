@@ -22,7 +22,7 @@ from sagline.kernels.workspaces.pose_box_proof import BOX_COLUMNS, INSIDE, OPEN,
 from sagline.robot.pose import PoseBox
 from sagline.robot.robot import Robot
 from sagline.statics.tables import robot_terms
-from sagline.tension.options import LIMITS_OF
+from sagline.tension.method import LIMITS_OF
 from sagline.workspaces.margin_rows import check_cable_count
 from sagline.workspaces.orientations import check_tilt
 from sagline.workspaces.wrench_sets import WrenchSet, load_of

@@ -16,8 +16,8 @@ from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.polygon import polygon_at, tension_polygon
 from sagline.kinematics.status import PoseStatus
+from sagline.tension.method import kernel_options, takes_default_kernel
 from sagline.tension.methods import MinimumNorm
-from sagline.tension.options import kernel_options, takes_default_kernel
 from sagline.tension.polygon import TensionPolygon
 from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
 from sagline.viewer.feature import Feature, Reading, View
