@@ -22,8 +22,7 @@ class Cable:
     Attributes:
         linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
         axial_stiffness: Young's modulus times section area EA [N], shape (...), > 0.
-        diameter: Diameter of the rope [m], shape (...), > 0; None where it is not known. What is wound on a drum needs
-            it, and nothing that hangs.
+        diameter: Diameter of the rope [m], shape (...), > 0; None where it is not known. Only drums need it.
         expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None where it is not
             known.
 

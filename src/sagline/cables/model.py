@@ -205,8 +205,8 @@ class CableModel:
         Raises:
             InvalidValueError: If fewer than two points are asked for, or cable or state are none.
         """
-        hung = replace(instance(state, CableState, "state"), model=self, cable=instance(cable, Cable, "cable"))
-        return hung.points(whole_number(points, "points", 2))
+        placed = replace(instance(state, CableState, "state"), model=self, cable=instance(cable, Cable, "cable"))
+        return placed.points(whole_number(points, "points", 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

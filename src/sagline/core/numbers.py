@@ -62,7 +62,7 @@ def n(
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
     """A number with its standard error, both to the two digits of the error that count: "512 ± 12 kN".
 
-    error: its standard error, in the unit; one that is not finite is told as "not told by anything"; prefixed: whether
+    error: its standard error, in the unit; one that is not finite is written as "not told"; prefixed: whether
     the unit takes the prefix it reads best with; in a column of a table none does.
     """
     number, own = float(value), float(error)

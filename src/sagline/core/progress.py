@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from sagline.core.arrays import Array
 
-Progress: TypeAlias = Callable[[int, int], None]  # told after each block: how many are done, of how many
+Progress: TypeAlias = Callable[[int, int], None]  # called after each block: how many are done, of how many
 
 
 def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:

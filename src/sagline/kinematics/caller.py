@@ -20,7 +20,7 @@ WHOLE: Final = slice(None)
 
 
 def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
-    """Write a caller's numbers into memory of ours; that they are finite is for the solver to tell.
+    """Write a caller's numbers into memory of ours; the solver checks that they are finite.
 
     memory: a `memoryview` of float64 numbers, shape (k,).
     """
@@ -32,7 +32,7 @@ def copy_in(memory: Any, given: Any, item: str, unit: str) -> None:
             memory[WHOLE] = array("d", given)
             return
     except (TypeError, ValueError, NotImplementedError, OverflowError):
-        pass  # of another kind or shape: integers and the like are taken, or it is told what is wrong
+        pass  # of another kind or shape: integers and the like are accepted, others refused with a reason
     memory[WHOLE] = exactly(given, item, unit, (len(memory),))
 
 

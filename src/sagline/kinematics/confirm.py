@@ -92,8 +92,8 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     parts = []
     for rows in blocks(len(lengths), BLOCK):
-        part, told = state[rows], None if progress is None else _from(rows.start, len(lengths), progress)
-        found = _forward(part, told)
+        part, progress_of_part = state[rows], None if progress is None else _from(rows.start, len(lengths), progress)
+        found = _forward(part, progress_of_part)
         parts.append((found.pose.position, found.pose.quaternion, found.status, found.wrench_residual))
     position, quaternion, status, residual = (locked(np.concatenate(each)) for each in zip(*parts, strict=True))
     return Confirmation(plan, Pose._adopt(position, quaternion), status, residual)
@@ -112,5 +112,5 @@ def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
 
 
 def _from(first: int, count: int, progress: Progress) -> Progress:
-    """Tells of a part that begins at a pose as of the whole."""
+    """Progress of a part that begins at a pose, as of the whole."""
     return lambda done, _: progress(first + done, count)

@@ -57,7 +57,7 @@ def search(
     counts: the better status, then fewer cables outside their limits, then the lower energy.
 
     lengths: unstrained lengths (N, m), rows of NaN are left out; wrenches: external plus inertial (1 or N, 6);
-    progress: told after each block how many samples are done, of how many.
+    progress: called after each block how many samples are done, of how many.
     """
     count, m = lengths.shape
     found = ForwardRows.empty(count, m, has_routing(robot))
@@ -205,8 +205,8 @@ def forward(
         tension_measured: Readings of load cells: then lengths count as measured too, both are corrected within their
             deviations to fit each other, and the answer carries the covariance of the pose.
         winding: Which way the drums turned last, for the friction of pulleys and guides: +1 winding in, -1 paying out,
-            0 standing, shape (m,) or (N, m). None: nothing rubs. What friction and guides change of the lengths is
-            found in rounds of solving; with load cells, it stays what it is at the measured lengths. Much friction on
+            0 standing, shape (m,) or (N, m). None: nothing rubs. Friction and guides change the lengths by
+            iteration; with load cells, that change stays as it is at the measured lengths. Much friction on
             soft cables lets the platform rest at more than one pose near by.
         progress: Called every tenth of a second or so: how many samples are solved, of how many.
 
@@ -286,7 +286,7 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
             "> 0 m, finite; or NaN for all cables of a sample",
             "Correct the length of this cable.",
         )
-    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # who gives other counts is told so later
+    fitting = dead.shape[:-1] in ((), array.shape[:-1])  # other counts are refused later
     if fitting and ((array <= dead) & (dead > 0.0)).any():
         raise dead_only(array, np.broadcast_to(dead, array.shape))
     return locked(array)

@@ -187,7 +187,7 @@ def solve_forward_rows(
 
     lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial (1 or
     N, 6); chained: whether each sample starts where the last one ended; freedom: motions to allow (n, 6); None for
-    those of the robot; progress: told after each block how many samples are done, of how many.
+    those of the robot; progress: called after each block how many samples are done, of how many.
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom

@@ -169,7 +169,7 @@ class ForwardSolver:
     ) -> ForwardStatus:
         """Solve one sample into the caller's memory: no allocation once a pose is known.
 
-        What is wrong with a length or a number of the wrench is told by the status, not by an error.
+        A wrong length or number of the wrench is reported by the status, not by an error.
 
         Args:
             unstrained_length: L [m], shape (m,).

@@ -26,7 +26,7 @@ _CATENARY = Catenary()
 MISSED: Final = 1e-9  # of a tension: a cable that misses it by more cannot have it
 LARGEST_STRAIN: Final = 0.5  # no rope holds more; what reads so has another unit
 HALVINGS: Final = 50  # of the interval, as a ratio, in which a cable's least tension lies
-FOUND: Final = 1e-4  # how near it is told, as a ratio
+PRECISION: Final = 1e-4  # its precision, as a ratio
 
 
 def home(
@@ -150,11 +150,11 @@ def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low:
     if not can(high):
         return None
     for _ in range(HALVINGS):
-        if high <= (1.0 + FOUND) * low:
+        if high <= (1.0 + PRECISION) * low:
             break
         centered_positions = math.sqrt(low * high)
         low, high = (low, centered_positions) if can(centered_positions) else (centered_positions, high)
-    return high * (1.0 + FOUND)  # so that the number told will do, with five digits
+    return high * (1.0 + PRECISION)  # so that the number in the message is enough, with five digits
 
 
 def _check_whole(winches: Winch, length: Array) -> None:

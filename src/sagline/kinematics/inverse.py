@@ -55,12 +55,12 @@ def inverse(
             differ in anything but number of cables, motion pattern with its plane, kind of tension limits and gravity.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
-        tension: How the load is shared among redundant cables. `Closest` carries its reference along a
+        tension: Tension distribution method. `Closest` carries its reference along a
             path only; in a batch of poses each stands alone.
         wrench: External wrench on the platform about its center of mass in world axes, without gravity and
             inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         previous: A plan that this one continues: `Closest` starts from its last feasible tensions. Or such tensions,
-            in the variable of the sharing [N], shape (m,).
+            in the variable of the tension distribution [N], shape (m,).
         winding: Which way the drums turn, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0
             standing, shape (m,) or (N, m); or "path", the way the lengths go along the path without friction. It
             changes lengths behind the pulleys alone. None: nothing rubs.
@@ -171,7 +171,7 @@ def _in_world(components: Array, robot: Robot) -> Array:
 
 
 def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
-    """Tensions to start from, in the sharing's variable (m,): as given, the last feasible ones of a plan, or NaN."""
+    """Tensions to start from, in the distribution's variable (m,): given, the last feasible of a plan, or NaN."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):

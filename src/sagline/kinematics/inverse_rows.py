@@ -72,7 +72,7 @@ def solve_inverse_rows(
     """Run the kernel over poses.
 
     rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: tensions that
-    `Closest` starts from, in its variable (m,), or NaN; the last feasible ones on return; progress: told after each
+    `Closest` starts from, in its variable (m,), or NaN; the last feasible ones on return; progress: called after each
     block how many poses are solved, without those left open, of how many.
     """
     shared = first_of(robot)
@@ -99,7 +99,7 @@ class Verdicts(NamedTuple):
     reliefs: Array  # the force that suffices [N], along the free motions, (N, n), NaN where none is needed or known
     farkas: Array  # Farkas vectors along the free motions, (N, n)
     blocking: Flags  # cables whose limits stand against the needed wrench, (N, m)
-    at_border: Flags  # poses that were solved here, and not by the way of sharing, (N,)
+    at_border: Flags  # poses solved here, not by the tension distribution method, (N,)
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
@@ -137,7 +137,7 @@ def decide_rows(
 ) -> Verdicts:
     """Decide the poses that the iterations left open; fill the results of the feasible ones.
 
-    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); progress: told after each
+    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); progress: called after each
     block how many poses are done, the feasible ones among them, of how many.
     """
     count, n = found.needed.shape

@@ -78,7 +78,7 @@ class InverseSolver:
         Args:
             robot: The robot, with at least as many cables as degrees of freedom.
             model: Cable model; the default is the exact one.
-            tension: How the load is shared; the default is `Closest`, to the step before.
+            tension: Tension distribution method; the default is `Closest`, to the step before.
 
         Raises:
             InvalidValueError: If the robot has too few cables, its winches have guides, the method cannot share among
@@ -179,7 +179,7 @@ class InverseSolver:
             else:
                 raise TypeError
         except (struct.error, TypeError, ValueError, NotImplementedError, OverflowError):
-            copy_in(self._position, place, "position", "m")  # integers and the like, or it is told what is wrong
+            copy_in(self._position, place, "position", "m")  # integers and the like, or an error with a reason
             copy_in(self._quaternion, turn, "quaternion", "")
         if wrench is not None:
             self._loaded = True
@@ -206,7 +206,7 @@ class InverseSolver:
                 raise TypeError
             out[WHOLE] = self._lengths
         except (AttributeError, IndexError, TypeError, ValueError):
-            copy_out(self._lengths, out, "out")  # looks closer, or tells what is wrong
+            copy_out(self._lengths, out, "out")  # converts, or raises an error with a reason
         status: PoseStatus = _STATUSES[code]
         return status
 

@@ -48,7 +48,7 @@ class Plan(Result, Saved):
     Attributes:
         state: Robot, poses, wrench and cables; NaN forces and lengths where a pose has no answer.
         path: The path that was followed, or None for poses alone.
-        tension: How the load was shared.
+        tension: Tension distribution method.
         status: Codes of `PoseStatus`, shape () or (N,).
         shortfall: Smallest change of the force on the platform that would make the pose feasible [N], shape () or
             (N,), reached by tensions within their limits: 0 where it is feasible, infinite where it is proved that no
@@ -72,8 +72,8 @@ class Plan(Result, Saved):
             was found that does. None as above.
         relief: The force of that size [N], in world axes: added to the wrench it makes the pose feasible, shape (3,) or
             (N, 3); NaN where none is needed or known. None as above.
-        at_border: Poses so near the border that the rounds of sharing found nothing: tensions were searched for on
-            the cables' exact curves, and the way of sharing had no say, shape () or (N,). None as above.
+        at_border: Poses so near the border of feasibility that the iterations found no tensions: these were searched
+            on the cables' exact curves, without the tension distribution method, shape () or (N,). None as above.
     """
 
     state: Equilibrium
@@ -116,7 +116,7 @@ class Plan(Result, Saved):
 
     @property
     def free_length(self) -> Array:
-        """Unstrained length of the hanging cables [m], from their exit points to their platform ends."""
+        """Unstrained length of the free spans [m], from their exit points to their platform ends."""
         return self.state.free_length
 
     @property
@@ -133,8 +133,8 @@ class Plan(Result, Saved):
     def length_rate(self) -> Array | None:
         """dL/dt: how fast to wind [m/s], shape (N, m), along the path; None for poses without a path.
 
-        The rate at which `unstrained_length` changes as the platform moves on and the load is shared anew; NaN where
-        the plan has no answer. Worked out at each call. See docs/model.md, section 7.
+        The rate at which `unstrained_length` changes as the platform moves and the tensions change; NaN where
+        the plan has no answer. Computed at each call. See docs/model.md, section 7.
         """
         return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
 
@@ -157,7 +157,7 @@ class Plan(Result, Saved):
             return ()
         return (
             f"the platform is turned by {turn_in_words(turn[0])}, which motion_pattern {robot.motion_pattern} does "
-            "not do: what holds it so is not in the balance; correct the pose, or give the robot another "
+            "not allow: the force balance has no moment that holds it; correct the pose, or give the robot another "
             "motion_pattern",
         )
 

@@ -129,8 +129,8 @@ def _held_limit_rates(
     """Rates of the chord tensions of `Closest` as the platform moves on.
 
     Each set of tensions is the one nearest to the set before: in the limit, of all rates that keep the balance and do
-    not leave the limits, the smallest in the sharing's variable. Where cables are at limits that the smallest rates
-    would leave, they are held there, the worst first.
+    not leave the limits, the smallest in the distribution's variable. Where cables are at limits that the smallest
+    rates would leave, they are held there, the worst first.
 
     step: the step [s]. Returns d(tau)/dt [N/s], shape (N, m).
     """
@@ -169,10 +169,10 @@ def _held_limit_rates(
 class _RateConditions(NamedTuple):
     """Conditions on the rates x of the chord tensions."""
 
-    structure: Array  # J, whose rows the rates of the sharing's variable are made of, shape (N, n, m)
+    structure: Array  # J, whose rows the rates of the distribution's variable are made of, shape (N, n, m)
     matrix: Array  # the balance is kept where matrix x = right, shape (N, n, m)
     right: Array  # shape (N, n)
-    scale: Array  # the sharing's variable changes by scale x + drift, which is to be small, shape (N, m)
+    scale: Array  # the distribution's variable changes by scale x + drift, which is to be small, shape (N, m)
     drift: Array  # shape (N, m)
     gap_slope: Array  # the distance to the nearest limit changes by gap_slope x + gap_drift, shape (N, m)
     gap_drift: Array  # shape (N, m)
@@ -256,7 +256,7 @@ def _nearest_limits(
 
 
 def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
-    """Rate of the unstrained lengths while the platform follows the path and the load is shared as planned.
+    """Rate of the unstrained lengths while the platform follows the path with the planned tension distribution.
 
     Geometry and tensions both change: L(t) = L(pose(t), tau(t)). A method that depends on the pose alone is solved
     again an instant before and after each sample, where the path's twist, its rate and its jerk lead; `Closest` follows

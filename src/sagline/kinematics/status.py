@@ -1,4 +1,4 @@
-"""Status of a pose of a plan, and of a sample of a forward solution, with what to do about it."""
+"""Status of a pose of a plan, and of a sample of a forward solution, with the next step."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ class PoseStatus(Status):
     )
     SINGULAR = (
         codes.POSE_SINGULAR,
-        "the structure matrix has lost rank: some motion no cable resists; move the platform",
+        "the structure matrix has lost rank: no cable resists some motion of the platform; move the platform",
     )
     TOO_SLACK = (
         codes.POSE_TOO_SLACK,
         "a cable would carry less than a thousandth of its weight, or not hang between its guides; raise tension_min",
     )
-    NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not settle; please report this robot and pose"
+    NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not converge; please report this robot and pose"
     NO_CHORD = (
         codes.POSE_NO_CHORD,
         "both ends of a cable coincide, or its platform end is inside its pulley or hangs from it nearer to the swivel "
@@ -31,22 +31,22 @@ class PoseStatus(Status):
     )
     NOT_COVERED = (
         codes.POSE_NOT_COVERED,
-        "there are tensions within the limits, but the chosen way of sharing does not find them; "
+        "tensions within the limits exist, but the chosen tension distribution method does not find them; "
         "choose MinimumNorm or AnalyticCenter",
     )
     UNBOUNDED = (
         codes.POSE_UNBOUNDED,
-        "the feasible tensions have no upper end, and so no middle; give tension_max, or choose MinimumNorm",
+        "the feasible tensions are unbounded, so they have no center; give tension_max, or choose MinimumNorm",
     )
     NO_POSE = (
-        100,  # no kernel says it: what is no pose does not reach one
-        "what was given is no pose: a number is not finite, or the quaternion is not of length 1; give a position and "
+        100,  # of no kernel: a value that is not a pose does not reach one
+        "the value is not a pose: a number is not finite, or the quaternion is not of length 1; give a position and "
         "a unit quaternion, scalar last",
     )
     BORDERLINE = (
         codes.POSE_BORDERLINE,
-        "so near the border that neither tensions nor a proof that there are none was found; move the platform, or "
-        "change the load by more than the shortfall's bracket",
+        "too near the border of feasibility: neither tensions nor a proof of infeasibility was found; move the "
+        "platform, or change the load by more than the shortfall's bracket",
     )
 
 
@@ -56,8 +56,8 @@ class ForwardStatus(Status):
     SOLVED = codes.FORWARD_SOLVED, "solved: a stable equilibrium"
     LOOSE = (
         codes.FORWARD_LOOSE,
-        "a stable equilibrium, but fewer cables pull than the platform has freedoms: the lengths are too long for it "
-        "to be held, it hangs; shorten the slack cables",
+        "a stable equilibrium, but fewer cables are taut than the platform has degrees of freedom: the lengths are too "
+        "long to hold it; shorten the slack cables",
     )
     OVERSTRETCHED = (
         codes.FORWARD_OVERSTRETCHED,
@@ -66,12 +66,12 @@ class ForwardStatus(Status):
     )
     UNSTABLE = (
         codes.FORWARD_UNSTABLE,
-        "an equilibrium, but not a stable one: the platform would leave it; "
-        "start elsewhere, or leave out the start, to find where it goes",
+        "an unstable equilibrium: the platform would leave it; "
+        "start elsewhere, or leave out the start, to find a stable one",
     )
     SINGULAR = (
         codes.FORWARD_SINGULAR,
-        "an equilibrium that some motion leaves without resistance: the pose is not determined",
+        "an equilibrium without resistance to some motion: the pose is not determined",
     )
     NOT_CONVERGED = (
         codes.FORWARD_NOT_CONVERGED,
@@ -83,7 +83,7 @@ class ForwardStatus(Status):
     )
     FITTED = (
         codes.FORWARD_FITTED,
-        "straight cables know no forces: this is the pose whose lengths fit best; see cables.closure_residual",
+        "straight cables have no forces: this pose fits the lengths best; see cables.closure_residual",
     )
 
 

@@ -19,7 +19,7 @@ from sagline.robot.drum import Drums, drum_tension, drums_of, warmth
 from sagline.robot.robot import Robot
 
 Winding = Literal["constant", "remembered"]
-LARGEST: Final = 2.0**53  # counts: beyond, whole numbers are no longer told apart
+LARGEST: Final = 2.0**53  # counts: beyond, whole numbers are not exact
 
 
 def encoder_counts(

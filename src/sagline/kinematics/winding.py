@@ -19,7 +19,7 @@ from sagline.robot.routing import with_routing
 
 Winding = ArrayLike | Literal["path"]
 ITERATIONS: Final = 100  # some ten of them, unless far more cable is behind than before, or a lot rubs
-MEMORY: Final = 5  # of rounds before, from which the next is mixed
+MEMORY: Final = 5  # iterations before, from which the next is mixed
 _RANK: Final = 1e-6
 TOLERANCE: Final = 1e-13  # of a length
 _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
@@ -68,13 +68,14 @@ def iterate_routing(
 ) -> ForwardRows:
     """Equilibria at lengths that count what is really behind the pulleys.
 
-    Kernels get the lengths less what guides and friction add at the tensions of the round before, until that stays.
+    Kernels get the lengths less what guides and friction add at the tensions of the iteration before, until they
+    converge.
 
     found: equilibria over a straight guided run without friction, at the lengths less what is taken for the rest;
     lengths: unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of
     friction, shape (m,) or (N, m), or None; taken: what they were solved with for what guides and friction add [m], (N,
-    m); None for nothing. Returns the answers; NOT_CONVERGED where that does not settle, or a cable is too slack to hang
-    between its guides.
+    m); None for nothing. Returns the answers; NOT_CONVERGED where that does not converge, or a cable is too slack to
+    hang between its guides.
     """
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
     past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # what was taken, and what it missed

@@ -25,7 +25,7 @@ def limit_margin(state: Equilibrium) -> Array:
 
     Returns:
         Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
-        limit, NaN where there are no tensions. It depends on how the load is shared.
+        limit, NaN where there are no tensions. It depends on the tension distribution.
 
     Raises:
         InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
@@ -61,7 +61,7 @@ def capacity_margin(state: Equilibrium) -> Array:
         state: Robot or robots, poses, wrench and cables, `plan.state` for instance.
 
     Returns:
-        Force [N], shape () or (N,), whatever the way of sharing; infinite where no force alone can make the pose fail,
+        Force [N], shape () or (N,), for any tension distribution; infinite where no force alone can make the pose fail,
         NaN where there are no tensions.
 
     Raises:

@@ -31,7 +31,7 @@ PREFERENCE_ROWS = 2
 
 @dataclass(frozen=True, slots=True)
 class TensionMethod:
-    """A way of choosing among the feasible tensions: a code that the kernels understand, and its options.
+    """A choice among the feasible tensions: a code that the kernels understand, and its options.
 
     Attributes:
         code: Which choice the kernels make (`sagline.kernels.codes`).
@@ -56,7 +56,7 @@ class TensionMethod:
         """Check the options."""
         if type(self) is TensionMethod:
             step = "Choose one of the methods, MinimumNorm() for instance."
-            raise InvalidValueError("TensionMethod()", "the interface alone", "a way of sharing the load", step)
+            raise InvalidValueError("TensionMethod()", "the interface alone", "a tension distribution method", step)
         object.__setattr__(self, "variable", choice(self.variable, "variable", VARIABLES))
         if self.lowest_point_margin is not None:
             margin = number(self.lowest_point_margin, "lowest_point_margin", "N", low=0.0)
@@ -97,7 +97,7 @@ class TensionMethod:
 
 
 def shared_tension(state: Equilibrium, variable: Variable) -> Array:
-    """Tensions of a state in the variable in which the load is shared.
+    """Tensions of a state in the variable of the distribution.
 
     Returns (m,) or (N, m) [N].
     """

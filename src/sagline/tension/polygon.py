@@ -35,13 +35,14 @@ class TensionPolygon(Result):
         vertices: The article's Omega_lambda: corners, counter-clockwise, in coordinates of the null space [N], shape
             (h, 2); for one redundant cable the ends of an interval, shape (2, 1), infinite where it has none; for no
             redundant cable one point without coordinates, shape (1, 0). Shape (0, r) where nothing is feasible.
-        tensions: The article's Omega_t: tensions at the vertices [N], in the sharing's variable, shape (h, m).
+        tensions: The article's Omega_t: tensions at the vertices [N], in the distribution's variable, shape (h, m).
         sides: The limit that each side is, from vertex k to vertex k + 1 (at vertex k for an interval); None where the
             polygon has no such side: it is unbounded there, and the vertices at both ends only stand in for infinity.
         bounded: Whether every side is a limit.
         basis: Orthonormal basis of the null space, shape (r, m).
         origin: The minimum-norm tensions of the balance without limits [N], shape (m,).
-        scale: The sharing's variable is scale times the chord tension plus offset, shape (m,): 1, or cos phi for the
+        scale: The distribution's variable is scale times the chord tension plus offset, shape (m,): 1, or cos phi for
+        the
             horizontal tension, or the slope of the frame-end tension.
         offset: Zero but for the frame-end tension [N], shape (m,).
     """
