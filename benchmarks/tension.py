@@ -57,9 +57,8 @@ def share_batch(  # type: ignore[no-untyped-def]
     sharing = Distribution(*sharing_terms)
     r, m = nulls[0].shape
     near, rest = new_reference_point(Memory(*room), previous, r)
-    rows, at = block(rest.numbers, 0, 2, m)
+    rows, rest = block(rest, 2, m)
     tension, offset = rows[0], rows[1]
-    rest = Memory(rest.numbers[at:], rest.counters)
     others = None if otherwise is None else new_work_arrays(sharing.method, rest, m, r)
     for i in range(m):
         offset[i] = 0.0
