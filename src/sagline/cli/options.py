@@ -134,7 +134,7 @@ WrenchOption = Annotated[
         "FX,FY,FZ[,MX,MY,MZ]",
         "Force [N] and moment [N m] on the platform besides its weight, about its center of mass, along the world's "
         "axes.",
-        "wrench_of",
+        "wrench_of_text",
     ),
 ]
 PayloadOption = Annotated[
@@ -151,7 +151,7 @@ PoseOption = Annotated[
     converted_option(
         "X,Y,Z[,A,B,C]",
         "Position [m] and angles about z, y, x [degrees]. Default: middle of the robot's test box.",
-        "pose_of",
+        "pose_of_text",
     ),
 ]
 TensionOption = Annotated[Tension, choice_option("METHOD", "Tension distribution method", Tension)]
