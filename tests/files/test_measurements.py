@@ -27,7 +27,7 @@ def test_columns_in_any_order_with_their_units(tmp_path: Path) -> None:
         ("", ("columns", "no columns; allowed: span, rise, length, tension")),
         ("span,rise,length\n1,2,3\n", ("line 1", "missing column tension; found: span, rise, length")),
         ("span,rise,length,force\n", ("line 1", "unknown column 'force'")),
-        ("span,rise,length,tension,span\n", ("line 1", "column span is there twice")),
+        ("span,rise,length,tension,span\n", ("line 1", "column span is given twice")),
         ("span [kg],rise,length,tension\n", ("line 1", "the unit of span is [kg]")),
         ("span,rise,length,tension\n1,0,1\n", ("line 2", "3 columns")),
         ("span,rise,length,tension\n1,0,1,x\n", ("line 2", "tension is x", "a number")),

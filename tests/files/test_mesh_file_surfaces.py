@@ -99,7 +99,7 @@ def test_vtk_is_left_to_the_package_that_is_installed(
 def test_what_cannot_be_written_is_said_and_what_was_there_stays(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with refused(next_step="Take .stl, .glb, .ply, .vtk, .vtu.", kind=sl.FileError, file=tmp_path / "hull.obj"):
+    with refused(next_step="Use .stl, .glb, .ply, .vtk, .vtu.", kind=sl.FileError, file=tmp_path / "hull.obj"):
         SURFACE.export(tmp_path / "hull.obj")
     monkeypatch.setattr(mesh_file, "find_spec", lambda _: None)
     old = tmp_path / "hull.vtk"

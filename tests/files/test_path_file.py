@@ -216,7 +216,7 @@ def test_a_wrong_waypoint_file_is_told_by_file_and_key(tmp_path: FilePath, text:
         ("time,x,y,z,aplha\n", ("line 1", "unknown column 'aplha' (did you mean alpha?)")),
         ("\ntime (s),x,y,z\n", ("line 2", "unknown column 'time (s)' (did you mean time?)")),
         ("0,1,2,3\n1,1,2,3\n", ("line 1", "unknown column '0'")),
-        ("time,x,y,z,x\n", ("line 1", "column x is there twice")),
+        ("time,x,y,z,x\n", ("line 1", "column x is given twice")),
         ("time,x,y,z,alpha,beta\n", ("line 1", "missing column gamma; found: time, x, y, z, alpha, beta")),
         ("time,x,y,z,qx,qy,qz\n", ("line 1", "missing column qw; found: time, x, y, z, qx, qy, qz")),
         ("time,x,y,z,alpha,beta,gamma,qx\n", ("line 1", "columns qx beside alpha, beta, gamma")),
@@ -234,7 +234,7 @@ def test_a_wrong_waypoint_file_is_told_by_file_and_key(tmp_path: FilePath, text:
         ("time,x,y,z\n0,1,2,3\n0,1,2,3\n", ("line 3", "time is 0 s")),
         ("time,x,y,z,qx,qy,qz,qw\n0,1,2,3,0,0,0,1\n1,1,2,3,0,0,0,0\n", ("line 3", "the length of qx, qy, qz, qw is 0")),
         ("time,x,y,z\n0,1,2,3\n", ("number of samples", "1", "at least two")),
-        ('time,x,y,z\n0,1,2,"3\n', ("line 2", "it is no CSV (unexpected end of data)")),
+        ('time,x,y,z\n0,1,2,"3\n', ("line 2", "it is not CSV (unexpected end of data)")),
         (",,,\n", ("columns",)),
         ("", ("columns",)),
     ],
@@ -278,9 +278,9 @@ def test_another_suffix_is_refused(tmp_path: FilePath) -> None:
     [
         (
             "time;x;y;z\n0;1;2;3\n",
-            ("line 1", "the columns are parted by semicolons", "commas, and points in the numbers"),
+            ("line 1", "the columns are separated by semicolons", "commas, and points in the numbers"),
         ),
-        ("time\tx\ty\tz\n0\t1\t2\t3\n", ("line 1", "the columns are parted by tabs")),
+        ("time\tx\ty\tz\n0\t1\t2\t3\n", ("line 1", "the columns are separated by tabs")),
         (
             "time,x,y,z\n0,0,1,5,2,5,3,5\n",
             ("line 2", "8 columns", "4, as in the header, and a point in the numbers, not a comma"),

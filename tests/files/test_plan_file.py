@@ -239,9 +239,9 @@ def test_files_that_are_no_plan(tmp_path: FilePath, saved: FilePath, snapshot: S
     ("attribute", "value", "parts"),
     [
         ("sagline_format", 3, ("sagline_format", None, None, "Install a newer sagline.")),
-        ("sagline_format", 2, ("digest", "is not as it was written: its digest is missing")),
+        ("sagline_format", 2, ("digest", "has changed since it was written: its digest is missing")),
         ("sagline_format", 0, ("sagline_format",)),
-        ("sagline_format", "two", ("sagline_format", "is of format 'two', which never was")),
+        ("sagline_format", "two", ("sagline_format", "has the unknown format 'two'")),
         ("model", "Rope", ("model", "'Rope'", "Straight, Elastic, Empirical, Parabolic, Catenary")),
         (
             "tension",

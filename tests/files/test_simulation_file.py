@@ -205,11 +205,11 @@ def test_values_that_no_simulation_has(
         (lambda data: data.assign_attrs(cable_mass="heavy"), ("cable_mass", "'heavy'", "none, lumped, modal")),
         (
             lambda data: data.assign_attrs(cable_mass="none"),
-            ("node_position", "given", "given for cables with mass, and for no others"),
+            ("node_position", "given", "given for cables with mass only"),
         ),
         (
             lambda data: data.drop_vars("node_position"),
-            ("node_position", "not given", "given for cables with mass, and for no others"),
+            ("node_position", "not given", "given for cables with mass only"),
         ),
         (
             lambda data: data.assign_attrs(integrator="euler"),
@@ -231,7 +231,7 @@ def test_values_that_no_simulation_has(
         ),
         (
             lambda data: data.assign_attrs(sagline_simulation_format="x"),
-            ("sagline_simulation_format", "is of format 'x', which never was"),
+            ("sagline_simulation_format", "has the unknown format 'x'"),
         ),
         (lambda data: data.isel(cable=slice(7)), ("cable", "has 7 cables, its robot 8")),
         (lambda data: data.isel(axis=slice(2)), ("axis", None, "x, y, z")),

@@ -77,13 +77,13 @@ def execution_of_log(log: RecordedLog, plan: int | None = None) -> Execution:
     blocks = [block for block in log.blocks if plan is None or block.get("plan") == number]
     if log.truth and not log.blocks:
         step = "Give it as: sagline view ROBOT RUN.mcap --truth FILE."
-        raise FileError(log.path, "is the log of a twin, where the platform really was: no execution", step)
+        raise FileError(log.path, "is the log of a twin with true poses, not an execution", step)
     if log.robot is None or not blocks:
         raise FileError(log.path, "has no cycle", "Nothing was recorded in it, or it was cut off at once.")
     try:
         return _execution(log, log.robot, blocks, number)
     except (InvalidValueError, ValueError, KeyError) as error:
-        raise FileError(log.path, f"does not hold what it says ({error})", AGAIN) from None
+        raise FileError(log.path, f"is inconsistent ({error})", AGAIN) from None
 
 
 def _execution(log: RecordedLog, robot: Robot, blocks: list[dict[str, NDArray[Any]]], number: int | None) -> Execution:

@@ -41,7 +41,7 @@ class Format(Content, Generic[T]):
             if unsealed is not None:
                 unsealed(path)
         elif not sealed:
-            raise FileError(path, "is not as it was written: its digest is missing", self.again, item="digest")
+            raise FileError(path, "has changed since it was written: its digest is missing", self.again, item="digest")
         assert self.unpack is not None
         with file_errors(path):
             return self.unpack(path, data)

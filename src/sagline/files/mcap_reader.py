@@ -104,7 +104,7 @@ class LogReader:
             status = path.stat()
             check_regular(path, status.st_mode)
             if status.st_size < self._offset:
-                raise FileError(path, "has become shorter while it was read", "Read it again; it was begun anew.")
+                raise FileError(path, "has become shorter while it was read", "Read it again; it was started anew.")
             check_memory(f"{path.name}", 2.0 * (status.st_size - self._offset), "Take a shorter log.")
             with path.open("rb") as file:
                 file.seek(self._offset)
@@ -122,7 +122,7 @@ class LogReader:
         if MAGIC.startswith(data):  # nothing, or the first few bytes
             raise FileError(self.log.path, "is empty", "Nothing was recorded in it, or it was cut off at once.")
         step = "Give the .mcap file that was recorded, or that an execution's save wrote."
-        raise FileError(self.log.path, "is another kind of file, no log in MCAP", step)
+        raise FileError(self.log.path, "is not a log in MCAP", step)
 
     def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
         """Complete records; the rest is read by the next call."""
@@ -191,7 +191,7 @@ class LogReader:
     def _begin(self, said: dict[str, Any]) -> None:
         found = said["sagline_log_format"]
         if found > FORMAT:
-            text = f"is of format {found}, written by {said['source']}; this is sagline {version('sagline')}, which "
+            text = f"has format {found}, written by {said['source']}; this is sagline {version('sagline')}, which "
             raise FileError(self.log.path, f"{text}reads up to {FORMAT}", "Install a newer sagline.")
         self.log.period = float(said["period"])
         self.log.robot = parse_robot(said["robot"], f"{self.log.path}, robot")
@@ -205,7 +205,7 @@ class LogReader:
                 raise ValueError("a chunk is missing")
             log.blocks.append(block := unpack(data))
             if lacking := _NEEDED - block.keys():
-                raise FileError(self.log.path, f"does not hold what it says (no {min(lacking)})", AGAIN)
+                raise FileError(self.log.path, f"is inconsistent (no {min(lacking)})", AGAIN)
         elif topic == EVENT:
             log.events.append(event_of(data))
         elif topic == TRUTH:
@@ -222,9 +222,9 @@ def read_log(file: os.PathLike[str] | str) -> RecordedLog:
     reader.more()
     log = reader.log
     if log.robot is None and log.complete:
-        raise FileError(log.path, "is an MCAP file, but no log of sagline", "Check that this is the file you mean.")
+        raise FileError(log.path, "is an MCAP file, but not a log of sagline", "Check that this is the file you mean.")
     if log.robot is None:
-        raise FileError(log.path, "was cut off before it says of what robot it is", "Nothing of it can be read.")
+        raise FileError(log.path, "was cut off before the data of its robot", "It cannot be read.")
     return log
 
 

@@ -54,7 +54,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
     factor = meters(unit, "unit")
     called = path.stem[:100] if name is None else name
     if path.suffix.lower() not in KINDS:
-        raise FileError(path, f"is no mesh file; allowed: {', '.join(KINDS)}", "Save it as one of these.")
+        raise FileError(path, f"is not a mesh file; allowed: {', '.join(KINDS)}", "Save it as one of these.")
     data = read_bytes(path, LIMIT)
     vertices, faces = _triangles(path, data)
     if len(faces) > MOST:
@@ -140,7 +140,7 @@ def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) ->
     target = file_path(file)
     ending = target.suffix.lower()
     if ending not in ENDINGS:
-        raise FileError(target, "has an ending that no surface is written with", f"Take {', '.join(ENDINGS)}.")
+        raise FileError(target, "has an ending without a format for surfaces", f"Use {', '.join(ENDINGS)}.")
     if not len(surface.faces):
         raise InvalidValueError("surface", "empty", "a surface with triangles", "Look for the set elsewhere.")
     tints = None if colors is None else _check_colors(colors, len(surface.vertices))

@@ -93,11 +93,11 @@ class Content:
             raise FileError(path, *self._instead(attributes))
         if not isinstance(found, int | np.integer) or found < 1:
             step = "Write it again; it was edited, or damaged."
-            raise FileError(path, f"is of format {found!r}, which never was", step, item=self.key)
+            raise FileError(path, f"has the unknown format {found!r}", step, item=self.key)
         if found > self.version:
             raise FileError(
                 path,
-                f"is of format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
+                f"has format {found}, written by {attributes.get('source')}; this is sagline {version('sagline')}, "
                 f"which reads up to {self.version}",
                 "Install a newer sagline.",
                 item=self.key,
@@ -108,8 +108,8 @@ class Content:
         """Other content of a file, and the next step."""
         for key, (what, step) in OTHERS.items():
             if key in attributes:
-                return f"is {what} of sagline, no {self.name}", step
-        return f"is no {self.name} of sagline, it names no {self.key}", "Check that this is the file you mean."
+                return f"is {what} of sagline, not a {self.name}", step
+        return f"is not a {self.name} of sagline: it has no {self.key}", "Check that this is the file you mean."
 
     def attributes(self, title: str) -> dict[str, Any]:
         """Attributes of every file of this content."""
@@ -160,7 +160,7 @@ def read_dataset(path: Path, content: Content) -> tuple[Dataset, bool]:
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         raise unreadable(path, error) from None
     if right is False:
-        raise FileError(path, "is not as it was written: it was damaged or edited", content.again)
+        raise FileError(path, "has changed since it was written: it was damaged or edited", content.again)
     return _load(path, content), right is True
 
 
@@ -211,7 +211,7 @@ def _cause(path: Path, content: Content) -> tuple[str, str]:
     if begin == _BEGIN:
         return "is damaged, or was cut off", content.again
     kind = _KINDS.get(path.suffix.lower(), "empty" if not begin else "another kind of file")
-    return f"is {kind}, no {content.made}", content.give
+    return f"is {kind}, not a {content.made}", content.give
 
 
 def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:

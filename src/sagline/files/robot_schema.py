@@ -81,7 +81,7 @@ class ObstacleEntry(YamlEntry):
         found = [kind for kind in _KINDS if kind in given]
         if len(found) != 1:
             value = " and ".join(found) or "none of them"
-            raise InvalidValueError(item, value, _EITHER, "Say what it is, once.")
+            raise InvalidValueError(item, value, _EITHER, "Give exactly one of these keys.")
         kind = found[0]
         if foreign := sorted(given - {kind, *_KINDS[kind]}):
             allowed = ", ".join(_KINDS[kind])
@@ -196,7 +196,12 @@ def _vectors(value: object) -> object:
         return value
     if value not in SWIVEL_AXES:
         allowed = f"{', '.join(SWIVEL_AXES)}, or a vector of three numbers"
-        raise InvalidValueError("winches.swivel_axis", reprlib.repr(value), allowed, "Say which way the cable enters.")
+        raise InvalidValueError(
+            "winches.swivel_axis",
+            reprlib.repr(value),
+            allowed,
+            "Give the direction in which the cable enters the pulley.",
+        )
     return SWIVEL_AXES[value]
 
 

@@ -101,14 +101,14 @@ def _cause(error: Exception, data: bytes) -> tuple[str, str]:
     encoding = "utf-8" if declared is None else declared[1].decode()
     if data[:2] not in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         if not data.removeprefix(codecs.BOM_UTF8).lstrip().startswith(b"<"):
-            return "is no XML file", "Check that this is the file you mean."
+            return "is not an XML file", "Check that this is the file you mean."
         if not _decodes(data, encoding):
             return f"is not {encoding} text, as an XML file that says {'so' if declared else 'nothing'} must be", (
                 "Save it as UTF-8."
             )
     if getattr(error, "code", None) in _CUT_OFF:
-        return f"is no complete XML ({error})", "Check that this is the file you mean; it may have been cut off."
-    return f"is no complete XML ({error})", "Check that this is the file you mean, and correct it there."
+        return f"is not complete XML ({error})", "Check that this is the file you mean; it may have been cut off."
+    return f"is not complete XML ({error})", "Check that this is the file you mean, and correct it there."
 
 
 def _decodes(data: bytes, encoding: str) -> bool:

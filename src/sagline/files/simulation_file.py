@@ -95,7 +95,7 @@ def _check_simulation(data: Dataset, cables: int) -> None:
         check_variables(data, (LARGEST,), sizes)
     _check_times(time)
     if bool(nodes) != (data.attrs["cable_mass"] != "none"):
-        allowed = "given for cables with mass, and for no others"
+        allowed = "given for cables with mass only"
         raise InvalidValueError(NODES.name, "given" if nodes else "not given", allowed, STEP)
     broken = np.full(cables, np.inf)
     if _has_events(data):
@@ -121,7 +121,7 @@ def _check_settings(attributes: Any) -> None:
         number(attributes[name], name, "", low=0.0)
     if (attributes["cable_mass"] == "modal") != (attributes["integrator"] == "exact"):
         found = f"{attributes['integrator']} for cable_mass {attributes['cable_mass']}"
-        raise InvalidValueError("integrator", found, "exact for modal, and for no others", STEP)
+        raise InvalidValueError("integrator", found, "exact for modal only", STEP)
 
 
 def _check_times(time: Array) -> None:

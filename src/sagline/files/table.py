@@ -63,7 +63,7 @@ class CsvTable:
                     numbers.extend(_numbers(path, reader.line_num, row, tuple(found), gaps))
                     lines.append(reader.line_num)
         except csv.Error as error:
-            raise line_error(path, reader.line_num, f"it is no CSV ({error})") from None
+            raise line_error(path, reader.line_num, f"it is not CSV ({error})") from None
         if not found:
             reason, step = f"no columns; allowed: {', '.join(units)}", "Give the names of the columns first."
             raise FileError(path, reason, step, item="columns")
@@ -110,7 +110,9 @@ def _factors(
     """Column names, and what to multiply their numbers by to have them in SI; None where no unit is given."""
     if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
         shown = {";": "semicolons", "\t": "tabs"}[other]
-        raise line_error(path, line, f"the columns are parted by {shown}; allowed: commas, and points in the numbers")
+        raise line_error(
+            path, line, f"the columns are separated by {shown}; allowed: commas, and points in the numbers"
+        )
     factors: dict[str, float | None] = {}
     for cell in header:
         found = _COLUMN.fullmatch(cell)
@@ -122,7 +124,7 @@ def _factors(
             hint = f" (did you mean {near}?)" if near else " (a number, no name)" if plain_number(cell) else ""
             raise line_error(path, line, f"unknown column {name!r}{hint}; allowed: {', '.join(units)}")
         if name in factors:
-            raise line_error(path, line, f"column {name} is there twice; allowed: once")
+            raise line_error(path, line, f"column {name} is given twice; allowed: once")
         factors[name] = None if unit is None else _factor(path, line, name, unit, units[name])
     return factors
 

@@ -163,7 +163,9 @@ def write_text(file: os.PathLike[str] | str, text: str) -> None:
     except UnicodeEncodeError as error:
         found = f"U+{ord(text[error.start]):04X} in {text[max(0, error.start - 20) : error.start]!r}…"
         step = "Correct the name or note it comes from."
-        raise FileError(Path(file), f"cannot hold half a character ({found})", step) from None
+        raise FileError(
+            Path(file), f"cannot be written: the text has an incomplete character ({found})", step
+        ) from None
     with atomic_file(file) as partial:
         partial.write_bytes(content)
 

@@ -137,13 +137,13 @@ def _check_order(events: list[Event], robot: Robot) -> None:
     for event in events:
         cable = event_cable(event)
         if cable in broken:
-            step = "Leave out what happens to it later."
+            step = "Remove the later events of this cable."
             raise InvalidValueError(f"events: cable {cable}", f"broken before {event.time:g} s", "there", step)
         if isinstance(event, Break):
             broken.add(event.cable)
         if isinstance(event, Drop):
             if event.mass >= mass:
-                allowed = f"< {mass:g} kg, what there is at {event.time:g} s"
+                allowed = f"< {mass:g} kg, the mass at {event.time:g} s"
                 raise InvalidValueError("events: Drop: mass", f"{event.mass:g} kg", allowed, "Drop less.")
             mass -= event.mass
         if isinstance(event, PickUp):

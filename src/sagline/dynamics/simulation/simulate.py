@@ -215,10 +215,10 @@ def integrator_code(integrator: Any, kind: int, elements: int = 0) -> int:
     if integrator is not None:
         choice(integrator, "integrator", get_args(Integrator))
     if kind == d.DRUMS and integrator == "runge-kutta":
-        step = "Leave integrator out: friction that sticks is nothing for a smooth method."
+        step = "Leave integrator out: static friction needs a non-smooth method."
         raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for winches="robot"', step)
     if elements and integrator == "runge-kutta":
-        step = "Leave integrator out: long runs of stiff chains need one that keeps their energy."
+        step = "Leave integrator out: long runs of stiff chains need a method that preserves energy."
         raise InvalidValueError("integrator", '"runge-kutta"', '"splitting" for cables with mass', step)
     return k.SPLITTING if kind == d.DRUMS or elements or integrator == "splitting" else k.RUNGE_KUTTA
 
