@@ -23,7 +23,7 @@ from sagline.cli.hosting import CompiledReadings
 import numpy as np
 from sagline.viewer.workspace import WorkspaceQuery, region_hull
 from sagline.viewer.server import start_server, stop_server
-from sagline.viewer.feature import Reading
+from sagline.viewer.feature import Computation
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
 
@@ -35,12 +35,12 @@ viewer = Page(server, FEATURES, sl.load_robot("cogiro"), None, readings.ready)
 def watch():
     viewer.shown.wait()
     print(time.time() - begun, flush=True)
-    while not readings.ready(Reading.WORKSPACE):
+    while not readings.ready(Computation.WORKSPACE):
         time.sleep(0.05)
     asked = WorkspaceQuery(viewer.view.snapshot.robot, np.array([0.0, 0.0, 0.0, 1.0]), sl.Catenary(), sl.WrenchBox())
     region_hull(asked, True, lambda *_: None)
     print(time.time() - begun, flush=True)
-    while not all(map(readings.ready, Reading)):
+    while not all(map(readings.ready, Computation)):
         time.sleep(0.05)
     updates = viewer.updates
     viewer.refresh()

@@ -12,7 +12,7 @@ import viser
 import sagline as sl
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
-from sagline.viewer.playback import Run
+from sagline.viewer.playback import PlayedPlan
 from sagline.viewer.server import start_server, stop_server
 from tests.tiers import extended
 from tests.viewer.client import PATIENCE, Client
@@ -65,7 +65,7 @@ def press(count: int, seed: int) -> None:
     """Send so many odd messages, and see between them whether the next client is served."""
     generator = np.random.default_rng(seed)
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [1.0, 0.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = Run.of(sl.inverse(ROBOT, sl.quintic_path(ends, durations=[1.0], rate=20)))
+    run = PlayedPlan.of(sl.inverse(ROBOT, sl.quintic_path(ends, durations=[1.0], rate=20)))
     server = start_server(port=0)
     viewer = Page(server, FEATURES, ROBOT, run)
     thread = threading.Thread(target=viewer.serve)

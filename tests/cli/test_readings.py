@@ -10,7 +10,7 @@ from sagline.cli import hosting as module
 from sagline.cli.compilation import Stage
 from sagline.cli.entries import MARGINS, POLYGON, VIBRATION
 from sagline.cli.hosting import ENTRY_OF, ORDER, CompiledReadings
-from sagline.viewer.feature import Reading
+from sagline.viewer.feature import Computation
 
 
 class Watched:
@@ -72,14 +72,14 @@ def test_readings_come_one_after_the_other(side: type[FakeSide], monkeypatch: py
             yield Stage(name, 2, 2, finished=True)
 
     monkeypatch.setattr(side, "said", said, raising=False)
-    readings, others = CompiledReadings(), [True] * (len(Reading) - 2)
-    assert [readings.ready(each) for each in Reading] == [False, False, *others]
+    readings, others = CompiledReadings(), [True] * (len(Computation) - 2)
+    assert [readings.ready(each) for each in Computation] == [False, False, *others]
     with readings.compiled_for(viewer):  # type: ignore[arg-type]
         for count, expected in ((1, [True, False, *others]), (2, [True, True, *others])):
             steps.release()
             while viewer.refreshed < count:
                 threading.Event().wait(0.001)
-            assert [readings.ready(each) for each in Reading] == expected
+            assert [readings.ready(each) for each in Computation] == expected
     assert side.started == [[MARGINS, POLYGON]]
     assert not readings.missing
 
@@ -109,8 +109,8 @@ def test_warm_nothing_is_started(side: type[FakeSide], monkeypatch: pytest.Monke
     with readings.compiled_for(Watched()):  # type: ignore[arg-type]
         pass
     assert side.started == []
-    assert all(readings.ready(each) for each in Reading)
-    assert {ENTRY_OF[each.name] for each in Reading} < set(ORDER)
+    assert all(readings.ready(each) for each in Computation)
+    assert {ENTRY_OF[each.name] for each in Computation} < set(ORDER)
 
 
 def test_on_one_core_the_cables_come_first(side: type[FakeSide], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,7 @@ import sagline as sl
 from sagline.control.link import GroupFault, Mode
 from sagline.files.controller_source import source_text
 from sagline.plc.blocks import BLOCKS, CLAIM, FROM_PLC, TO_PLC, Block
-from sagline.twin.plc_program import Limits, Order, Program
+from sagline.twin.plc_program import Order, PlcLimits, Program
 from tests.files.scl import Array, data_block, function_block, variables
 from tests.refusal import refused
 from tests.tiers import extended
@@ -60,7 +60,7 @@ class Bench:
 
     def __init__(self, count: int) -> None:
         self.count = count
-        limits = Limits([0.5] * count, [6.0] * count, [SPEED] * count, [300.0] * count)
+        limits = PlcLimits([0.5] * count, [6.0] * count, [SPEED] * count, [300.0] * count)
         self.program = Program(limits, PERIOD)
         self.block, self.v = function_block(text(), "SaglineGroup"), variables(text(), "SaglineGroup")
         filled = {name: Array([0.0] * 6 + values) for name, values in limits._asdict().items()}

@@ -11,7 +11,7 @@ import pytest
 import sagline as sl
 from sagline.core.arrays import Array
 from sagline.share.course import MOST_RATE, of_plan
-from sagline.share.packing import Channel, encode_channels
+from sagline.share.packing import PackedColumn, encode_columns
 from sagline.share.page import course_page
 from tests.tiers import extended
 
@@ -43,14 +43,16 @@ def test_values_come_back_within_half_a_step() -> None:
     smooth = np.stack((np.sin(time), -1e4 * np.cos(0.1 * time), np.zeros_like(time)), axis=1)
     rough = np.exp(rng.normal(0.0, 3.0, (5000, 4)))
     rough[rng.random((5000, 4)) < 0.1] = np.nan
-    found = unpacked(*encode_channels([Channel("smooth", smooth, 1e-5), Channel("rough", rough, 1e-4, "relative")]))
+    found = unpacked(
+        *encode_columns([PackedColumn("smooth", smooth, 1e-5), PackedColumn("rough", rough, 1e-4, "relative")])
+    )
     np.testing.assert_allclose(found["smooth"], smooth, rtol=0.0, atol=0.5001e-5)
     np.testing.assert_allclose(found["rough"], rough, rtol=0.501e-4)
 
 
 def test_smooth_motion_takes_less_than_a_byte_a_number() -> None:
     time = np.linspace(0.0, 60.0, 6000)
-    _, text = encode_channels([Channel("place", np.sin(time)[:, None] * np.arange(1.0, 4.0), 1e-5)])
+    _, text = encode_columns([PackedColumn("place", np.sin(time)[:, None] * np.arange(1.0, 4.0), 1e-5)])
     assert len(text) < 18000
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import sagline as sl
 from sagline.control import Command, Missing, Mode, Sample
-from sagline.twin.link import Channel, Network
+from sagline.twin.link import DelayLine, Network
 from tests.control.protocol import PERIOD
 from tests.twin.pilot import HOME, Pilot
 
@@ -71,7 +71,7 @@ def test_the_network_is_what_it_says() -> None:
 
 
 def test_messages_arrive_in_the_order_of_their_times() -> None:
-    way = Channel(Network(0.0, 0.5, 0.0, 1))
+    way = DelayLine(Network(0.0, 0.5, 0.0, 1))
     for k in range(50):
         way.send(0.01 * k, k)
     early, late = way.arrived(0.4), way.arrived(10.0)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from sagline.control import Mode
-from sagline.twin.plc_program import Limits, Order, Program
+from sagline.twin.plc_program import Order, PlcLimits, Program
 from tests.control.protocol import COUNTERS, HEARTBEAT, OWNER_TIMEOUT, RAMP, GroupFault, GroupStatus, WinchState
 from tests.tiers import extended
 
 PERIOD = 0.01
-LIMITS = Limits([0.5, 0.5], [8.0, 9.0], [0.4, 0.5], [1000.0, 2000.0])
+LIMITS = PlcLimits([0.5, 0.5], [8.0, 9.0], [0.4, 0.5], [1000.0, 2000.0])
 
 
 class Group:

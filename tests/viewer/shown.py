@@ -14,8 +14,8 @@ import viser
 import sagline as sl
 from sagline.viewer.camera import Framing
 from sagline.viewer.page import Page
-from sagline.viewer.playback import Run
-from sagline.viewer.server import NAME, Server, start_server, stop_server
+from sagline.viewer.playback import PlayedPlan
+from sagline.viewer.server import NAME, PageServer, start_server, stop_server
 from tests.viewer.client import PATIENCE, Client, await_that
 
 ROBOT = sl.load_robot("article-suspended")
@@ -24,9 +24,9 @@ PATH = sl.quintic_path(
 )
 
 
-def a_run() -> Run:
+def a_run() -> PlayedPlan:
     """A run of 2 s along `PATH`, whose approximate model makes the platform rest beside it."""
-    return Run.of(sl.inverse(ROBOT, PATH, model=sl.Empirical()))
+    return PlayedPlan.of(sl.inverse(ROBOT, PATH, model=sl.Empirical()))
 
 
 def with_mass(robot: sl.Robot, mass: float) -> sl.Robot:
@@ -44,7 +44,7 @@ class Shown(NamedTuple):
         pieces: Its pieces of HTML, in the order in which they were added.
     """
 
-    server: Server
+    server: PageServer
     viewer: Page
     thread: threading.Thread
     pieces: list[viser.GuiHtmlHandle]
@@ -76,7 +76,7 @@ class Shown(NamedTuple):
         return self.server.scene.get_handle_by_name(name)
 
 
-def pieces_of(server: Server) -> list[viser.GuiHtmlHandle]:
+def pieces_of(server: PageServer) -> list[viser.GuiHtmlHandle]:
     """The pieces of HTML that will be added to all pages of a server, as they come."""
     gui: Any = server.gui
     add, pieces = gui.add_html, list[viser.GuiHtmlHandle]()
@@ -89,7 +89,7 @@ def pieces_of(server: Server) -> list[viser.GuiHtmlHandle]:
     return pieces
 
 
-def shown(made: Callable[[Server], Page]) -> Iterator[Shown]:
+def shown(made: Callable[[PageServer], Page]) -> Iterator[Shown]:
     """A page of a viewer made for a server, while it is served."""
     server = start_server(port=0)
     pieces = pieces_of(server)
@@ -106,12 +106,12 @@ def shown(made: Callable[[Server], Page]) -> Iterator[Shown]:
     assert not thread.is_alive()
 
 
-def controls(server: Server) -> list[Any]:
+def controls(server: PageServer) -> list[Any]:
     """All controls of all pages of a server."""
     return list(server.gui._gui_input_handle_from_uuid.values())
 
 
-def handle(page: Shown | Server, label: str) -> Any:
+def handle(page: Shown | PageServer, label: str) -> Any:
     """The control with a label."""
     server = page.server if isinstance(page, Shown) else page
     found = [each for each in controls(server) if each.label == label]
@@ -119,7 +119,7 @@ def handle(page: Shown | Server, label: str) -> Any:
     return found[0]
 
 
-def put(client: Client, server: Server, framing: Framing) -> viser.CameraHandle:
+def put(client: Client, server: PageServer, framing: Framing) -> viser.CameraHandle:
     """The camera of a client, once it has been put to where it sees all."""
     met = client.met(server)
     await_that(lambda: bool(framing._places.get(met.client_id)))
@@ -132,7 +132,7 @@ def framed(client: Client, page: Shown) -> viser.CameraHandle:
     return put(client, page.server, page.viewer.framing)
 
 
-def tell(page: Shown | Server, client: Client, topic: str, value: Any) -> None:
+def tell(page: Shown | PageServer, client: Client, topic: str, value: Any) -> None:
     """Say what a page says through browser/channel.js."""
     text = json.dumps({"topic": topic, "value": value, "count": time.monotonic()})
     client.set(handle(page, NAME), text)

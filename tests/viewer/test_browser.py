@@ -19,7 +19,7 @@ import sagline as sl
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.page import Page as ViewerPage
-from sagline.viewer.playback import Run
+from sagline.viewer.playback import PlayedPlan
 from sagline.viewer.robot_scene import PLATFORM
 from sagline.viewer.server import start_server, stop_server
 from tests.calibration.made_up import made_up
@@ -62,7 +62,7 @@ def browser() -> Iterator[Browser]:
 def opened(
     browser: Browser,
     robot: sl.Robot,
-    run: Run | None = None,
+    run: PlayedPlan | None = None,
     *,
     width: int = 1000,
     height: int = 640,
@@ -158,7 +158,7 @@ def test_the_platform_is_lit_without_a_picture_of_surroundings(browser: Browser)
 def test_a_run_plays_in_the_page(browser: Browser) -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
+    run = PlayedPlan.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
     with opened(browser, robot, run) as (page, viewer):
         page.get_by_role("button", name="Play").click()
         await_that(page, lambda: viewer.view is not None and viewer.view.snapshot.pose.position[0] == 2.0)
@@ -204,7 +204,7 @@ def least_contrast(page: Page) -> float:
 def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"], width: int) -> None:
     robot = sl.load_robot("article-mixed")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
+    run = PlayedPlan.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=50), model=sl.Empirical()))
     with opened(browser, robot, run, width=width, theme=theme, complains=True) as (page, viewer):
         assert page.evaluate("document.documentElement.dataset.mantineColorScheme") == theme
         least_contrast(page)

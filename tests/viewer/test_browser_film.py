@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, Page
 import sagline as sl
 from sagline.viewer.features import export
 from sagline.viewer.page import home_pose
-from sagline.viewer.playback import Run
+from sagline.viewer.playback import PlayedPlan
 from sagline.viewer.shapes import size_of
 from sagline.viewer.tension_scale import TensionScale
 from tests.chromium import NEEDED, PATIENCE, launched
@@ -57,11 +57,11 @@ def browser() -> Iterator[Browser]:
     yield from launched(FLAGS)
 
 
-def a_run(name: str) -> Run:
+def a_run(name: str) -> PlayedPlan:
     """A run from left to right through the middle of a robot's room."""
     robot = sl.load_robot(name)
     aside = 0.06 * size_of(robot) * np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    return Run.of(sl.inverse(robot, sl.Pose(home_pose(robot).position + aside, np.stack([np.eye(3)] * 3))))
+    return PlayedPlan.of(sl.inverse(robot, sl.Pose(home_pose(robot).position + aside, np.stack([np.eye(3)] * 3))))
 
 
 def played(page: Page, file: FilePath) -> tuple[float, list[Any]]:

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 import sagline as sl
 from sagline.viewer.features.keyboard import KeyboardFeature
 from sagline.viewer.page import Page as ViewerPage
-from sagline.viewer.playback import Run
+from sagline.viewer.playback import PlayedPlan
 from tests.chromium import NEEDED, PATIENCE, launched
 from tests.tiers import extended
 from tests.viewer.reach import broken_rules, walked
@@ -115,7 +115,7 @@ def keys_move(page: Page, viewer: ViewerPage) -> None:
 def test_all_is_reached_named_and_said(browser: Browser) -> None:
     robot = sl.load_robot("article-suspended")
     ends = sl.Pose(np.array([[0.0, 0.0, 1.5], [2.0, 1.0, 1.5]]), np.stack([np.eye(3)] * 2))
-    run = Run.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
+    run = PlayedPlan.of(sl.inverse(robot, sl.quintic_path(ends, durations=[2.0], rate=20)))
     with opened(browser, robot, run) as (page, viewer):
         check_all(page, walking=False)
         await_that(page, lambda: said(page).startswith("Feasible, tensions "))

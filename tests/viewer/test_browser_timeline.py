@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, FloatRect, Page
 
 import sagline as sl
 from sagline.viewer.page import Page as ViewerPage
-from sagline.viewer.playback import Run
+from sagline.viewer.playback import PlayedPlan
 from tests.chromium import NEEDED, launched
 from tests.tiers import extended
 from tests.viewer.test_browser import FLAGS, OVERFLOWING, SCENE, await_that, box, least_contrast, opened
@@ -29,13 +29,15 @@ def browser() -> Iterator[Browser]:
     yield from launched(FLAGS)
 
 
-def run_of(robot: sl.Robot) -> Run:
+def run_of(robot: sl.Robot) -> PlayedPlan:
     """From the middle of what the robot is meant for, a bit to the side."""
     box = robot.test_box
     assert box is not None
     middle, aside = 0.5 * (box.low + box.high), np.zeros(3)
     aside[np.argmax(box.high - box.low)] = 0.2 * float(np.max(box.high - box.low))
-    return Run.of(sl.inverse(robot, sl.quintic_path([tuple(middle), tuple(middle + aside)], durations=[2.0], rate=40)))
+    return PlayedPlan.of(
+        sl.inverse(robot, sl.quintic_path([tuple(middle), tuple(middle + aside)], durations=[2.0], rate=40))
+    )
 
 
 def at(page: Page, share: float) -> tuple[float, float]:
@@ -44,7 +46,7 @@ def at(page: Page, share: float) -> tuple[float, float]:
     return slider["x"] + share * slider["width"], slider["y"] + 0.5 * slider["height"]
 
 
-def scrubbed(page: Page, viewer: ViewerPage, run: Run) -> None:
+def scrubbed(page: Page, viewer: ViewerPage, run: PlayedPlan) -> None:
     """Point, drag, step and play with mouse and keys."""
     page.mouse.move(*at(page, 0.25))
     tip = page.locator("#sagline-timeline .tip")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from sagline.viewer.server import LONGEST, NAME, Channel, Server, chosen_by, start_server, stop_server
+from sagline.viewer.server import LONGEST, NAME, Channel, PageServer, chosen_by, start_server, stop_server
 from tests.viewer.client import Client, await_that
 from tests.viewer.shown import handle
 
@@ -18,14 +18,14 @@ NONSENSE = ("", "{", "[]", "3", '{"topic": "test"}', '{"topic": [], "value": 1}'
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
+def server() -> Iterator[PageServer]:
     one = start_server(port=0)
     yield one
     stop_server(one)
 
 
 @pytest.fixture(scope="module")
-def channel(server: Server) -> Channel:
+def channel(server: PageServer) -> Channel:
     """A channel whose tasks are done at once, by the thread that hears."""
     one = Channel(server.gui, lambda task: task())
     server.on_client_connect(one.connect)
@@ -33,11 +33,11 @@ def channel(server: Server) -> Channel:
     return one
 
 
-def say(server: Server, client: Client, text: Any) -> None:
+def say(server: PageServer, client: Client, text: Any) -> None:
     client.set(handle(server, NAME), text)
 
 
-def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: Server, channel: Channel) -> None:
+def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: PageServer, channel: Channel) -> None:
     heard: list[Any] = []
     channel.on("test", lambda value, client: heard.append((value, client)))
     with Client(server.get_port()) as client:
@@ -50,7 +50,7 @@ def test_what_a_page_says_is_heard_in_order_and_nonsense_is_not(server: Server, 
         assert len({number for _, number in heard}) == 1
 
 
-def test_who_comes_later_is_told_the_last_word(server: Server, channel: Channel) -> None:
+def test_who_comes_later_is_told_the_last_word(server: PageServer, channel: Channel) -> None:
     channel.send("news", {"a": 1})
     channel.send("news", {"a": 2})
     with Client(server.get_port()) as client:
@@ -70,7 +70,7 @@ def test_a_value_is_text_in_an_attribute() -> None:
     assert '"' not in chosen_by("x", 'a"b').split('data-value="')[1][:-1]
 
 
-def test_an_answer_reaches_who_asked_and_nobody_else(server: Server, channel: Channel) -> None:
+def test_an_answer_reaches_who_asked_and_nobody_else(server: PageServer, channel: Channel) -> None:
     channel.on("ask", lambda value, client: channel.send_to(client, "asked", value))
     with Client(server.get_port()) as one, Client(server.get_port()) as other:
         for k in range(20):  # in turn, faster than pages are drawn

@@ -14,7 +14,7 @@ from sagline.viewer.camera import Camera
 from sagline.viewer.features import FEATURES, cut
 from sagline.viewer.features.cut import Before, CutFeature
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.playback import Playback
+from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.player import InMotion, Played, Player
 from sagline.viewer.server import start_server, stop_server
 from tests.effort import least_seconds
@@ -85,7 +85,7 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         client.set(button_of(page, 2), True)
         await_that(lambda: (found := played()) is not None and found.duration > 4.0)
         whole = played()
-        assert isinstance(whole, Playback)
+        assert isinstance(whole, PlayedSimulation)
         state = sl.inverse(ROBOT, POSE, tension=sl.MinimumNorm()).state
         by_itself = sl.simulate(state, duration=cut.DURATION, events=sl.Break(cable=2, time=0.0), damping=cut.LOSSES)
         np.testing.assert_allclose(whole.simulation.tensions, by_itself.tensions, rtol=1e-9)
@@ -109,13 +109,13 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
 def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
     server = start_server(port=0)
     try:
-        given, first, second = Playback(made.simulation()), made.simulation(50), made.simulation(60)
+        given, first, second = PlayedSimulation(made.simulation()), made.simulation(50), made.simulation(60)
         viewer = Page(server, FEATURES, given.robot, given)
         cuts, player = viewer.feature(CutFeature), viewer.player
         cuts._asked, before = 1, Before(given.home, player.save())
         cuts._play(1, first, 3, before)
         cuts._play(1, second, 3, before)
-        assert isinstance(player.played, Playback)
+        assert isinstance(player.played, PlayedSimulation)
         assert player.played.simulation is second
         player.play(given)
         cuts._play(1, made.simulation(70), 3, before)
@@ -127,7 +127,7 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
 def test_cut_by_cut_all_is_put_back() -> None:
     server = start_server(port=0)
     try:
-        given = Playback(made.simulation())
+        given = PlayedSimulation(made.simulation())
         viewer = Page(server, FEATURES, given.robot, given)
         cuts, player = viewer.feature(CutFeature), viewer.player
         for number in (1, 2):
@@ -164,30 +164,30 @@ def test_the_first_part_is_soon_there_and_begins_what_follows(name: str) -> None
 def test_a_clock_at_the_end_of_what_is_known_waits_and_goes_on() -> None:
     player = Player(None, lambda played: None)
     whole = made.simulation()
-    player.play(Playback(whole), at_once=True)
+    player.play(PlayedSimulation(whole), at_once=True)
     player.advance(5.0)
     ended = player.clock
-    player.grow(Playback(whole))
+    player.grow(PlayedSimulation(whole))
     assert (ended.playing, player.clock.playing) == (False, True)
     assert player.clock.time == player.clock.duration == 2.0
     player.scrub_to(1.0)
-    player.grow(Playback(whole))
+    player.grow(PlayedSimulation(whole))
     assert (player.clock.time, player.clock.playing) == (1.0, False)
 
 
 def test_what_was_played_is_put_back_where_its_clock_stood() -> None:
-    run = Playback(made.simulation())
+    run = PlayedSimulation(made.simulation())
     player = Player(run, lambda played: None)
     player.scrub_to(0.7)
     player.toggle()
     kept = player.save()
-    player.play(Playback(made.simulation(50)), at_once=True)
+    player.play(PlayedSimulation(made.simulation(50)), at_once=True)
     player.advance(0.5)
     player.restore(kept)
     assert player.played is run
     assert (player.clock.time, player.clock.playing, player.following) == (0.7, True, True)
     player.leave()
     kept = player.save()
-    player.play(Playback(made.simulation(50)), at_once=True)
+    player.play(PlayedSimulation(made.simulation(50)), at_once=True)
     player.restore(kept)
     assert (player.clock.time, player.clock.playing, player.following) == (0.7, False, False)

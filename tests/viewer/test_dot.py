@@ -16,7 +16,7 @@ import sagline as sl
 from sagline.viewer.by_hand import BY_HAND, ByHand, DotField
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
-from sagline.viewer.features.tensions import Marks, field_of, grouped, polygon_figure
+from sagline.viewer.features.tensions import MethodMarks, field_of, grouped, polygon_figure
 from sagline.viewer.page import Page, Source, home_pose
 from sagline.viewer.snapshot import METHODS, Settings, Snapshot, taken_at
 from tests.effort import best_rate
@@ -223,7 +223,7 @@ def test_marks_are_where_their_ways_are() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
-    field, found = field_of(snapshot), Marks()
+    field, found = field_of(snapshot), MethodMarks()
     assert field is not None
     assert snapshot.plan is not None
     marks = found.at(snapshot.plan, further=True)
@@ -256,7 +256,7 @@ def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From the second pose on solvers answer, which know no guides; another robot has none at first."""
-    robot, moved, calls = changed(name), Marks(), list[sl.Pose]()
+    robot, moved, calls = changed(name), MethodMarks(), list[sl.Pose]()
 
     def counted(*arguments: Any) -> sl.Plan:
         calls.append(arguments[1])
@@ -270,7 +270,7 @@ def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
         calls.clear()
         marks = moved.at(plan, further=True)
         assert len(calls) == (0 if k and name != "guides" else len(METHODS))
-        for mark, expected in zip(marks, Marks().at(plan, further=True), strict=True):
+        for mark, expected in zip(marks, MethodMarks().at(plan, further=True), strict=True):
             assert (mark.name, mark.letter, mark.missing) == (expected.name, expected.letter, expected.missing)
             np.testing.assert_array_equal(mark.tension, expected.tension)
     other = sl.inverse(changed(name), home)
@@ -287,7 +287,7 @@ def test_what_a_way_misses_is_told() -> None:
     snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
     assert snapshot.plan is not None
     assert not sl.inverse(robot, pose, tension=sl.ClosedForm()).feasible
-    marks = Marks().at(snapshot.plan, further=True)
+    marks = MethodMarks().at(snapshot.plan, further=True)
     missing = {mark.name: mark.missing for mark in marks if mark.missing}
     assert "ClosedForm" in missing
     html = polygon_figure(snapshot, marks, field_of(snapshot))

@@ -12,12 +12,12 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline.core.arrays import locked
-from sagline.viewer.feature import Reading
+from sagline.viewer.feature import Computation
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.missing import explanation, missing_label
 from sagline.viewer.missing import NearestFeasible, missing_of, nearest_feasible
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.server import Server, chosen_by
+from sagline.viewer.server import PageServer, chosen_by
 from sagline.viewer.snapshot import Settings, Snapshot, taken_at
 from sagline.viewer.tension_scale import force_unit
 from tests.effort import best_rate
@@ -199,8 +199,8 @@ def test_other_reasons_are_explained_too() -> None:
 
 
 def test_nobody_says_that_there_is_nowhere_to_go_before_it_was_looked_for() -> None:
-    def made(server: Server) -> Page:
-        pose, later = sl.Pose(OUTSIDE["cogiro"][0], np.eye(3)), Reading.WORKSPACE
+    def made(server: PageServer) -> Page:
+        pose, later = sl.Pose(OUTSIDE["cogiro"][0], np.eye(3)), Computation.WORKSPACE
         return Page(server, FEATURES, sl.load_robot("cogiro"), pose=pose, ready=lambda reading: reading is not later)
 
     with contextmanager(shown)(made) as page:

@@ -16,7 +16,7 @@ from sagline.viewer.feature import BackgroundTask
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.playback import Playback
+from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.swing import PERIOD, mode_of
 from sagline.viewer.tension_scale import TensionScale
@@ -160,7 +160,7 @@ def test_a_cut_cable_is_simulated_and_played_as_a_run_is(page: Shown, monkeypatc
 
 
 def test_a_moment_of_a_simulation_hangs_as_its_lengths_say() -> None:
-    played = Playback(made.simulation())
+    played = PlayedSimulation(made.simulation())
     start, end = played.at(0.0), played.at(9.0)
     state = made.state_at()
     ends = shapes.chords(ROBOT, state.pose)

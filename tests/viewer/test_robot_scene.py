@@ -10,25 +10,25 @@ import sagline as sl
 from sagline.viewer import shapes
 from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import RobotScene
-from sagline.viewer.server import Server, start_server, stop_server
+from sagline.viewer.server import PageServer, start_server, stop_server
 from sagline.viewer.snapshot import Settings, taken_at
 from sagline.viewer.tension_scale import TensionScale
 from tests.tiers import wide
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[Server]:
+def server() -> Iterator[PageServer]:
     one = start_server(port=0)
     yield one
     stop_server(one)
 
 
-def node(server: Server, name: str) -> Any:
+def node(server: PageServer, name: str) -> Any:
     return server.scene.get_handle_by_name(name)
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
-def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: Server, name: str) -> None:
+def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: PageServer, name: str) -> None:
     robot = sl.load_robot(name)
     RobotScene(server.scene, robot, home_pose(robot))
     size = shapes.size_of(robot)
@@ -38,7 +38,7 @@ def test_the_gizmo_is_smaller_than_the_robot_and_no_larger_than_it_must(server: 
 
 
 @pytest.mark.parametrize("name", wide(sl.robot_names(), 3))
-def test_every_robot_has_a_floor_and_a_scale(server: Server, name: str) -> None:
+def test_every_robot_has_a_floor_and_a_scale(server: PageServer, name: str) -> None:
     robot = sl.load_robot(name)
     RobotScene(server.scene, robot, home_pose(robot))
     low, high = shapes.bounds(robot)
@@ -54,7 +54,7 @@ def test_every_robot_has_a_floor_and_a_scale(server: Server, name: str) -> None:
     assert (arms[:, 1] - arms[:, 0]) / lengths[0] == pytest.approx(np.eye(3), abs=1e-6)
 
 
-def test_pulleys_turn_and_exit_points_move_with_the_platform(server: Server) -> None:
+def test_pulleys_turn_and_exit_points_move_with_the_platform(server: PageServer) -> None:
     robot = sl.load_robot("ipanema-2-pulleys")
     stage = RobotScene(server.scene, robot, home_pose(robot))
     wheels = node(server, "/pulleys")
@@ -75,7 +75,7 @@ def test_pulleys_turn_and_exit_points_move_with_the_platform(server: Server) -> 
     assert np.linalg.norm(seen[1] - seen[0], axis=1).min() > 0.005
 
 
-def test_dead_cable_is_dashed_where_its_way_is_not_known(server: Server) -> None:
+def test_dead_cable_is_dashed_where_its_way_is_not_known(server: PageServer) -> None:
     base = sl.load_robot("article-suspended")
     rise = np.array([2.0, 2.0, 2.0, 2.0, 1.0, 1.0, 0.0, 0.0])
     winch = sl.Winch(pulley_radius=0.2, dead_cable=2.0, dead_rise=rise, drum_radius=0.2)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.playback import Run
+from sagline.viewer.playback import PlayedPlan
 from sagline.viewer.player import Timeline
 
 ROBOT = sl.load_robot("article-mixed")
@@ -12,7 +12,7 @@ PATH = sl.quintic_path(
     sl.Pose(np.array([[0.0, 0.0, 1.5], [6.9, 3.0, 1.5]]), np.stack([np.eye(3)] * 2)), durations=[4.0], rate=10
 )
 PLAN = sl.inverse(ROBOT, PATH, model=sl.Empirical())
-RUN = Run.of(PLAN)
+RUN = PlayedPlan.of(PLAN)
 
 
 def test_samples_are_those_of_the_plan() -> None:
@@ -48,7 +48,7 @@ def test_traces_draw_the_error_times_its_scale() -> None:
 
 def test_plan_of_a_single_pose_is_no_run() -> None:
     with pytest.raises(sl.InvalidValueError, match="single pose"):
-        Run.of(sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 1.5], np.eye(3))))
+        PlayedPlan.of(sl.inverse(ROBOT, sl.Pose([0.0, 0.0, 1.5], np.eye(3))))
 
 
 def test_clock_plays_pauses_scrubs_and_stops_at_the_end() -> None:

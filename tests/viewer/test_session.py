@@ -17,7 +17,7 @@ from sagline.viewer.player import InMotion, Timeline
 from sagline.viewer.readout import css_color
 from sagline.viewer.robot_scene import ACTUAL, INFEASIBLE, PLATFORM, TRUTH, scaled_position
 from sagline.viewer.server import start_server, stop_server
-from sagline.viewer.session import LogFollower, Session
+from sagline.viewer.session import LogFollower, PlayedLog
 from sagline.viewer.tension_scale import TensionScale
 from tests.files.executions import cycles_of, events_of, execution, plan_of
 from tests.tiers import extended, wide
@@ -42,7 +42,7 @@ def truth(tmp_path: Path) -> Path:
     return tmp_path / "twin.mcap"
 
 
-def session_of(log: Path, truth: Path | None = None) -> Session:
+def session_of(log: Path, truth: Path | None = None) -> PlayedLog:
     session = LogFollower(log, truth).more()
     assert session is not None
     return session
@@ -88,7 +88,7 @@ def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
     session = session_of(log)
     evil = Event(1000.0, 0, EventKind.NOTE, "x", State.MOVING, "<script>alert(1)</script>")
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    text = Session(**parts | {"events": (evil,)}).at(1.0).verdict
+    text = PlayedLog(**parts | {"events": (evil,)}).at(1.0).verdict
     assert "<script>" not in text
     assert "&lt;script&gt;" in text
 
@@ -97,7 +97,7 @@ def test_a_text_from_a_log_is_text_on_the_page(log: Path) -> None:
 def test_a_fault_is_red_with_its_name(log: Path, state: State) -> None:
     session = session_of(log)
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    wrong = Session(**parts | {"state": np.full(201, state, dtype=np.int8)})
+    wrong = PlayedLog(**parts | {"state": np.full(201, state, dtype=np.int8)})
     server = start_server(port=0)
     try:
         viewer = Page(server, FEATURES, ROBOT, wrong)
@@ -178,12 +178,12 @@ def test_before_the_place_is_known_the_platform_is_shown_in_the_middle(log: Path
     session = session_of(log)
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
     unknown = np.full((201, 3), np.nan)
-    lost = Session(**parts | {"position": unknown, "planned": unknown})
+    lost = PlayedLog(**parts | {"position": unknown, "planned": unknown})
     assert ROBOT.test_box is not None
     assert np.allclose(lost.home.position, 0.5 * (ROBOT.test_box.low + ROBOT.test_box.high))
     later = unknown.copy()
     later[100:120] = [0.1, 0.2, 1.4]
-    known = Session(**parts | {"position": later, "planned": unknown})
+    known = PlayedLog(**parts | {"position": later, "planned": unknown})
     assert np.array_equal(known.at(1.5).pose.position, [0.1, 0.2, 1.4])  # the last that was known
     assert known.track().spans == ()
     assert known.traces(50, 1.0)[1].shape == (50, 3)

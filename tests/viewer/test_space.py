@@ -11,11 +11,11 @@ import pytest
 
 import sagline as sl
 from sagline import SaglineError
-from sagline.viewer.feature import Reading
+from sagline.viewer.feature import Computation
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.region import RegionFeature, planes_of
 from sagline.viewer.page import Page
-from sagline.viewer.server import Server
+from sagline.viewer.server import PageServer
 from sagline.viewer.tension_scale import cable_color
 from sagline.viewer.workspace import Hull, WorkspaceQuery, region_hull
 from tests.effort import best_rate
@@ -273,8 +273,8 @@ def test_a_planar_robot_is_sliced_in_its_plane() -> None:
 
 
 def test_what_is_still_compiled_is_said() -> None:
-    def made(server: Server) -> Page:
-        return Page(server, FEATURES, ROBOT, ready=lambda reading: reading is not Reading.WORKSPACE)
+    def made(server: PageServer) -> Page:
+        return Page(server, FEATURES, ROBOT, ready=lambda reading: reading is not Computation.WORKSPACE)
 
     with contextmanager(shown)(made) as page:
         assert "Compiling" not in page.text

@@ -17,7 +17,7 @@ from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
 from sagline.viewer.page import Page, Source
 from sagline.viewer.panel import mass_range
-from sagline.viewer.playback import Playback, Run
+from sagline.viewer.playback import PlayedPlan, PlayedSimulation
 from sagline.viewer.snapshot import METHODS, MODELS, Settings, Snapshot, depends_on_history, taken_at
 from sagline.viewer.tension_scale import TensionScale
 from tests.tiers import extended, wide
@@ -129,7 +129,7 @@ def path_of(robot: sl.Robot) -> sl.Path:
 def test_a_sample_of_a_run_in_a_file(tmp_path: Path) -> None:
     robot, file = sl.load_robot("article-suspended"), tmp_path / "a 'run'.nc"
     sl.inverse(robot, path_of(robot), model=sl.Empirical()).save(file)
-    run = Run.of(sl.load_plan(file))
+    run = PlayedPlan.of(sl.load_plan(file))
     for time in (0.0, 0.52, 9.0):
         view = View(run.at(time), Settings(robot.mass), TensionScale.of(robot), False, None, run)
         names = executed(code_of(view, robot, Source.of_file("plan", file), time))
@@ -154,7 +154,7 @@ def test_a_moment_of_a_simulation_in_a_file(tmp_path: Path) -> None:
     robot, file = sl.load_robot("article-suspended"), tmp_path / "cut.nc"
     state = sl.inverse(robot, sl.Pose([0.0, 0.0, 1.5], np.eye(3))).state
     sl.simulate(state, duration=0.2, events=(sl.Break(cable=0, time=0.05),)).save(file)
-    playback = Playback(sl.load_simulation(file))
+    playback = PlayedSimulation(sl.load_simulation(file))
     moment = playback.at(0.13)
     view = View(moment, Settings(robot.mass), TensionScale.of(robot), False, None, playback)
     names = executed(code_of(view, robot, Source.of_file("simulation", file), 0.13))
@@ -228,6 +228,6 @@ def test_questions_that_are_none_are_not_answered(page: Shown, value: Any) -> No
 @extended
 def test_what_is_in_no_file_is_refused_in_a_line() -> None:
     robot = sl.load_robot("article-suspended")
-    run = Run.of(sl.inverse(robot, path_of(robot)))
+    run = PlayedPlan.of(sl.inverse(robot, path_of(robot)))
     with contextmanager(shown)(lambda server: Page(server, FEATURES, robot, run)) as page:
         assert asked(page, "copy", "code", "c")["refused"].startswith("the run ")

@@ -13,17 +13,17 @@ from sagline.control import State
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.timeline import TimelineFeature
 from sagline.viewer.page import Page
-from sagline.viewer.playback import Playback, Run
+from sagline.viewer.playback import PlayedPlan, PlayedSimulation
 from sagline.viewer.player import Beside, Player
 from sagline.viewer.server import start_server, stop_server
-from sagline.viewer.session import LogFollower, Session
+from sagline.viewer.session import LogFollower, PlayedLog
 from sagline.viewer.tension_scale import ForceUnit
 from sagline.viewer.timeline import MOST_COLUMNS as MOST_COLUMNS
 from sagline.viewer.timeline import (
     MOST_SPANS,
     Chart,
-    Limit,
-    Mark,
+    ChartLimit,
+    TimelineMark,
     Track,
     columns,
     limit_violations,
@@ -44,12 +44,12 @@ UNIT = ForceUnit("N", 1.0, ".1f")
 
 @pytest.fixture(scope="module")
 def page() -> Iterator[Shown]:
-    beside = Beside(Run.of(OTHER), ("a.nc", "b.nc"))
-    yield from shown(lambda server: Page(server, FEATURES, ROBOT, Run.of(PLAN), beside=beside))
+    beside = Beside(PlayedPlan.of(OTHER), ("a.nc", "b.nc"))
+    yield from shown(lambda server: Page(server, FEATURES, ROBOT, PlayedPlan.of(PLAN), beside=beside))
 
 
 @pytest.fixture(scope="module")
-def log(tmp_path_factory: pytest.TempPathFactory) -> Session:
+def log(tmp_path_factory: pytest.TempPathFactory) -> PlayedLog:
     file = tmp_path_factory.mktemp("log") / "run.mcap"
     execution().save(file)
     session = LogFollower(file).more()
@@ -57,13 +57,13 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Session:
     return session
 
 
-def changed(session: Session, **changes: Any) -> Session:
+def changed(session: PlayedLog, **changes: Any) -> PlayedLog:
     parts = {name: getattr(session, name) for name in session.__slots__ if name != "shown"}
-    return Session(**parts | changes)
+    return PlayedLog(**parts | changes)
 
 
 @pytest.fixture
-def growing(log: Session) -> Iterator[Shown]:
+def growing(log: PlayedLog) -> Iterator[Shown]:
     """The first hundred cycles of the log."""
     cycles = {name: value[:100] for name in log.__slots__ if isinstance(value := getattr(log, name), np.ndarray)}
     del cycles["shown"]
@@ -112,7 +112,7 @@ def test_spans_cover_all_that_is_wrong_and_no_more_than_their_pixels(seed: int) 
 
 
 def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
-    track = Run.of(PLAN).track()
+    track = PlayedPlan.of(PLAN).track()
     gaps = PLAN.gaps
     assert len(gaps) == len(track.spans) == 1
     (gap,), (span,) = gaps, track.spans
@@ -124,7 +124,7 @@ def test_a_plan_says_where_it_has_no_answer_and_why() -> None:
 
 
 def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
-    track = Run.of(PLAN).track()
+    track = PlayedPlan.of(PLAN).track()
     (part,) = timeline_message([("run", track)], 0, 8.0)["tracks"]
     low = np.array(part["low"], dtype=float)  # None as NaN
     np.testing.assert_allclose(low.T, PLAN.state.limited_tension, rtol=0.0, atol=0.5001e-2)
@@ -139,7 +139,10 @@ def test_what_a_page_is_told_are_the_numbers_of_the_plan() -> None:
 
 
 def test_limits_are_drawn_where_they_are_near_and_told_where_not() -> None:
-    time, limits = np.linspace(0.0, 1.0, 11), (Limit(25.0, "lowest", upper=False), Limit(2000.0, "highest", upper=True))
+    time, limits = (
+        np.linspace(0.0, 1.0, 11),
+        (ChartLimit(25.0, "lowest", upper=False), ChartLimit(2000.0, "highest", upper=True)),
+    )
     chart = Chart("Tension", "N", 1, ("0",), lambda rows: 30.0 + 20.0 * time[rows, None], limits)
     page = timeline_message([("a", Track(time, (chart,)))], 0, 1.0)
     assert page["range"] == pytest.approx([25.0 - 1.0, 50.0 + 1.0])
@@ -184,7 +187,7 @@ def test_of_two_tracks_both_have_one_axis_and_the_chart_that_was_chosen() -> Non
 def test_a_simulation_says_when_it_broke_and_draws_nothing_of_a_broken_cable() -> None:
     state = sl.inverse(sl.load_robot("cogiro"), sl.Pose([0.0, 0.0, 2.0], np.eye(3))).state
     cut = sl.simulate(state, duration=1.0, events=sl.Break(cable=3, time=0.5))
-    track = Playback(cut).track()
+    track = PlayedSimulation(cut).track()
     (event,) = [mark for mark in track.marks if mark.text.startswith("break of cable 3")]
     assert event.time == pytest.approx(0.5)
     assert event.bad
@@ -204,7 +207,7 @@ def test_tensions_beyond_their_limits_are_spans_with_their_worst() -> None:
     assert told == [("4", "below", "20.0", "12.0"), ("5", "above", "500.0", "700.0")]
 
 
-def test_a_log_marks_its_events_and_shades_its_faults(log: Session) -> None:
+def test_a_log_marks_its_events_and_shades_its_faults(log: PlayedLog) -> None:
     marks = log.track().marks
     assert [(mark.time, mark.bad) for mark in marks] == [(0.0, False), (0.5, True)]
     assert [mark.text for mark in marks] == [f"{event.name}: {event.text}" for event in events_of()]
@@ -303,7 +306,7 @@ def test_a_window_is_looked_at_and_the_whole_again(page: Shown) -> None:
 def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> None:
     server = start_server(port=0)
     try:
-        page = Page(server, (), ROBOT, Run.of(PLAN))
+        page = Page(server, (), ROBOT, PlayedPlan.of(PLAN))
         channel, player = page.channel, page.player
         show = TimelineFeature(page)
 
@@ -327,7 +330,7 @@ def test_a_window_follows_a_clock_to_its_end_however_long_nobody_looked() -> Non
 
 
 @extended
-def test_a_log_that_grows_grows_on_the_page_and_who_is_at_its_end_stays_there(growing: Shown, log: Session) -> None:
+def test_a_log_that_grows_grows_on_the_page_and_who_is_at_its_end_stays_there(growing: Shown, log: PlayedLog) -> None:
     with Client(growing.port) as client:
         tell(growing, client, "chart", 1)
         tell(growing, client, "scrub", 99.0)
@@ -370,10 +373,10 @@ def test_nonsense_changes_nothing(page: Shown) -> None:
 
 
 def test_what_a_cut_brought_is_played_alone_and_given_back_with_its_second_run() -> None:
-    run, other = Run.of(PLAN), Beside(Run.of(OTHER), ("a", "b"))
+    run, other = PlayedPlan.of(PLAN), Beside(PlayedPlan.of(OTHER), ("a", "b"))
     player = Player(run, lambda *_: None, other)
     assert (player.beside, player.clock.duration) == (other, 9.0)
-    player.play(Run.of(PLAN))
+    player.play(PlayedPlan.of(PLAN))
     assert (player.beside, player.clock.duration) == (None, 8.0)
     player.extend(run)
     player.play(run)
@@ -385,7 +388,7 @@ def test_a_long_run_is_told_at_once() -> None:
     """600,000 samples of eight cables: the page is told in a blink."""
     time = np.linspace(0.0, 600.0, 600_000)
     values = np.random.default_rng(1).normal(size=(600_000, 8))
-    marks = tuple(Mark(float(k), "x", bad=False) for k in range(1000))
+    marks = tuple(TimelineMark(float(k), "x", bad=False) for k in range(1000))
     track = Track(time, (Chart("Tension", "N", 1, tuple("01234567"), values.__getitem__),), (), marks)
     assert least_seconds(lambda: timeline_message([("run", track)], 0, 600.0), 0.5) < 0.5
     assert len(json.dumps(timeline_message([("run", track)], 0, 600.0))) < 400_000

@@ -14,7 +14,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 import sagline as sl
-from sagline.viewer.feature import Reading
+from sagline.viewer.feature import Computation
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
 from sagline.viewer.robot_scene import RobotScene
@@ -263,7 +263,7 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
 
         return refuse
 
-    ready: set[Reading] = set()
+    ready: set[Computation] = set()
     kernels = (
         "sagline.tension.margin.margins_of_poses",
         "sagline.statics.slopes.describe_states",
@@ -293,10 +293,10 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
             assert viewer.view is not None
             assert viewer.view.snapshot.rest is None
         for reading, text in (
-            (Reading.MARGIN, "in any direction"),
-            (Reading.FREQUENCIES, " Hz</span></div>"),
-            (Reading.POLYGON, 'class="polygon"'),
-            (Reading.REST, "Really rests"),
+            (Computation.MARGIN, "in any direction"),
+            (Computation.FREQUENCIES, " Hz</span></div>"),
+            (Computation.POLYGON, 'class="polygon"'),
+            (Computation.REST, "Really rests"),
         ):
             assert text not in page.text
             ready.add(reading)

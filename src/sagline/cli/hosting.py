@@ -38,7 +38,7 @@ from sagline.core.errors import FileError
 from sagline.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from sagline.viewer.feature import Reading
+    from sagline.viewer.feature import Computation
     from sagline.viewer.page import Page
 
 LATER = "trimesh"  # a package that the viewer loads when it is needed
@@ -122,7 +122,7 @@ class CompiledReadings:
         """Find the entries that are not compiled."""
         self.missing = not_compiled(ORDER)  # replaced as a whole, by the thread that compiles
 
-    def ready(self, reading: Reading) -> bool:
+    def ready(self, reading: Computation) -> bool:
         """True if a reading needs no compilation."""
         return ENTRY_OF[reading.name] not in self.missing
 

@@ -13,7 +13,7 @@ from sagline.files.writing import check_file, write_text
 
 if TYPE_CHECKING:
     from sagline.robot.robot import Robot
-    from sagline.share.course import Course
+    from sagline.share.course import SharedMotion
 
 ENDINGS: Final = (".html", ".htm")
 HEAD: Final = 2000  # bytes of a page that have its mark
@@ -66,7 +66,7 @@ def share(
     show_text(f"{target.resolve()}: {amount}, opens in any browser, without a network", whole=True)
 
 
-def _found(source: Path) -> Robot | Course:
+def _found(source: Path) -> Robot | SharedMotion:
     """A robot, or a run to play."""
     from sagline.files.calibration_file import FORMAT as CALIBRATION
     from sagline.files.calibration_file import load_calibration
@@ -93,7 +93,7 @@ def _found(source: Path) -> Robot | Course:
     return of_plan(plan)
 
 
-def _log(source: Path) -> Course:
+def _log(source: Path) -> SharedMotion:
     try:
         from sagline.share.course import of_session
         from sagline.viewer.session import LogFollower

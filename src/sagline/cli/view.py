@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
     from sagline.viewer.page import Page, Source
     from sagline.viewer.player import Beside, Played
-    from sagline.viewer.session import LogFollower, Session
+    from sagline.viewer.session import LogFollower, PlayedLog
 
 LOG: Final = ".mcap"
 LOOK: Final = 0.5  # s, between two looks at a file that grows
@@ -185,7 +185,7 @@ def played_in(robot: Robot, file: Path) -> Played:
     from sagline.files.netcdf import is_of
     from sagline.files.plan_file import load_plan
     from sagline.files.simulation_file import FORMAT, load_simulation
-    from sagline.viewer.playback import Playback, Run
+    from sagline.viewer.playback import PlayedPlan, PlayedSimulation
     from sagline.viewer.session import LogFollower
 
     if file.suffix.lower() == LOG:
@@ -195,13 +195,13 @@ def played_in(robot: Robot, file: Path) -> Played:
     if is_of(file, FORMAT):
         simulation = load_simulation(file)
         _check_robot(file, "simulation", simulation.robot, robot)
-        return Playback(simulation)
+        return PlayedSimulation(simulation)
     plan = load_plan(file)
     made_for = plan.state.one_robot
     _check_robot(file, "run", made_for, robot)
     count = len(plan.state.pose) if plan.state.pose.shape else 1
     with working(f"{made_for.name}: confirming {count:,} poses", FORWARD) as line:
-        return Run.of(plan, line.progress)
+        return PlayedPlan.of(plan, line.progress)
 
 
 def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
@@ -219,7 +219,7 @@ def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot, *, alone:
         raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
 
 
-def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> Session:
+def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> PlayedLog:
     """The cycles in a log; of a live one, as soon as all logs have begun and there is a cycle."""
     from sagline.files.mcap_reader import has_begun
 

@@ -22,12 +22,12 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import chord_geometry
 
 if TYPE_CHECKING:
-    from sagline.viewer.session import Session
+    from sagline.viewer.session import PlayedLog
 
 MOST_RATE: Final = 100.0  # samples a second; of twice as many and more a page keeps some: screens show 60
 
 
-class Verdict(NamedTuple):
+class SampleVerdict(NamedTuple):
     """Verdict on a sample."""
 
     good: bool | None  # whether all is well; None where there is nothing to judge
@@ -35,7 +35,7 @@ class Verdict(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class SharedMotion:
     """N samples of a robot in motion."""
 
     robot: Robot
@@ -48,7 +48,7 @@ class Course:
     chord_tension: Array  # with which cables are drawn [N], shape (N, m); NaN draws a straight line
     length: Array  # unstrained, off the drum [m], shape (N, m)
     verdict: NDArray[np.intp]  # which of the verdicts, shape (N,)
-    verdicts: tuple[Verdict, ...]  # all that are said
+    verdicts: tuple[SampleVerdict, ...]  # all that are said
     notes: tuple[str, ...] = ()  # what is to be known of the page
 
     def pose_at(self, index: int) -> Pose | None:
@@ -57,7 +57,7 @@ class Course:
             return None
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
 
-    def thinned(self) -> Course:
+    def thinned(self) -> SharedMotion:
         """Every so many samples, and the last, where there are more than a screen shows; the notes say so."""
         count, duration = len(self.time), float(self.time[-1])
         every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
@@ -67,25 +67,25 @@ class Course:
         note = f"One in {every} of {count:,} samples is kept."
         fields = ("time", "position", "quaternion", "tension", "chord_tension", "length", "verdict")
         kept = {name: getattr(self, name)[rows] for name in fields}
-        return Course(
+        return SharedMotion(
             self.robot, self.kind, quantity=self.quantity, verdicts=self.verdicts, notes=(*self.notes, note), **kept
         )
 
 
-def of_plan(plan: Plan) -> Course:
+def of_plan(plan: Plan) -> SharedMotion:
     """A plan of N poses in a row, one second each where they have no times."""
     count = len(plan.state.pose)
     time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
-    verdicts = [Verdict(True, "Feasible")]
+    verdicts = [SampleVerdict(True, "Feasible")]
     which = np.zeros(count, dtype=np.intp)
     for gap in plan.gaps:
         which[gap.first : gap.last + 1] = len(verdicts)
-        verdicts.append(Verdict(False, _why(gap)))
+        verdicts.append(SampleVerdict(False, _why(gap)))
     notes = ["Poses without times: one a second."] * (plan.path is None)
     if not isinstance(plan.state.cables.model, Catenary):
         name = type(plan.state.cables.model).__name__.lower()
         notes.append(f"Planned with the {name} model; cables are drawn as they hang at these tensions.")
-    return Course(
+    return SharedMotion(
         plan.state.one_robot, "run", time - time[0], plan.state.pose.position, plan.state.pose.quaternion,
         plan.chord_tension, "along the chord", plan.chord_tension, plan.unstrained_length, which, tuple(verdicts),
         tuple(notes),
@@ -102,23 +102,23 @@ def _why(gap: Gap) -> str:
     return f"Not feasible: {short}{cables}"
 
 
-def of_simulation(simulation: Simulation) -> Course:
+def of_simulation(simulation: Simulation) -> SharedMotion:
     """A simulation; cables with mass are drawn as massless ones of their lengths hang."""
     robot, time = simulation.robot, simulation.time
     broken = np.zeros_like(simulation.tensions, dtype=bool)
-    said = [Verdict(None, "Simulated")]
+    said = [SampleVerdict(None, "Simulated")]
     which = np.zeros(len(time), dtype=np.intp)
     for event in simulation.events:
         of = "" if event.cable is None else f" of cable {event.cable}"
         which[time >= event.time] = len(said)
-        said.append(Verdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
+        said.append(SampleVerdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
         if event.kind == "break" and event.cable is not None:
             broken[time >= event.time, event.cable] = True
     tension = np.where(broken, np.nan, simulation.tensions)
     drawn = np.where(broken, np.nan, chord_tension(robot, simulation.pose, simulation.length))
     notes = ("Cables with mass are drawn as cables of their lengths hang at rest.",) * (simulation.nodes is not None)
     pose = simulation.pose
-    return Course(
+    return SharedMotion(
         robot, "simulation", time - time[0], pose.position, pose.quaternion, tension, "at the frame end", drawn,
         simulation.length, which, tuple(said), notes,
     )  # fmt: skip
@@ -139,7 +139,7 @@ def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
     return np.where(known, cables.chord_tension, np.nan)
 
 
-def of_session(session: Session) -> Course:
+def of_session(session: PlayedLog) -> SharedMotion:
     """A controller's log: the platform where it was to be, beside a plan where it was estimated to be."""
     from sagline.viewer.session import WRONG
 
@@ -149,13 +149,13 @@ def of_session(session: Session) -> Course:
     quaternion = np.where(wanted, session.planned_quaternion, session.quaternion[row])
     codes, which = np.unique(session.state, return_inverse=True)
     states = [State(int(code)) for code in codes]
-    verdicts = tuple(Verdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
+    verdicts = tuple(SampleVerdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
     unknown = ~np.isfinite(position).all(axis=1)
     if unknown.any():  # nothing was known before, or ever
         somewhere = session.pose_at(int(np.argmax(unknown)))
         position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
     drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)
-    return Course(
+    return SharedMotion(
         session.robot, "log", session.time, position, quaternion, session.tension, "measured", drawn, session.length,
         which.astype(np.intp), verdicts,
     )  # fmt: skip

@@ -14,7 +14,7 @@ from sagline.robot.batch import pulleys_of
 from sagline.robot.pose import Pose
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
-from sagline.share.packing import Channel, encode_channels
+from sagline.share.packing import PackedColumn, encode_columns
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
@@ -105,7 +105,7 @@ def _highest(robot: Robot) -> float:
 
 def _triangles(solid: shapes.Solid, size: float) -> tuple[dict[str, object], str]:
     """The corners of all triangles, one after the other, packed."""
-    return encode_channels([Channel("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
+    return encode_columns([PackedColumn("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
 
 
 def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:

@@ -18,7 +18,7 @@ _ORDERS: Final = (0, 1, 2, 3)  # of differences: the one of which least is left 
 _LEVEL: Final = 9
 
 
-class Channel(NamedTuple):
+class PackedColumn(NamedTuple):
     """Something that a page knows over time."""
 
     name: str  # as the page knows it
@@ -27,7 +27,7 @@ class Channel(NamedTuple):
     scale: Literal["linear", "relative"] = "linear"  # "linear", or "relative" of values above zero
 
 
-def encode_channels(channels: Sequence[Channel]) -> tuple[dict[str, object], str]:
+def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object], str]:
     """Encode channels for a page."""
     described, planes = [], []
     for channel in channels:
@@ -43,7 +43,7 @@ def encode_channels(channels: Sequence[Channel]) -> tuple[dict[str, object], str
     return {"count": len(channels[0].values), "channels": described}, text
 
 
-def _codes(channel: Channel, values: Array) -> tuple[Codes, int | None]:
+def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
     """The nearest whole numbers of steps; and the one that stands for nothing, None where it is not needed."""
     known = np.isfinite(values)
     if channel.scale == "relative":

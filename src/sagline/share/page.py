@@ -16,9 +16,9 @@ from sagline.core.numbers import n
 from sagline.kinematics.inverse import inverse
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
-from sagline.share.course import Course
+from sagline.share.course import SharedMotion
 from sagline.share.machine import colors, model_data, numbers, robot_drawing, solids_data
-from sagline.share.packing import Channel, encode_channels
+from sagline.share.packing import PackedColumn, encode_columns
 from sagline.viewer.tension_scale import number
 
 SCRIPTS: Final = (  # in the order in which they need each other
@@ -58,19 +58,19 @@ def robot_page(robot: Robot) -> str:
     )
 
 
-def course_page(course: Course, title: str) -> str:
+def course_page(course: SharedMotion, title: str) -> str:
     """A run that plays."""
     robot, kept = course.robot, course.thinned()
     first = kept.pose_at(0)
-    header, text = encode_channels(
+    header, text = encode_columns(
         [
-            Channel("time", kept.time, TIME),
-            Channel("position", kept.position, POSITION),
-            Channel("quaternion", kept.quaternion, TURN),
-            Channel("tension", kept.tension, TENSION, "relative"),
-            Channel("chord_tension", kept.chord_tension, TENSION, "relative"),
-            Channel("length", kept.length, LENGTH),
-            Channel("verdict", kept.verdict.astype(np.float64), 1.0),
+            PackedColumn("time", kept.time, TIME),
+            PackedColumn("position", kept.position, POSITION),
+            PackedColumn("quaternion", kept.quaternion, TURN),
+            PackedColumn("tension", kept.tension, TENSION, "relative"),
+            PackedColumn("chord_tension", kept.chord_tension, TENSION, "relative"),
+            PackedColumn("length", kept.length, LENGTH),
+            PackedColumn("verdict", kept.verdict.astype(np.float64), 1.0),
         ]
     )
     facts = {**_facts(robot), "states": header, "verdicts": [each._asdict() for each in kept.verdicts]}

@@ -1,4 +1,4 @@
-"""Servers of the data blocks of a twin, one for each group, whatever protocol they speak."""
+"""Servers of the data blocks of a twin, one for each group; base class of all protocols."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class BlockServers(ABC):
                     self._memory[group][FROM_PLC][:] = block
 
     def written(self) -> list[tuple[bytes, bytes]]:
-        """Contents of DB102 and DB103 of each group; claims are erased, as by a PLC that has read them."""
+        """Contents of DB102 and DB103 of each group; claims are erased, as a PLC does after reading."""
         found = []
         for group, memory in enumerate(self._memory):
             with self._locked(group, TO_PLC):
@@ -74,12 +74,12 @@ def check_free(host: str, port: int) -> str:
             number = socket.gethostbyname(host)
             probe.bind((number, port))
             probe.listen()
-        except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two of what is no name
+        except (OSError, OverflowError, ValueError, TypeError) as error:  # the last two if it is not a name
             reason = getattr(error, "strerror", None) or str(error)
             raise InvalidValueError(
                 "address of the twin",
                 f"{host!r}, port {port} ({reason})",
                 "a free port at an address of this machine",
-                "Choose another with --port, or end what listens there.",
+                "Choose another with --port, or stop the program that listens there.",
             ) from None
     return number

@@ -21,11 +21,10 @@ class Hardware:
     """Drives, sensors and plant.
 
     Attributes:
-        read: Readings at the end of a period, in the rows LENGTH: unstrained, off the drums, of nominal drums at what
-            the encoders count [m]; RATE: its change in the period [m/s]; TORQUE: of the motors at their shafts,
-            positive where it lets cable out [N m]; CELL: readings of the load cells [N]; FILTERED: the same after a
-            filter [N], (5, m).
-        counts: Of the encoders, whole numbers as floats, (m,).
+        read: Readings at the end of a period, shape (5, m). Rows: LENGTH, unstrained, off nominal drums at the encoder
+            counts [m]; RATE, its mean rate over the period [m/s]; TORQUE of the motors at their shafts, positive in the
+            direction that lets cable out [N m]; CELL, readings of the load cells [N]; FILTERED, the same, filtered [N].
+        counts: Encoder counts, whole numbers as floats, shape (m,).
     """
 
     def __init__(self, robot: Robot, begin: Start, damping: Damping, step: float, period: float, seed: int) -> None:
@@ -38,10 +37,10 @@ class Hardware:
         self._full = np.full(m, np.inf) if winch.load_cell_range is None else winch.load_cell_range
         self._lever = drum_lever(robot, reading.length) / np.abs(winch.gear)
         self._weight, self._gravity, self._slip = np.zeros(6), robot.gravity, np.zeros(m)
-        self._wrong: dict[int, tuple[float, float]] = {}  # load cells: what counts of a reading, and what is added
+        self._wrong: dict[int, tuple[float, float]] = {}  # faulty load cells: factor of the reading, and offset [N]
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
-        self._heavier = True  # whether the plant has not been told the weight
+        self._load_changed = True  # whether the simulator needs the new load
         self.read = np.zeros((5, m))
         self._rows = tuple(self.read)
         self.read[FILTERED] = reading.load_cell
@@ -53,13 +52,13 @@ class Hardware:
         """True state of the plant."""
         return self._simulator.reading
 
-    def go_on(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
-        """Simulate a period in which the set points go linearly to the given ones: length [m], tension [N]."""
+    def simulate_period(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
+        """Simulate a period in which the set points go linearly to new ones: length [m], tension [N]."""
         if powered != self._powered:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))
         targets = self._true.lengths(counts - self._slip)
-        weight, self._heavier = self._weight if self._heavier else None, False
+        weight, self._load_changed = self._weight if self._load_changed else None, False
         self._take(self._simulator.step(targets, self._period, tension=tension, wrench=weight))
 
     def _switch(self, powered: list[bool]) -> None:
@@ -87,7 +86,7 @@ class Hardware:
 
     @property
     def saturated(self) -> Array:
-        """Drives at a limit of torque or speed, not 0 where they are, (m,)."""
+        """Nonzero for drives at a limit of torque or speed, (m,)."""
         return self._simulator.reading.saturated
 
     def spoil_cell(self, cell: int, words: str | None, value: float) -> None:
@@ -105,7 +104,7 @@ class Hardware:
         self._simulator.cut(cable)
 
     def shift_encoder(self, winch: int, length: float) -> None:
-        """Shift the count of an encoder by a length of cable [m]; its drive winds that in."""
+        """Shift the count of an encoder by a length of cable [m]; its drive winds this length in."""
         slip = np.rint(length * self._nominal.per_meter[winch])
         self._slip[winch] += slip
         self._simulator.shift(-slip / self._true.per_meter[winch], winch)
@@ -114,7 +113,7 @@ class Hardware:
         """Limit the force of a drive at the cable [N]."""
         self._simulator.limit_force(force, winch)
 
-    def load(self, mass: float) -> None:
+    def add_load(self, mass: float) -> None:
         """Add a mass at the platform's center of mass [kg]."""
         self._weight[2] -= mass * self._gravity
-        self._heavier = True
+        self._load_changed = True

@@ -1,4 +1,4 @@
-"""Injected faults of a machine, each from one line of text."""
+"""Injected faults of a machine, each written as one line of text."""
 
 from __future__ import annotations
 
@@ -13,53 +13,49 @@ from sagline.core.arguments import brief
 from sagline.core.errors import InvalidValueError, nearest
 
 
-class Kind(NamedTuple):
+class FaultKind(NamedTuple):
     """One kind of fault."""
 
     item: str  # kind of part ("cell")
-    numbered: bool  # whether there are several, told apart by a number
     words: str  # the fault, with # in place of its value
-    unit: str  # of that value in texts
-    scale: float  # to SI
-    for_good: bool  # whether it cannot end by itself
     sense: str  # meaning, in words
+    unit: str = ""  # of the value, in texts
+    scale: float = 1.0  # of the value, to SI
+    for_good: bool = False  # whether it cannot end by itself
+
+    @property
+    def numbered(self) -> bool:
+        """True if a machine has several such parts, distinguished by a number."""
+        return self.item in ("cell", "cable", "encoder", "servo", "group")
 
 
 KINDS: Final = MappingProxyType(
     {
         f"{kind.item} {kind.words}".strip(): kind
         for kind in (
-            Kind("cell", True, "sticks", "", 1.0, False, "reads what it read last"),
-            Kind("cell", True, "reads #", "N", 1.0, False, "reads that, whatever pulls"),
-            Kind("cell", True, "saturates", "", 1.0, False, "reads its full scale"),
-            Kind("cell", True, "is wrong by #", "N", 1.0, False, "reads so much more than it did"),
-            Kind("cable", True, "breaks", "", 1.0, True, "pulls and weighs no longer"),
-            Kind("encoder", True, "jumps by #", "mm", 1e-3, True, "counts so much more cable than there is"),
-            Kind("servo", True, "is limited to #", "N", 1.0, True, "gives no more at the cable"),
-            Kind("servo", True, "trips", "", 1.0, True, "has no power, until the operator resets the machine"),
-            Kind(
-                "load",
-                False,
-                "grows by #",
-                "kg",
-                1.0,
-                False,
-                "hangs at the center of mass; less than 0: goes",
-            ),
-            Kind("emergency stop", False, "", "", 1.0, True, "is pressed, until the operator resets the machine"),
-            Kind("group", True, "is silent", "", 1.0, False, "its blocks do not arrive"),
-            Kind("group", True, "repeats", "", 1.0, False, "its last block arrives again and again"),
-            Kind("group", True, "doubles", "", 1.0, False, "each of its blocks arrives twice"),
-            Kind("group", True, "swaps", "", 1.0, False, "of two blocks the later one arrives first"),
-            Kind("group", True, "goes back", "", 1.0, False, "older and older blocks arrive"),
-            Kind("group", True, "is torn", "", 1.0, False, "the counters at the two ends of its blocks differ"),
-            Kind("group", True, "is foreign", "", 1.0, False, "its blocks are of another program"),
-            Kind("group", True, "stops", "", 1.0, False, "its PLC stops: what it said stays, its drives have no power"),
-            Kind("group", True, "is taken", "", 1.0, False, "another controller has its grant"),
-            Kind("commands", False, "stop", "", 1.0, False, "none arrives at any PLC"),
-            Kind("commands", False, "repeat", "", 1.0, False, "the last one arrives again and again"),
-            Kind("commands", False, "are torn", "", 1.0, False, "the counters at the two ends of their blocks differ"),
-            Kind("commands", False, "are foreign", "", 1.0, False, "they come from another owner"),
+            FaultKind("cell", "sticks", "repeats its last reading"),
+            FaultKind("cell", "reads #", "reads this value, whatever the tension is", "N"),
+            FaultKind("cell", "saturates", "reads its full scale"),
+            FaultKind("cell", "is wrong by #", "reads this much more", "N"),
+            FaultKind("cable", "breaks", "has neither tension nor weight any more", for_good=True),
+            FaultKind("encoder", "jumps by #", "counts this much more cable than there is", "mm", 1e-3, True),
+            FaultKind("servo", "is limited to #", "gives no more force at the cable", "N", 1.0, True),
+            FaultKind("servo", "trips", "has no power until the operator resets the machine", for_good=True),
+            FaultKind("load", "grows by #", "is added at the center of mass; removed if less than 0", "kg"),
+            FaultKind("emergency stop", "", "is pressed until the operator resets the machine", for_good=True),
+            FaultKind("group", "is silent", "its blocks do not arrive"),
+            FaultKind("group", "repeats", "its last block arrives again and again"),
+            FaultKind("group", "doubles", "each of its blocks arrives twice"),
+            FaultKind("group", "swaps", "of two blocks the later one arrives first"),
+            FaultKind("group", "goes back", "older and older blocks arrive"),
+            FaultKind("group", "is torn", "the counters at the two ends of its blocks differ"),
+            FaultKind("group", "is foreign", "its blocks are of another program"),
+            FaultKind("group", "stops", "its PLC stops: its block stays unchanged, its drives have no power"),
+            FaultKind("group", "is taken", "another controller has its grant"),
+            FaultKind("commands", "stop", "none arrives at any PLC"),
+            FaultKind("commands", "repeat", "the last one arrives again and again"),
+            FaultKind("commands", "are torn", "the counters at the two ends of their blocks differ"),
+            FaultKind("commands", "are foreign", "they come from another owner"),
         )
     }
 )
@@ -75,9 +71,9 @@ class Injected:
     Attributes:
         kind: One of `KINDS`, "cell sticks" for instance.
         which: Number of the cell, cable, encoder, servo or group, from 0; 0 where there is only one.
-        value: Its number, SI; 0 where it has none.
-        time: Of its beginning, since the start of the machine [s].
-        duration: Until its end [s]; infinite by default.
+        value: Value in SI units; 0 for a kind without one.
+        time: Time of its beginning, since the start of the machine [s].
+        duration: Duration [s]; infinite by default.
     """
 
     kind: str
@@ -99,15 +95,15 @@ def fault(text: str) -> Injected:
     """A fault from its text.
 
     Args:
-        text: What happens, to which one (from 0), and when: "cell 3 sticks at 40 s", "group 2 is silent at 12.5 s for
-            0.2 s". Without a time it is there from the start, without a duration it lasts. What there is:
+        text: Part with its number (from 0), fault and time: "cell 3 sticks at 40 s", "group 2 is silent at 12.5 s for
+            0.2 s". Without a time the fault begins at the start; without a duration it does not end. All kinds:
             `sl.twin.KINDS`.
 
     Returns:
         The fault.
 
     Raises:
-        InvalidValueError: If there is no such fault; the message names the words that there are.
+        InvalidValueError: If there is no such fault; the message lists the known words.
 
     Examples:
         >>> import sagline as sl
@@ -130,14 +126,14 @@ def fault(text: str) -> Injected:
         if match := re.fullmatch(f"{kind.item}{number} {happens}".strip(), what, re.ASCII):
             found = match.groupdict()
             if kind.for_good and duration < math.inf:
-                raise _refused(text, f"no duration: what {kind.words or 'is pressed'} does not end by itself")
+                raise _refused(text, f"no duration: what {kind.words or 'is pressed'} does not recover by itself")
             value = _number(text, found.get("value"), 0.0, kind.unit) * kind.scale
             return Injected(name, int(found.get("which") or 0), value, time, duration)
     raise _unknown(text, what)
 
 
 def _unknown(text: str, what: str) -> InvalidValueError:
-    """Error for unknown words: names the words for that item, or the items."""
+    """Error for unknown words, which lists the words for that item, or the items."""
     items = sorted({kind.item for kind in KINDS.values()})
     first = what.split(" ")[0] if what else ""
     item = next((item for item in items if item.split(" ")[0] == first), None)
@@ -176,20 +172,20 @@ def _number(text: str, word: str | None, otherwise: float, unit: str) -> float:
 
 
 class Schedule:
-    """Queue of the beginnings and ends of faults."""
+    """Queue of the starts and ends of faults."""
 
     def __init__(self) -> None:
-        """Begin empty."""
+        """Make an empty queue."""
         self._due: list[tuple[float, int, bool, Injected]] = []
         self._planned = 0
 
     @property
     def waiting(self) -> bool:
-        """True if there are any."""
+        """True if the queue is not empty."""
         return bool(self._due)
 
     def plan(self, what: Injected) -> None:
-        """Queue the beginning and the end of a fault."""
+        """Add the start and the end of a fault."""
         self._push(what.time, True, what)
         if what.duration < math.inf:
             self._push(what.time + what.duration, False, what)
@@ -199,7 +195,7 @@ class Schedule:
         heappush(self._due, (time, self._planned, begins, what))
 
     def due(self, now: float) -> list[tuple[bool, Injected]]:
-        """Faults that begin (True) or end by a time [s], in order."""
+        """Faults that start (True) or end by a time [s], in order."""
         found = []
         while self._due and self._due[0][0] <= now + TINY:
             _, _, begins, what = heappop(self._due)

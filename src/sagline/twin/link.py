@@ -1,4 +1,4 @@
-"""In-process link: commands and samples over a network with delay, jitter and losses, on the lockstep clock."""
+"""In-process link: commands and samples over a network with delay, jitter and losses, in lockstep with the machine."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class Network:
     """Delay, jitter and losses of messages.
 
     Attributes:
-        ideal: Whether each arrives at once.
+        ideal: Whether each message arrives at once.
     """
 
     def __init__(self, delay: float, jitter: float, loss: float, seed: int) -> None:
-        """Check the values; delay [s], jitter [s]."""
+        """Check delay [s], jitter [s] and share of losses."""
         self._delay = number(delay, "delay", "s", low=0.0)
         self._jitter = number(jitter, "jitter", "s", low=0.0)
         self._loss = number(loss, "loss", "", low=0.0)
@@ -34,29 +34,29 @@ class Network:
         self._generator = np.random.default_rng((seed, 1))
 
     def arrival(self, now: float) -> float | None:
-        """Time of arrival of a message that is sent now [s]; None if it is lost."""
+        """Arrival time of a message that is sent now [s]; None if it is lost."""
         if self.ideal:
             return now
         lost, late = self._generator.random(2)
         return None if lost < self._loss else now + self._delay + late * self._jitter
 
 
-class Channel:
-    """Messages on the way in one direction."""
+class DelayLine:
+    """Messages that have been sent in one direction and have not arrived."""
 
     def __init__(self, network: Network) -> None:
-        """Begin empty."""
+        """Begin without messages."""
         self._network, self._sent = network, 0
         self._messages: list[tuple[float, int, Any]] = []
 
     def send(self, now: float, message: Any) -> None:
-        """Send a message [s]."""
+        """Send a message; now [s]."""
         if (arrival := self._network.arrival(now)) is not None:
             self._sent += 1
             heappush(self._messages, (arrival, self._sent, message))
 
     def arrived(self, now: float) -> list[tuple[float, Any]]:
-        """Times of arrival [s] and messages up to now, the earliest first."""
+        """Arrival times [s] and messages up to now, the earliest first."""
         found = []
         while self._messages and self._messages[0][0] <= now + TINY:
             arrival, _, message = heappop(self._messages)
@@ -64,13 +64,13 @@ class Channel:
         return found
 
 
-FIRST: Final = 2  # of the arrays of a snapshot that are of groups rather than winches
+FIRST: Final = 2  # index of the first array of `PlcBlocks` with a column for each group rather than each winch
 
 COUNTS, STATE, DRIVE_FAULT = range(3)  # rows of the second
 COUNTER, OWNER, ECHO, STATUS, FAULT = range(5)  # rows of the third
 
 
-class Snapshot:
+class PlcBlocks:
     """Blocks of all groups, in arrays.
 
     Attributes:
@@ -90,8 +90,8 @@ class Snapshot:
         """Counter of a group's block."""
         return int(self.arrays[FIRST][COUNTER, group])
 
-    def keep(self, group: int, part: slice, before: Snapshot) -> None:
-        """Restore the data of a group from before."""
+    def keep(self, group: int, part: slice, before: PlcBlocks) -> None:
+        """Restore the data of a group from earlier blocks."""
         for k, (array, old) in enumerate(zip(self.arrays, before.arrays, strict=True)):
             where = part if k < FIRST else group
             array[..., where] = old[..., where]
@@ -102,20 +102,20 @@ class Report(NamedTuple):
     """Content of the block of one group, for a server.
 
     Attributes:
-        counter: Of the blocks, at the block's beginning.
-        counter_again: At its end: another one where the block is torn.
+        counter: Block counter, at the beginning of the block.
+        counter_again: The same at its end; it differs where the block is torn.
         foreign: Whether the block is of another program.
-        plc_time: On the PLC's clock [s].
-        owner: Of the grant.
-        echo: Counter of the last command taken.
+        plc_time: Clock of the PLC [s].
+        owner: Owner of the grant.
+        echo: Counter of the last accepted command.
         status: Bits of `GroupStatus`.
         fault: Code of `GroupFault`.
-        length: Of the group's winches [m].
-        rate: [m/s].
-        torque: [N m].
-        tension: [N].
-        filtered: [N].
-        counts: Of the encoders.
+        length: Lengths of the group's winches [m].
+        rate: Their rates [m/s].
+        torque: Torques of the motors [N m].
+        tension: Readings of the load cells [N].
+        filtered: The same, filtered [N].
+        counts: Encoder counts.
         state: Codes of `WinchState`.
         winch_fault: The drives' own codes.
     """
@@ -138,7 +138,7 @@ class Report(NamedTuple):
     winch_fault: list[int]
 
 
-HISTORY: Final = 100  # blocks of the past that a group which goes back still has
+HISTORY: Final = 100  # earlier blocks that the fault "goes back" can send
 
 
 class Driven(Protocol):
@@ -150,7 +150,7 @@ class Driven(Protocol):
 
     @property
     def period(self) -> float:
-        """Time of one exchange [s]."""
+        """Period of one exchange [s]."""
 
     @property
     def time(self) -> float:
@@ -164,22 +164,22 @@ class Driven(Protocol):
 
 
 class MachineLink:
-    """`Link` to a machine in the same process, without waiting and without threads."""
+    """`Link` to a machine in the same process, without delays and threads of its own."""
 
     def __init__(self, machine: Driven, network: Network, moves: bool) -> None:
-        """Begin without data of any group; made by `Machine.link`."""
+        """Begin without data of any group; use `Machine.link`."""
         self._machine, self._network, self._moves = machine, network, moves
         self._groups = machine.groups
         count = len(self._groups)
-        self._outbound = [Channel(network) for _ in range(count)]
-        self._inbound = [Channel(network) for _ in range(count)]
-        self._newest: list[Snapshot | None] = [None] * count
+        self._outbound = [DelayLine(network) for _ in range(count)]
+        self._inbound = [DelayLine(network) for _ in range(count)]
+        self._newest: list[PlcBlocks | None] = [None] * count
         self._arrival = np.zeros(count)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self._groups]
         self._discarded = np.zeros(count, dtype=np.int64)
         self._owner = [0] * count
-        self._held: list[Snapshot | None] = [None] * count
-        self._past: deque[Snapshot] = deque(maxlen=HISTORY)
+        self._held: list[PlcBlocks | None] = [None] * count
+        self._past: deque[PlcBlocks] = deque(maxlen=HISTORY)
         self._steps_back = [0] * count
         self._closed = False
 
@@ -190,7 +190,7 @@ class MachineLink:
 
     @property
     def period(self) -> float:
-        """Time between two commands, by which an exchange advances the machine [s]."""
+        """Time between two commands [s], by which an exchange advances the machine."""
         return self._machine.period
 
     def exchange(self, command: Command | None) -> Sample | Missing:
@@ -231,7 +231,7 @@ class MachineLink:
                 for _, message in way.arrived(now):
                     self._machine.deliver(group, message)
 
-    def after(self, now: float, snapshot: Snapshot, spoiled: dict[int, str]) -> None:
+    def after(self, now: float, snapshot: PlcBlocks, spoiled: dict[int, str]) -> None:
         """Send the blocks of the PLCs after a scan; now [s]."""
         if self._network.ideal and not spoiled:
             self._newest, self._owner = [snapshot] * len(self._groups), list(snapshot.owners)
@@ -244,7 +244,7 @@ class MachineLink:
                     self._take(group, arrival, block)
         self._past.append(snapshot)
 
-    def _blocks(self, group: int, snapshot: Snapshot, how: str | None) -> list[Snapshot | None]:
+    def _blocks(self, group: int, snapshot: PlcBlocks, how: str | None) -> list[PlcBlocks | None]:
         """Blocks that a group sends in a scan; None for an invalid one."""
         held, self._held[group] = self._held[group], None
         if how == "goes back":
@@ -262,7 +262,7 @@ class MachineLink:
             return [None]
         return [snapshot, snapshot] if how == "doubles" else [snapshot, held] if held is not None else [snapshot]
 
-    def _take(self, group: int, arrival: float, block: Snapshot | None) -> None:
+    def _take(self, group: int, arrival: float, block: PlcBlocks | None) -> None:
         """Accept a block, if it is valid and newer than the one before."""
         known = self._newest[group]
         if block is None or (known is not None and not newer(block.counter(group), known.counter(group))):
@@ -291,7 +291,7 @@ class MachineLink:
             length, rate, torque, tension, filtered, counts, state, winch_fault, self._discarded.copy(),
         )  # fmt: skip
 
-    def _mixed(self, newest: list[Snapshot]) -> tuple[Any, ...]:
+    def _mixed(self, newest: list[PlcBlocks]) -> tuple[Any, ...]:
         """Arrays composed of the newest block of each group."""
         found = tuple(array.copy() for array in newest[0].arrays)
         for group, (part, block) in enumerate(zip(self._parts, newest, strict=True)):

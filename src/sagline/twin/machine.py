@@ -28,39 +28,40 @@ from sagline.twin.link import (
     STATUS,
     MachineLink,
     Network,
+    PlcBlocks,
     Report,
-    Snapshot,
 )
-from sagline.twin.plc_program import Limits, Order, Program
+from sagline.twin.plc_program import Order, PlcLimits, Program
 from sagline.twin.start import check_step, initial_state, limits_of
 
-LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # ours; on the prototype as if the air took 2 N s/m
+LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed; 2 N s/m of air damping on the prototype
 MOST_SEED: Final = 2**63 - 1
 LARGEST_ID: Final = 2**32 - 1
-RIVAL: Final = 2**31 - 2  # the id of a controller that takes a grant it should not have
-TRIPPED: Final = 1  # the code of a drive that has
+RIVAL: Final = 2**31 - 2  # id of a controller that takes a grant without permission
+TRIPPED: Final = 1  # fault code of a tripped drive
 
 
 class Machine:
     """Simulated machine in steps of one period, driven by a controller or through a server.
 
-    In process, `link` gives the way to it, each of whose exchanges moves it on. A server that other processes talk to
-    drives it so, in every period:
+    A controller in the same process uses `link`; each exchange advances the machine by a period. A server for other
+    processes calls, in every period:
 
-        machine.claim(group, owner)      # where somebody wrote a claim
-        machine.take(group, command)     # what stands in the group's block of commands, its own winches only
+        machine.claim(group, owner)      # if a claim was written
+        machine.take(group, command)     # command in the group's block, for its own winches only
         machine.advance()
-        machine.report(group)            # what its block says now; None: leave what is there
+        machine.report(group)            # present block of the group; None: leave the block unchanged
 
-    Each PLC runs its program at the beginning of a period, turns set points to counts with the nominal drums, and its
-    drives go there straight until the end of the period; the true drums turn counts to cable. The inner loops are
-    closed every millisecond on the drums themselves: the encoders' steps, of nanometers, are in what is read alone.
+    Each PLC runs its program at the beginning of a period and converts set points to counts with the nominal drums; its
+    drives move linearly until the end of the period; the true drums convert counts to cable. The inner control loops
+    act on the drum angles every millisecond, without the resolution of the encoders (nanometers), which only readings
+    have.
 
     Attributes:
-        robot: The robot as it is.
-        nominal: As it was planned.
+        robot: The true robot.
+        nominal: The planned robot.
         groups: The winches of each group, from 0.
-        period: Of controller and PLCs [s].
+        period: Period of controller and PLCs [s].
     """
 
     def __init__(
@@ -79,24 +80,24 @@ class Machine:
         damping: Damping | None = None,
         faults: str | Injected | Iterable[str | Injected] = (),
     ) -> None:
-        """Switch a machine on, its platform at rest, brakes on.
+        """Switch a machine on, with its platform at rest and its brakes on.
 
         Args:
-            robot: The robot as it is, with all that its winches and encoders need.
-            nominal: As it was planned, by which the PLCs count and limit; None: as it is. Between the `length_zero` of
-                the two lies the error of an encoder's zero; where one has none, there is no such error.
-            start: The pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
-                platform stands where the nominal lengths at that pose put it; what pulleys and dead cable of the true
-                robot add to them was not counted.
-            surveyed: Whether the true platform stood at that pose when the encoders were set.
-            seed: Of noise, clocks and the network.
-            period: Of controller and PLCs [s], of whole steps.
-            step: Of the plant [s].
-            delay: Of every message over `link`, each way [s].
-            jitter: On top of it, evenly up to this [s].
+            robot: The true robot, with all data of its winches and encoders.
+            nominal: The planned robot, with whose data the PLCs count and limit; None for the true one. The difference
+                of the two `length_zero` is the zero error of an encoder; without both of them there is none.
+            start: Pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
+                platform is where the nominal lengths at this pose put it; the lengths that pulleys and dead cable of
+                the true robot add are not counted.
+            surveyed: Whether the true platform was at this pose when the encoders were set.
+            seed: Seed of noise, clocks and the network.
+            period: Period of controller and PLCs [s], a whole multiple of the step.
+            step: Step of the simulation of the plant [s].
+            delay: Delay of every message over `link`, in each direction [s].
+            jitter: Largest additional delay, uniformly distributed [s].
             loss: Share of the messages that are lost.
-            damping: What takes energy out of the cables; None: a loss time of 1 ms, and air.
-            faults: What goes wrong, and when: texts as `fault` reads them, or what it makes of them; one, or several.
+            damping: Damping of the cables; None for a loss time of 1 ms, and air.
+            faults: One or several faults, as texts that `fault` reads, or as its results.
 
         Raises:
             InvalidValueError: If data are missing, the step is too coarse for the robot's modes, the robot does not
@@ -127,7 +128,7 @@ class Machine:
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
         self._group_rows = np.zeros((5, len(self.groups)), dtype=np.int64)
         self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)
-        self._reported: Any = None  # what was told last but for counters
+        self._reported: Any = None  # last report, without counters
         self._cycles = self._counter = 0
         self._links: list[MachineLink] = []
         self._schedule, self._commands = Schedule(), ""
@@ -138,11 +139,11 @@ class Machine:
         for one in _each_fault(faults):
             self.inject(one)
 
-    def _make_programs(self, limits: Limits) -> list[Program]:
+    def _make_programs(self, limits: PlcLimits) -> list[Program]:
         """Programs of the PLCs, each with the limits of its own winches."""
         programs, length = [], self._hardware.read[LENGTH].tolist()
         for part in self._parts:
-            program = Program(Limits(*(column[part] for column in limits)), self.period)
+            program = Program(PlcLimits(*(column[part] for column in limits)), self.period)
             program.length = length[part]
             programs.append(program)
         return programs
@@ -161,7 +162,7 @@ class Machine:
         """Link to the machine for a controller in this process.
 
         Args:
-            moves: Whether its exchanges move the machine on by a period each. Of several links one alone should.
+            moves: Whether its exchanges advance the machine by a period each. Of several links, only one should.
 
         Returns:
             The link: a `sagline.control.link.Link`.
@@ -171,26 +172,26 @@ class Machine:
         return link
 
     def claim(self, group: int, owner: int) -> None:
-        """Ask a PLC for its grant.
+        """Request the grant of a PLC.
 
         Args:
-            group: Which, from 0.
-            owner: Who asks; 0 for nobody.
+            group: Number of the group, from 0.
+            owner: Id of the controller; 0 for none.
 
         Raises:
-            InvalidValueError: If there is no such group, or the id is no whole number of 32 bits.
+            InvalidValueError: If there is no such group, or the id is not a whole number of 32 bits.
         """
         self.deliver(self._group(group), whole_number(owner, "owner", 0, LARGEST_ID))
 
     def take(self, group: int, command: Command) -> None:
-        """Give a PLC a command; it checks the counter and the owner.
+        """Send a command to a PLC, which checks its counter and its owner.
 
         Args:
-            group: Which, from 0.
-            command: Its arrays are of the group's winches only.
+            group: Number of the group, from 0.
+            command: Command whose arrays are of the group's winches only.
 
         Raises:
-            InvalidValueError: If there is no such group, or the command is none, or of other winches.
+            InvalidValueError: If there is no such group, or the command is of another type or of other winches.
         """
         chosen = self._group(group)
         count = len(self.groups[chosen])
@@ -208,8 +209,8 @@ class Machine:
         """Deliver a claim or a command to a PLC, unless a fault prevents it.
 
         Args:
-            group: Which, from 0.
-            message: The owner who claims, or a command.
+            group: Number of the group, from 0.
+            message: Id of the owner for a claim, or a command.
         """
         if self._schedule.waiting:
             self._apply_due_faults()
@@ -223,7 +224,7 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Simulate one period: faults that are due, the PLCs' scans, drives and plant, and the readings at its end."""
+        """Simulate one period: faults that are due, scans of the PLCs, drives and plant, and readings at its end."""
         now = self.time
         if self._schedule.waiting:
             self._apply_due_faults()
@@ -250,10 +251,10 @@ class Machine:
             length += program.length
             tension += program.tension
             powered += program.powered
-        hardware.go_on(length, tension, powered)
+        hardware.simulate_period(length, tension, powered)
 
-    def _written(self, before: Snapshot | None) -> Snapshot:
-        """Blocks of all groups; those of a stopped PLC stay as they were."""
+    def _written(self, before: PlcBlocks | None) -> PlcBlocks:
+        """Blocks of all groups; those of a stopped PLC do not change."""
         hardware, programs, groups = self._hardware, self._programs, self._group_rows
         self._counter = self._counter % COUNTERS + 1
         groups[COUNTER] = self._counter
@@ -266,7 +267,7 @@ class Machine:
             for program, part in zip(programs, self._parts, strict=True):
                 self._whole[STATE, part], self._whole[DRIVE_FAULT, part] = program.states(saturated[part])
         self._whole[COUNTS] = hardware.counts
-        new = Snapshot((hardware.read.copy(), self._whole.copy(), groups.copy(), self._clocks + self.time))
+        new = PlcBlocks((hardware.read.copy(), self._whole.copy(), groups.copy(), self._clocks + self.time))
         if before is not None and self._stopped:
             for group in self._stopped:
                 new.keep(group, self._parts[group], before)
@@ -276,10 +277,10 @@ class Machine:
         """Present block of a group.
 
         Args:
-            group: Which, from 0.
+            group: Number of the group, from 0.
 
         Returns:
-            The block; None where a fault keeps what was there before.
+            The block; None where a fault keeps the block before.
 
         Raises:
             InvalidValueError: If there is no such group.
@@ -290,16 +291,16 @@ class Machine:
             return None
         floats, whole, groups, clock = self._snapshot.arrays
         part = self._parts[group]
-        counter, *told = groups[:, group].tolist()
+        counter, *state = groups[:, group].tolist()
         again = counter % COUNTERS + 1 if how == "is torn" else counter
         rows: list[Any] = [*floats[:, part].tolist(), *whole[:, part].tolist()]
-        return Report(counter, again, how == "is foreign", float(clock[group]), *told, *rows)
+        return Report(counter, again, how == "is foreign", float(clock[group]), *state, *rows)
 
     def inject(self, what: str | Injected) -> None:
         """Inject a fault.
 
         Args:
-            what: A text as `fault` reads it, or what it makes of it. What should have begun already begins at once.
+            what: Text that `fault` reads, or its result. A fault whose time has passed begins at once.
 
         Raises:
             InvalidValueError: If there is no such fault, or the machine has no such part.
@@ -331,7 +332,7 @@ class Machine:
         elif item == "encoder":
             hardware.shift_encoder(which, value)
         elif item == "load":
-            hardware.load(value if begins else -value)
+            hardware.add_load(value if begins else -value)
         elif item == "emergency stop":
             self.emergency_stop()
         elif words == "trips":
@@ -363,7 +364,7 @@ class Machine:
 
 
 def _each_fault(faults: Any) -> Iterable[Any]:
-    """Iterable of faults; a single one may be given by itself."""
+    """Iterable of faults, of one or several."""
     if isinstance(faults, str | Injected):
         return (faults,)
     if isinstance(faults, Iterable):

@@ -21,10 +21,10 @@ from sagline.control.link import (
 )
 
 FOLLOWING: Final = 0.01  # m, between set point and encoder: the controller stops at half of it
-TINY: Final = 1e-9  # m and s: of rounding
-LEFT: Final = 0.1  # m: so much hanging cable there is at least
+TINY: Final = 1e-9  # m and s: rounding
+LEFT: Final = 0.1  # m: least free cable
 
-# plain numbers, which Python compares ten times as fast as members of an enumeration
+# plain numbers: Python compares them ten times as fast as members of an enumeration
 _EMERGENCY: Final = int(GroupStatus.EMERGENCY | GroupStatus.LOCKED | GroupStatus.BRAKED)
 _LOCKED: Final = int(GroupStatus.READY | GroupStatus.LOCKED | GroupStatus.BRAKED)
 _READY, _BRAKED, _RAMPING = int(GroupStatus.READY), int(GroupStatus.BRAKED), int(GroupStatus.RAMPING)
@@ -45,72 +45,72 @@ class Order(NamedTuple):
     enable: list[bool]
 
 
-class Limits(NamedTuple):
+class PlcLimits(NamedTuple):
     """Limits of the winches of a PLC."""
 
     least: list[float]  # shortest set points [m]
-    most: list[float]  # longest [m]
+    most: list[float]  # longest set points [m]
     speed: list[float]  # largest rates [m/s]
-    tension: list[float]  # largest at which cable is taken in, and that may be expected [N]
+    tension: list[float]  # largest tensions at which cable is wound in, and largest expected tensions [N]
 
 
 class Program:
     """Program of one group.
 
-    What it reads stands in `order`, `encoder` and `cell`; what it sets in the attributes below.
+    Its inputs are the command, the encoders and the load cells; its outputs are the attributes below.
 
     Attributes:
-        owner: Of the grant, 0 for nobody.
-        echo: Counter of the last command taken, 0 before the first.
-        fault: Reason why it acts by itself; a command to hold acknowledges it after the ramp, and 100 ms at least.
-        powered: Drives with power and without brake.
+        owner: Owner of the grant, 0 for none.
+        echo: Counter of the last accepted command, 0 before the first.
+        fault: Reason of an automatic stop; a command to hold acknowledges it after the ramp and at least 100 ms.
+        powered: Whether each drive has power and its brake is released.
         length: Set points at the end of the scan's period [m].
-        tension: Expected at the drums [N].
-        drive_fault: Codes of the drives, not 0 where one has tripped.
+        tension: Expected tensions at the drums [N].
+        drive_fault: Fault codes of the drives, 0 for none.
         emergency: Whether the emergency stop is pressed.
-        locked: Whether the drums are locked until the operator lets them go.
+        locked: Whether the drums are locked until the operator releases them.
     """
 
-    def __init__(self, limits: Limits, period: float) -> None:
+    def __init__(self, limits: PlcLimits, period: float) -> None:
         """Begin with brakes on and without owner; period of a scan [s]."""
         self.limits, self.period = limits, period
         count = len(limits.least)
         self.winches = range(count)
         self.owner, self.echo, self.fault = 0, 0, GroupFault.NONE
         self.powered = [False] * count
-        self._loaded = [False] * count  # which drives have taken up the tension
+        self._loaded = [False] * count  # whether each drive has built up its tension
         self.length, self.tension = [0.0] * count, [0.0] * count
         self.drive_fault = [0] * count
         self.emergency = self.locked = False
         self._order: Order | None = None
         self._fresh = False
         self._moved = -OWNER_TIMEOUT  # when the command counter moved last
-        self._asked = [0.0] * count  # set points of the last command, or where the drives stood
+        self._target = [0.0] * count  # set points of the last command, or lengths of the drives [m]
         self._rate = [0.0] * count
-        self._ramp = 0.0  # what is left of it [s]
-        self._left = 0.0  # of the cycle after a command, at whose end its set points are reached [s]
-        self._now = self._since = 0.0  # of this scan, and of that in which the fault came [s]
+        self._ramp = 0.0  # remaining time of the ramp [s]
+        self._left = 0.0  # remaining time of the cycle after a command, at whose end its set points are reached [s]
+        self._now = self._since = 0.0  # times of this scan, and of the scan of the fault [s]
         self._mode = _LEAVE
 
     def claim(self, owner: int, now: float) -> None:
-        """Give the grant, if it is free or its owner's counter has stood for OWNER_TIMEOUT; now [s]."""
+        """Grant ownership if it is free, or the owner's counter has not changed for OWNER_TIMEOUT; now [s]."""
         if owner > 0 and owner != self.owner and (not self.owner or now - self._moved >= OWNER_TIMEOUT - TINY):
             self.seize(owner, now)
 
     def seize(self, owner: int, now: float) -> None:
-        """Give the grant in any case."""
+        """Grant ownership in any case."""
         self.owner, self.echo, self._moved = owner, 0, now
         self._order, self._fresh = None, False
         if any(self._rate) and not self._ramp:
             self._stop(GroupFault.HEARTBEAT)
 
     def take(self, order: Order) -> None:
-        """Take a command, if it is the owner's and newer than the last one."""
+        """Accept a command if it is the owner's and newer than the last one."""
         if self.owner and order.owner == self.owner and (not self.echo or newer(order.counter, self.echo)):
             self.echo, self._order, self._fresh = order.counter, order, True
 
     def reset(self) -> None:
-        """Release the drums and clear the drives, as the operator of the machine does; brakes stay on for now."""
+        """Release the drums and clear the drive faults, as the operator does; the brakes stay on."""
         self.emergency = self.locked = False
         self.drive_fault = [0] * len(self.drive_fault)
         self.fault, self._order = GroupFault.NONE, None
@@ -123,7 +123,7 @@ class Program:
         self._brake()
 
     def trip(self, winch: int, code: int) -> None:
-        """Trip a drive: it has no power until the operator resets it."""
+        """Trip a drive; it has no power until the operator resets it."""
         self.drive_fault[winch], self.powered[winch] = code, False
         self._stop(GroupFault.DRIVE)
 
@@ -147,20 +147,20 @@ class Program:
             self._brake()
             return
         if self._lags(encoder):
-            if self.fault == GroupFault.FOLLOWING_ERROR:  # its set point was put where it stood: nothing holds it
+            if self.fault == GroupFault.FOLLOWING_ERROR:  # at its own position: it does not hold
                 self.locked = True
                 self._brake()
                 return
             self._move_to_drives(encoder, cell)
             self._stop(GroupFault.FOLLOWING_ERROR)
-            self.fault = GroupFault.FOLLOWING_ERROR  # whatever came before
+            self.fault = GroupFault.FOLLOWING_ERROR  # replaces an earlier fault
         if any(self.drive_fault):
             self.fault = self.fault or GroupFault.DRIVE
         elif fresh and order is not None and (not self.fault or (order.mode == _HOLD and self._was_reported)):
             self.fault = GroupFault.NONE
             if order.enable != self.powered:
                 self._switch(order, encoder)
-                waited = 0.0  # one that begins where it stands has no way to make up for
+                waited = 0.0  # a drive that starts at its position has no lag to make up for
             self._obey(order, waited, cell)
             return
         elif order is not None and waited >= min(HEARTBEAT, order.valid_for) - TINY:
@@ -181,7 +181,7 @@ class Program:
         return True
 
     def _move_to_drives(self, encoder: list[float], cell: list[float]) -> None:
-        """Move set points that are too far away to the drives, with the tensions that their cells read."""
+        """Move set points that are too far from their drives to them, with the tensions of the load cells."""
         read = self._valid_tensions([max(reading, 0.0) for reading in cell])
         self.length, self._rate, self.tension = list(self.length), list(self._rate), list(self.tension)
         for i in self.winches:
@@ -195,15 +195,15 @@ class Program:
         self._rate, self._ramp, self._mode = [0.0] * len(self._rate), 0.0, _LEAVE
 
     def _switch(self, order: Order, encoder: list[float]) -> None:
-        """Switch on the drives that may move, at their present lengths, and switch off the others.
+        """Switch on the enabled drives at their present lengths, and switch off the others.
 
-        A drive takes up the tension that is expected first; its brake goes with the next command.
+        A drive builds up the expected tension first; its brake is released with the next command.
         """
-        self.length, self._asked, self._rate = list(self.length), list(self._asked), list(self._rate)
+        self.length, self._target, self._rate = list(self.length), list(self._target), list(self._rate)
         for i in self.winches:
             has = order.enable[i] and (self.powered[i] or self._loaded[i])
             if has and not self.powered[i]:
-                self.length[i] = self._asked[i] = encoder[i]
+                self.length[i] = self._target[i] = encoder[i]
             if not has or not self.powered[i]:
                 self._rate[i] = 0.0
             self.powered[i] = has
@@ -214,7 +214,7 @@ class Program:
         if order.mode == _FOLLOW and any(self.powered):
             self._follow(order, waited, cell)
             return
-        known = self._valid_tensions(order.tension)  # a drive that holds goes on with what it has
+        known = self._valid_tensions(order.tension)  # a drive that holds keeps its tension
         self.tension = [old if has else new for has, old, new in zip(self.powered, self.tension, known, strict=True)]
         if self._mode == _FOLLOW and any(self._rate):
             self._ramp = RAMP
@@ -227,18 +227,18 @@ class Program:
         return [new if 0.0 <= new <= most and isfinite(new) else old for new, old, most in rows]
 
     def _follow(self, order: Order, waited: float, cell: list[float]) -> None:
-        """Take new set points, if lengths, steps, rates and tensions are within their limits."""
+        """Follow new set points, if lengths, steps, rates and tensions are within their limits."""
         least, most, speed, tightest = self.limits
-        lengths, rates, tensions, asked = order.length, order.rate, order.tension, self._asked
+        lengths, rates, tensions, before = order.length, order.rate, order.tension, self._target
         self._mode, self._ramp = _FOLLOW, 0.0
-        waited = max(waited, 0.0) + PERIOD  # one may have come late, and this one not
+        waited = max(waited, 0.0) + PERIOD  # the command before may have been late, and this one not
         for i in self.winches:
             length, fastest = lengths[i], speed[i]
             if self.powered[i]:
                 far = fastest * waited + TINY
                 if not (
                     least[i] <= length <= most[i]
-                    and -far <= length - asked[i] <= far
+                    and -far <= length - before[i] <= far
                     and -fastest - TINY <= rates[i] <= fastest + TINY
                     and 0.0 <= tensions[i] <= tightest[i]
                     and isfinite(tensions[i])
@@ -248,15 +248,15 @@ class Program:
                     return
             elif not 0.0 <= tensions[i] <= tightest[i]:
                 tensions = self._valid_tensions(tensions)
-        self.tension, self._asked, self._rate, self._left = tensions, lengths, rates, PERIOD
+        self.tension, self._target, self._rate, self._left = tensions, lengths, rates, PERIOD
         self._drive(cell)
 
     def _drive(self, cell: list[float]) -> None:
-        """Advance the set points by a scan, unless that would wind in a cable beyond its tension limit.
+        """Advance the set points by a scan, unless this winds in a cable beyond its tension limit.
 
-        They go straight to those of the last command, where they are a cycle after it, and then on at its rates.
+        They reach those of the last command linearly within one cycle, and continue at its rates.
         """
-        limit, length, powered, asked, rate = self.limits.tension, self.length, self.powered, self._asked, self._rate
+        limit, length, powered, target, rate = self.limits.tension, self.length, self.powered, self._target, self._rate
         left, period, moved = self._left, self.period, []
         beyond = max(period - left, 0.0)
         for i in self.winches:
@@ -265,10 +265,10 @@ class Program:
                 if left <= TINY:
                     at += rate[i] * period
                 elif left > period + TINY:
-                    at += (asked[i] - at) * period / left
+                    at += (target[i] - at) * period / left
                 else:
-                    at = asked[i] + rate[i] * beyond
-                if not cell[i] <= limit[i] and at < length[i]:  # no number is too much
+                    at = target[i] + rate[i] * beyond
+                if not cell[i] <= limit[i] and at < length[i]:  # NaN counts as too much
                     self._stop(GroupFault.OVER_TENSION)
                     self._slow_down(cell)
                     return
@@ -276,13 +276,13 @@ class Program:
         self.length, self._left = moved, max(left - period, 0.0)
 
     def _stop(self, fault: GroupFault) -> None:
-        """Begin to slow down and hold, because of a fault."""
+        """Begin to slow down and hold after a fault."""
         if not self.fault:
             self.fault, self._since = fault, self._now
             self._ramp = RAMP if any(self._rate) and not self._ramp else self._ramp
 
     def _slow_down(self, cell: list[float]) -> None:
-        """Lead the rates to zero linearly; a cable beyond its tension limit is not wound in."""
+        """Reduce the rates to zero linearly; a cable beyond its tension limit is not wound in."""
         if self._ramp <= 0.0:
             return
         share, period = self._ramp / RAMP, min(self.period, self._ramp)
@@ -292,7 +292,7 @@ class Program:
         for i in self.winches:
             if self.powered[i] and (cell[i] <= self.limits.tension[i] or self._rate[i] >= 0.0):
                 self.length[i] += self._rate[i] * mean
-        self._asked = list(self.length)
+        self._target = list(self.length)
         if not self._ramp:
             self._rate = [0.0] * len(self._rate)
 

@@ -1,4 +1,4 @@
-"""S7 servers of a twin, all in one process, with the same data blocks as its PLCs."""
+"""S7 servers of a twin in one process, with the same data blocks as its PLCs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Machine in real time behind servers of its own, for controllers in other processes."""
+"""Servers of a machine in real time, for controllers in other processes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sagline.twin.machine import Machine
 if TYPE_CHECKING:
     from sagline.dynamics.simulation.simulator import Reading
 
-SCAN: Final = 0.005  # s, of a twin's PLCs: half a cycle, so that none of a controller's meets the same block twice
+SCAN: Final = 0.005  # s, of a twin's PLCs: half a control cycle, so that no cycle reads the same block twice
 SILENT: Final = bytes(FROM_PLC.size)
 HALF: Final = 2**31
 MODES: Final = frozenset(Mode)
@@ -36,7 +36,7 @@ ROWS: Final = ("length", "rate", "torque", "tension", "filtered", "counts", "sta
 
 
 class Server:
-    """PLCs of a machine, each at an address of its own; the plant runs in real time.
+    """PLCs of a machine, each with its own address; the plant runs in real time.
 
     Attributes:
         machine: The machine.
@@ -51,20 +51,20 @@ class Server:
         """Start the servers.
 
         Args:
-            machine: What stands behind the PLCs; its period is that of their scans.
-            host: Address to listen at; this machine only, unless told otherwise.
-            port: Of the first group, the others follow; 0: any that are free.
-            modbus: Whether they speak Modbus TCP instead of S7.
+            machine: Machine of the PLCs; its period is that of their scans.
+            host: Address to listen at; by default this computer only.
+            port: Port of the first group; the others follow. 0 for any that are free.
+            modbus: Whether the servers use Modbus TCP instead of S7.
 
         Raises:
-            InvalidValueError: If a port is in use, or the address is none of this machine.
+            InvalidValueError: If a port is in use, or the address is not one of this computer.
             FileError: If the package for it is not installed.
         """
         self.machine = instance(machine, Machine, "machine")
         place, first_port = instance(host, str, "host"), whole_number(port, "port", 0, LAST_PORT)
         self._pace = Pace(machine.period)
         self._groups = range(len(machine.groups))
-        self._seen = [b""] * len(machine.groups)  # commands that were looked at
+        self._seen = [b""] * len(machine.groups)  # last commands that were read
         first = [self._block(group) or SILENT for group in self._groups]
         self._servers = _block_servers(first, place, first_port, instance(modbus, bool, "modbus"))
         self.addresses = self._servers.addresses
@@ -78,7 +78,8 @@ class Server:
         """Serve until interrupted.
 
         Args:
-            watch: Told after every scan what is true: the machine's time [s], and a reading that the next one replaces.
+            watch: Function of the machine's time [s] and of the true state, called after every scan; the next scan
+                overwrites the state.
         """
         while True:
             self._pace.wait()
@@ -92,7 +93,7 @@ class Server:
             asked = CLAIM.read(claim)
             if not isinstance(asked, Refusal):
                 self.machine.claim(group, asked["owner"])
-            if command != self._seen[group]:  # what stood there before its owner had the grant is history
+            if command != self._seen[group]:  # a command from before the grant is ignored
                 self._seen[group] = command
                 order = self._command(group, command)
                 if order is not None:
@@ -105,7 +106,7 @@ class Server:
         self._servers.close()
 
     def _command(self, group: int, data: bytes) -> Command | None:
-        """Command in DB102; None where it is none, or torn."""
+        """Command in DB102; None if it is empty or torn."""
         values = TO_PLC.read(data)
         if isinstance(values, Refusal):
             return None
@@ -146,7 +147,7 @@ def block_of(group: int, report: Report) -> bytes:
     }
     if report.foreign:
         head["magic"] = 0
-    counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # a PLC's begin again, too
+    counts = [(count + HALF) % (2 * HALF) - HALF for count in report.counts]  # the counters of a PLC overflow too
     columns: list[list[Any]] = [*report[8:13], counts, report.state, report.winch_fault]
     return FROM_PLC.pack(head | winch_rows(ROWS, columns))
 
@@ -169,7 +170,7 @@ class RemoteMachine(NamedTuple):
     """Machine in another process."""
 
     addresses: tuple[str, ...]  # "host:port" of each group's PLC
-    place: Any  # shared with it: the true position of the platform's origin [m]
+    place: Any  # shared memory with the true position of the platform's origin [m]
 
     def position(self) -> Array:
         """Position of the platform's origin after the last scan [m], shape (3,)."""
@@ -202,8 +203,8 @@ def _receive_addresses(pipe: Connection) -> tuple[str, ...]:
         return answer
     if answer is not None:
         raise answer
-    step = "Try again; or in this process."
-    raise InvalidValueError("the twin's process", "gone, or silent for a minute", "one that answers", step)
+    step = "Try again, or use this process."
+    raise InvalidValueError("the twin's process", "not running, or silent for a minute", "one that answers", step)
 
 
 def _serve(robot: Robot, nominal: Robot, start: Pose, seed: int, pipe: Connection, place: Any) -> None:

@@ -22,7 +22,7 @@ from sagline.robot.drum import drum_lever, drums_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.twin.plc_program import LEFT, Limits
+from sagline.twin.plc_program import LEFT, PlcLimits
 
 
 class EncoderScale:
@@ -45,7 +45,7 @@ class EncoderScale:
         if winch.groove_pitch is not None and robot.cables.diameter is not None:
             drums = drums_of(robot)
             self._drums = (drums.table, drums.starts)
-            self._stretch, self._each, self._room = stretch, each, np.empty((3, 1, robot.cable_count))
+            self._stretch, self._each, self._work = stretch, each, np.empty((3, 1, robot.cable_count))
             self._at_no_turns = counts + each * drums.turns((length * stretch)[None])[0][0]
         else:
             self._at_no_length = counts - length * self.per_meter
@@ -55,7 +55,7 @@ class EncoderScale:
         if self._drums is None:
             found: Array = length * self.per_meter + self._at_no_length
             return found
-        path, turns, travel = self._room
+        path, turns, travel = self._work
         np.multiply(length, self._stretch, out=path[0])
         turns_of_lengths(*self._drums, path, turns, travel)
         found = self._at_no_turns - turns[0] * self._each
@@ -66,28 +66,28 @@ class EncoderScale:
         if self._drums is None:
             found: Array = (counts - self._at_no_length) / self.per_meter
             return found
-        path, turns, _ = self._room
+        path, turns, _ = self._work
         np.divide(self._at_no_turns - counts, self._each, out=turns[0])
         lengths_of_turns(*self._drums, turns, path)
         found = path[0] / self._stretch
         return found
 
 
-SHARE: Final = 0.2  # radians of the highest mode in a step
-NEAR: Final = 1e-6  # of a period: so far may it be from whole steps
-REACH: Final = 2.0  # of the largest distance between frame anchors: no cable is longer, where cable_length is not known
+SHARE: Final = 0.2  # rad: largest phase of the highest mode in a step
+NEAR: Final = 1e-6  # of a period: largest deviation from whole steps
+REACH: Final = 2.0  # of the largest distance between frame anchors: longest cable, where cable_length is not known
 
 
 class Start(NamedTuple):
     """Machine before it is switched on."""
 
-    state: Equilibrium  # the true robot at rest
+    state: Equilibrium  # of the true robot
     nominal: EncoderScale  # scale of the encoders in the PLCs
     true: EncoderScale  # true scale
 
 
 def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
-    """True equilibrium at the start, and the encoder scales there."""
+    """True equilibrium at the start, and encoder scales there."""
     pose = start_pose(nominal, start)
     plan = inverse(nominal, pose)
     planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
@@ -101,25 +101,26 @@ def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> St
         state = inverse(true, pose).state
         _feasible_lengths(state.unstrained_length, true, "start")
     else:
-        state = _rest_at(true, planned + _uncounted_length(true, nominal, pose) + _zero_errors(true, nominal), pose)
+        routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # on pulleys and dead cable, not counted
+        state = _rest_at(true, planned + routed + _zero_errors(true, nominal), pose)
     return Start(state, scale, EncoderScale(true, state.unstrained_length, counts))
 
 
 def start_pose(robot: Robot, start: Any) -> Pose:
-    """Pose at which encoders are set; by default the middle of the robot's test_box, level."""
+    """Pose at which encoders are set; by default the middle of the robot's test_box, without rotation."""
     pose = optional(start, Pose, "start")
     if pose is not None:
         if pose.shape:
             raise InvalidValueError("start", f"a batch of {len(pose)}", "a single pose", "Give one of them: start[0].")
         return pose
     if robot.test_box is None:
-        allowed = f"a pose: {robot.name} has no test_box, whose middle it would be"
-        step = "Give that at which encoders are set: start=Pose.from_euler([0, 0, 1.5], 0, 0, 0)."
+        allowed = f"a pose, because {robot.name} has no test_box"
+        step = "Give the pose at which encoders are set: start=Pose.from_euler([0, 0, 1.5], 0, 0, 0)."
         raise InvalidValueError("start", "not given", allowed, step)
     return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
 
 
-def limits_of(robot: Robot, scale: EncoderScale) -> Limits:
+def limits_of(robot: Robot, scale: EncoderScale) -> PlcLimits:
     """Limits of a robot's winches in the PLCs, each one list over all winches."""
     winch, anchors = robot.winches, robot.frame_anchors
     assert winch is not None
@@ -130,7 +131,7 @@ def limits_of(robot: Robot, scale: EncoderScale) -> Limits:
     if winch.speed_limit is not None and winch.counts_per_turn is not None:
         speed = winch.speed_limit * winch.counts_per_turn / (2.0 * math.pi * np.abs(scale.per_meter))
     tension = robot.tension_max + np.zeros(robot.cable_count)
-    return Limits(*(column.tolist() for column in (dead + LEFT, most, speed, tension)))
+    return PlcLimits(*(column.tolist() for column in (dead + LEFT, most, speed, tension)))
 
 
 def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> None:
@@ -154,8 +155,8 @@ def check_step(robot: Robot, state: Equilibrium, step: float, period: float) -> 
 
 def _feasible_lengths(length: Array, robot: Robot, item: str) -> Array:
     if np.isnan(length).any():
-        allowed = f"one that {robot.name} can hold within its tension limits"
-        raise InvalidValueError(item, "a pose without an answer", allowed, "Give another pose as start.")
+        allowed = f"a pose that {robot.name} can hold within its tension limits"
+        raise InvalidValueError(item, "a pose that is not feasible", allowed, "Give another pose as start.")
     return length
 
 
@@ -164,8 +165,8 @@ def _rest_at(robot: Robot, length: Array, pose: Pose) -> Equilibrium:
     dead = dead_cable(robot) + np.zeros(robot.cable_count)
     found = forward(robot, length, start=pose) if (length > dead).all() else None
     if found is None or not found.stable:
-        allowed, step = "one that hangs at rest there", "Change it by less, or give surveyed=True."
-        raise InvalidValueError("robot", "one that does not rest on the nominal lengths", allowed, step)
+        allowed, step = "a robot in equilibrium near the start", "Change it by less, or give surveyed=True."
+        raise InvalidValueError("robot", "one without equilibrium at the nominal lengths", allowed, step)
     return found.state
 
 
@@ -179,19 +180,15 @@ def _zero_errors(true: Robot, nominal: Robot) -> Array:
     return error
 
 
-def _uncounted_length(true: Robot, nominal: Robot, pose: Pose) -> Array:
-    """Length on pulleys and dead cable of the true robot beyond the nominal robot's [m], (m,)."""
-    return _routed_length(true, pose) - _routed_length(nominal, pose)
-
-
 def _routed_length(robot: Robot, pose: Pose) -> Array:
+    """Length on pulleys and dead cable [m], (m,)."""
     if robot.winches is None or not robot.winches.anything_behind:
         return np.zeros(robot.cable_count)
     whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))
     return _feasible_lengths(whole - bare, robot, "start")
 
 
-def plc_limits(robot: Robot) -> Limits:
+def plc_limits(robot: Robot) -> PlcLimits:
     """Limits of a robot's winches in the PLCs, each one list over all winches."""
     planned = _feasible_lengths(inverse(robot, start_pose(robot, None)).unstrained_length, robot, "test_box")
     return limits_of(robot, EncoderScale(robot, planned, np.zeros(robot.cable_count)))

@@ -19,7 +19,7 @@ from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
 
-class Reading(Enum):
+class Computation(Enum):
     """Readings whose kernels may still be compiled when the cables are drawn first."""
 
     MARGIN = "capacity margin"

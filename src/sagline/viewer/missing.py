@@ -44,7 +44,7 @@ class AtLimit(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Missing:
+class MissingWrench:
     """Smallest wrench with which a pose is feasible, a force alone where one suffices."""
 
     wrench: Array  # about the center of mass, world axes [N, N m], shape (6,)
@@ -62,7 +62,7 @@ class Missing:
         return self.wrench[3:]
 
 
-def missing_of(snapshot: Snapshot) -> Missing | None:
+def missing_of(snapshot: Snapshot) -> MissingWrench | None:
     """Missing wrench of an infeasible pose; None where another reason holds, or none was found."""
     plan = snapshot.plan
     if plan is None or snapshot.status not in _EXPLAINED:
@@ -76,7 +76,7 @@ def missing_of(snapshot: Snapshot) -> Missing | None:
             wrench = locked(state.wrench + missing)
             held = inverse(robot, snapshot.pose, state.cables.model, MinimumNorm(), wrench)
             if held.feasible:
-                return Missing(locked(missing), held.state, _limits(plan, held))
+                return MissingWrench(locked(missing), held.state, _limits(plan, held))
     except SaglineError:
         return None
     return None

@@ -24,8 +24,8 @@ from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
 from sagline.viewer import readout, shapes
 from sagline.viewer.camera import Framing
-from sagline.viewer.feature import Feature, Reading, View
-from sagline.viewer.panel import Panel
+from sagline.viewer.feature import Computation, Feature, View
+from sagline.viewer.panel import ControlPanel
 from sagline.viewer.player import Beside, Configuration, InMotion, Played, Player
 from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
 from sagline.viewer.server import Channel
@@ -93,7 +93,7 @@ class Page:
         features: Sequence[Callable[[Page], Feature | None]],
         robot: Robot,
         played: Played | None = None,
-        ready: Callable[[Reading], bool] = lambda _: True,
+        ready: Callable[[Computation], bool] = lambda _: True,
         wrench: Array | None = None,
         pose: Pose | None = None,
         mode: str = "",
@@ -112,7 +112,7 @@ class Page:
         server.on_client_disconnect(self.channel.disconnect)
         home = home_pose(robot) if played is None else played.home
         self.home = home if pose is None else pose
-        self.panel = Panel(server, robot, self.scale, self.refresh, lambda: self.later(self._forget))
+        self.panel = ControlPanel(server, robot, self.scale, self.refresh, lambda: self.later(self._forget))
         self.scene = RobotScene(server.scene, robot, self.home)
         self.extent = self.scene.extent(self.home)
         self.framing = Framing(server, *self.extent)
@@ -259,7 +259,7 @@ class Page:
     def _from_gizmo(self, settings: Settings) -> Snapshot:
         if self._changed is None or self._changed[0] != settings.changes:
             self._changed = (settings.changes, settings.applied(self.robot))
-        robot, pose, confirmed = self._changed[1], self.scene.dragged_pose(), self.ready(Reading.REST)
+        robot, pose, confirmed = self._changed[1], self.scene.dragged_pose(), self.ready(Computation.REST)
         snapshot = taken_at(robot, pose, settings, self._previous, confirmed=confirmed, wrench=self.wrench)
         if not depends_on_history(settings.tension):
             self._forget()  # the tensions of another method are no history
@@ -291,8 +291,8 @@ class Page:
         """Verdict and numbers."""
         if isinstance(snapshot, InMotion):
             return snapshot.verdict, snapshot.numbers(self.scale)
-        verdict, held = readout.verdict(snapshot, capacity=self.ready(Reading.MARGIN)), snapshot.feasible
-        if not self.ready(Reading.FREQUENCIES):
+        verdict, held = readout.verdict(snapshot, capacity=self.ready(Computation.MARGIN)), snapshot.feasible
+        if not self.ready(Computation.FREQUENCIES):
             return verdict, readout.numbers(snapshot, self.scale, None, frequencies_later=held)
         frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and held else None
         return verdict, readout.numbers(snapshot, self.scale, frequencies)

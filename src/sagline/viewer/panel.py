@@ -20,7 +20,7 @@ LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # px
 _LIGHTEST, _HEAVIEST = 0.1, 4.0  # of the robot's own mass
 
 
-class Panel:
+class ControlPanel:
     """Sliders, choices and readings. Reading a value twice is free; nothing here calls back but `changed`."""
 
     def __init__(

@@ -21,7 +21,15 @@ from sagline.viewer.readout import box, definitions
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import ForceUnit, force_unit, number
-from sagline.viewer.timeline import Chart, Mark, Track, cable_names, infeasible_spans, limit_violations, tension_limits
+from sagline.viewer.timeline import (
+    Chart,
+    TimelineMark,
+    Track,
+    cable_names,
+    infeasible_spans,
+    limit_violations,
+    tension_limits,
+)
 
 CABLES: Final = {
     "none": "massless cables",
@@ -39,7 +47,7 @@ def event_text(event: Occurrence, unit: ForceUnit) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Run:
+class PlayedPlan:
     """A plan of N poses, with the poses confirmed by forward kinematics."""
 
     plan: Plan
@@ -50,7 +58,7 @@ class Run:
     unchanged = "A run keeps its robot and loads; drag the platform to change them."
 
     @classmethod
-    def of(cls, plan: Plan, progress: Progress | None = None) -> Run:
+    def of(cls, plan: Plan, progress: Progress | None = None) -> PlayedPlan:
         """The run of a plan."""
         if not plan.state.pose.shape:
             raise InvalidValueError(
@@ -125,7 +133,7 @@ FAILURES: Final = ("break", "stall", "slack", "saturate")  # kinds of events
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Playback:
+class PlayedSimulation:
     """A simulation of N samples, from time 0 on."""
 
     simulation: Simulation
@@ -216,7 +224,8 @@ class Playback:
         )
         began = float(simulation.time[0])
         marks = tuple(
-            Mark(event.time - began, event_text(event, unit), bad=event.kind in FAILURES) for event in simulation.events
+            TimelineMark(event.time - began, event_text(event, unit), bad=event.kind in FAILURES)
+            for event in simulation.events
         )
         spans = limit_violations(robot, self.time, tension_rows, unit)
         return Track(self.time, (tension, away), spans, marks, (("actual", ACTUAL),))

@@ -96,11 +96,11 @@ def _serving_our_page(title: str) -> Iterator[None]:
         infra.WebsockServer = _STOCK  # type: ignore[misc]
 
 
-_running: list[Server] = []
+_running: list[PageServer] = []
 _quiet_process = ExitStack()  # silences logging of the whole process while any server runs
 
 
-class Server(viser.ViserServer):
+class PageServer(viser.ViserServer):
     """A viser server with our page; no page can ask it to open a tunnel to the internet."""
 
     def __init__(self, host: str, port: int, title: str) -> None:
@@ -113,7 +113,7 @@ class Server(viser.ViserServer):
         return None
 
 
-def start_server(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> Server:
+def start_server(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> PageServer:
     """Start a server at an address ("0.0.0.0" is every one) and a port (0 for any that is free).
 
     Raises:
@@ -125,14 +125,14 @@ def start_server(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> S
         if not _running:
             quiet.enter_context(_quiet())
         with redirect_stdout(StringIO()):
-            server = Server(host, port, title)
+            server = PageServer(host, port, title)
         _running.append(server)
         _quiet_process.push(quiet.pop_all())
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     return server
 
 
-def stop_server(server: Server) -> None:
+def stop_server(server: PageServer) -> None:
     """Stop a server and its threads; after the last one, logging and warnings are restored."""
     with redirect_stdout(StringIO()):
         server.stop()
@@ -141,7 +141,7 @@ def stop_server(server: Server) -> None:
         _quiet_process.close()
 
 
-def url(server: Server, host: str) -> str:
+def url(server: PageServer, host: str) -> str:
     """The address to open in a browser on this machine."""
     shown = "localhost" if host in ("0.0.0.0", "::", "") else f"[{host}]" if ":" in host else host
     return f"http://{shown}:{server.get_port()}"

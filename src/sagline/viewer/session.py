@@ -23,7 +23,16 @@ from sagline.viewer.player import InMotion
 from sagline.viewer.readout import box, definitions
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
 from sagline.viewer.tension_scale import force_unit, number
-from sagline.viewer.timeline import Chart, Mark, Span, Track, cable_names, limit_violations, spans_of, tension_limits
+from sagline.viewer.timeline import (
+    Chart,
+    Span,
+    TimelineMark,
+    Track,
+    cable_names,
+    limit_violations,
+    spans_of,
+    tension_limits,
+)
 
 PER_METER = 1e3  # mm
 MOST_EVENTS = 8  # that are listed, the newest
@@ -32,7 +41,7 @@ WRONG = (State.FAULT, State.EMERGENCY)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Session:
+class PlayedLog:
     """N cycles of a controller, from time 0 on."""
 
     robot: Robot
@@ -170,7 +179,7 @@ class Session:
             charts.append(Chart("True less planned", "mm", 2, axes, off(self.true, self.planned)))
             paths.append(("true", TRUTH))
         marks = tuple(
-            Mark(event.time - self.began, f"{event.name}: {event.text}", bad=event.kind is EventKind.FAULT)
+            TimelineMark(event.time - self.began, f"{event.name}: {event.text}", bad=event.kind is EventKind.FAULT)
             for event in self.events
         )
         return Track(self.time, tuple(charts), self._wrong(), marks, tuple(paths))
@@ -206,7 +215,7 @@ class LogFollower:
         """The robot of the log; None until it was read."""
         return self._reader.log.robot
 
-    def more(self) -> Session | None:
+    def more(self) -> PlayedLog | None:
         """Read what is new; the whole session, None if nothing is new, or nothing is there."""
         grown = self._reader.more()
         if self._truth is not None and self._truth.more():
@@ -237,13 +246,13 @@ class LogFollower:
             self._plans[number] = time, np.atleast_2d(pose.position), np.atleast_2d(pose.quaternion)
         return self._plans[number]
 
-    def _session(self, robot: Robot) -> Session:
+    def _session(self, robot: Robot) -> PlayedLog:
         whole = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         stamp, began = whole.pop("stamp"), float(whole["time"][0])
         true, turned = self._true(stamp)
         whole["time"] = np.round(whole["time"] - began, 9)  # 0.3 and not less: who asks for 0.3 s means this cycle
         events = tuple(self.log.events)
-        return Session(robot=robot, began=began, true=true, true_quaternion=turned, events=events, **whole)
+        return PlayedLog(robot=robot, began=began, true=true, true_quaternion=turned, events=events, **whole)
 
     def _true(self, stamp: Any) -> tuple[Array | None, Array | None]:
         truth = [] if self._truth is None else self._truth.log.truth

@@ -22,7 +22,7 @@ COLORS: Final = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794
 _ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 
 
-class Limit(NamedTuple):
+class ChartLimit(NamedTuple):
     """A limit of a chart."""
 
     value: float  # value, in the unit of the chart
@@ -38,7 +38,7 @@ class Span(NamedTuple):
     why: str  # reason
 
 
-class Mark(NamedTuple):
+class TimelineMark(NamedTuple):
     """An event."""
 
     time: float  # time [s]
@@ -56,7 +56,7 @@ class Chart:
     names: tuple[str, ...]  # names of the lines: numbers of cables, or axes
     # function that returns the values of some samples, shape (n, k); NaN where there is none
     values: Callable[[slice], Array]
-    limits: tuple[Limit, ...] = ()  # limits of the values
+    limits: tuple[ChartLimit, ...] = ()  # limits of the values
 
     @property
     def of_cables(self) -> bool:
@@ -71,7 +71,7 @@ class Track:
     time: Array  # times of the samples [s], from 0 on, shape (N,)
     charts: tuple[Chart, ...]  # charts, tensions first
     spans: tuple[Span, ...] = ()  # spans, in order
-    marks: tuple[Mark, ...] = ()  # marks, in order
+    marks: tuple[TimelineMark, ...] = ()  # marks, in order
     # names and colors of the paths that are drawn in the scene
     paths: tuple[tuple[str, tuple[int, int, int]], ...] = ()
 
@@ -91,12 +91,12 @@ def cable_names(robot: Robot) -> tuple[str, ...]:
     return tuple(map(str, range(robot.cable_count)))
 
 
-def tension_limits(robot: Robot, newtons: float, *, at: str) -> tuple[Limit, ...]:
+def tension_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, ...]:
     """The tension limits; where they differ between cables, the tightest."""
     low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
-    lower = (Limit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
-    upper = (Limit(high / newtons, f"highest allowed{other}", upper=True),) if isfinite(high) else ()
+    lower = (ChartLimit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
+    upper = (ChartLimit(high / newtons, f"highest allowed{other}", upper=True),) if isfinite(high) else ()
     return lower + upper
 
 
@@ -219,7 +219,7 @@ def _matching(track: Track, wanted: Chart, chart: int) -> Chart:
 
 
 def _track_message(
-    name: str, track: Track, chart: Chart, part: Columns, near: Sequence[Limit], *, first: bool
+    name: str, track: Track, chart: Chart, part: Columns, near: Sequence[ChartLimit], *, first: bool
 ) -> dict[str, Any]:
     digits = chart.decimals + 1
     far = [f"{limit.name} {limit.value:g} {chart.unit}" for limit in chart.limits if limit not in near]
@@ -249,7 +249,7 @@ def _most_important(track: Track) -> list[Any]:
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)
 
 
-def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, float, list[Limit]]:
+def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, float, list[ChartLimit]]:
     """Lowest and highest value of the axis, and the limits that lie on it."""
     ends = [_extent(part) for part in parts]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)

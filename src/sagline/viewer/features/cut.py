@@ -18,9 +18,9 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.viewer import shapes
 from sagline.viewer.camera import camera_of, nearest_line, screen_point
-from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
+from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.playback import Playback
+from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.player import PlayerState
 from sagline.viewer.readout import box, definitions, refused, sentence
 from sagline.viewer.robot_scene import Nodes
@@ -157,7 +157,7 @@ class CutFeature(Feature):
         if state is None or view is None:
             self._text.content = sentence("A cable is cut at rest, where the platform is held: drag it there first.")
             return
-        if not self._page.ready(Reading.SIMULATION):
+        if not self._page.ready(Computation.SIMULATION):
             self._text.content = sentence("The simulation is still being compiled.")
             return
         cable, cable_mass = self._chosen, CABLE_MASS.get(self._mass.value, "none")
@@ -200,11 +200,11 @@ class CutFeature(Feature):
         if self._playing == number:
             if self._player.number != self._number:
                 return  # something else is played now
-            self._player.grow(Playback(simulation))
+            self._player.grow(PlayedSimulation(simulation))
         else:
             self._playing, self._is_marked = number, False
             self._before.append(before)
-            self._player.play(Playback(simulation), at_once=True)
+            self._player.play(PlayedSimulation(simulation), at_once=True)
             self._number = self._player.number
             self._undo.visible = True
         whole = float(simulation.time[-1] - simulation.time[0]) >= DURATION - simulation.step

@@ -14,9 +14,9 @@ from sagline.core.numbers import n
 from sagline.kinematics.status import PoseStatus
 from sagline.tension.singular import unresisted_motion
 from sagline.viewer import shapes
-from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
+from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.features.tensions import SHARING
-from sagline.viewer.missing import Missing, NearestFeasible, missing_of, nearest_feasible
+from sagline.viewer.missing import MissingWrench, NearestFeasible, missing_of, nearest_feasible
 from sagline.viewer.page import Page
 from sagline.viewer.readout import block, definitions
 from sagline.viewer.robot_scene import INFEASIBLE, Nodes
@@ -30,7 +30,7 @@ OTHERWISE: Final = "AnalyticCenter"  # finds tensions wherever there are any
 
 
 def explanation(
-    snapshot: Snapshot, missing: Missing | None, nearest: NearestFeasible | None, *, searching: bool
+    snapshot: Snapshot, missing: MissingWrench | None, nearest: NearestFeasible | None, *, searching: bool
 ) -> str:
     """HTML: the missing force, the cables at limits, and the nearest feasible pose with a button to go there."""
     rows = _missing_rows(snapshot, missing) if missing is not None else _other_rows(snapshot)
@@ -51,13 +51,13 @@ def distance_of(nearest: NearestFeasible) -> str:
     return n(nearest.distance, ".3g", "m")
 
 
-def missing_label(missing: Missing, unit: ForceUnit) -> str:
+def missing_label(missing: MissingWrench, unit: ForceUnit) -> str:
     """Label of the arrow."""
     text = f"{unit.written(float(np.linalg.norm(missing.force)))} missing"
     return text + (f", and {_moment(missing)}" if _has_moment(missing) else "")
 
 
-def _missing_rows(snapshot: Snapshot, missing: Missing) -> list[tuple[str, str]]:
+def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str, str]]:
     unit = force_unit(snapshot.robot)
     parts = ", ".join(unit.bare(part) for part in missing.force)
     size = unit.written(float(np.linalg.norm(missing.force)))
@@ -92,11 +92,11 @@ def _other_rows(snapshot: Snapshot) -> list[tuple[str, str]]:
     return []
 
 
-def _has_moment(missing: Missing) -> bool:
+def _has_moment(missing: MissingWrench) -> bool:
     return bool(np.linalg.norm(missing.moment) > NEGLIGIBLE * np.linalg.norm(missing.force))
 
 
-def _moment(missing: Missing) -> str:
+def _moment(missing: MissingWrench) -> str:
     return n(float(np.linalg.norm(missing.moment)), ".4g", "N m")
 
 
@@ -118,7 +118,7 @@ class MissingFeature(Feature):
         self._page, self._panel, self._nodes = page, page.panel, Nodes(page.server.scene)
         self._body = shapes.platform(page.robot)
         self._task = BackgroundTask(page.later)
-        self.missing: Missing | None = None  # at the pose that is shown
+        self.missing: MissingWrench | None = None  # at the pose that is shown
         self._key: Key = ()  # of the pose that is shown; () while it is feasible
         self._found: tuple[Key, NearestFeasible | None] = ((), None)
         self._shown: tuple[Snapshot, View] | None = None
@@ -145,7 +145,7 @@ class MissingFeature(Feature):
         pose = snapshot.pose
         self._key = (id(snapshot.robot), type(model), pose.position.tobytes(), pose.quaternion.tobytes(), load)
         self._shown = snapshot, view
-        if self._page.ready(Reading.WORKSPACE) and not self._task.busy and self._found[0] != self._key:
+        if self._page.ready(Computation.WORKSPACE) and not self._task.busy and self._found[0] != self._key:
             self._search()
         self._explain()
 
@@ -182,7 +182,7 @@ class MissingFeature(Feature):
         ends = np.stack((snapshot.pose.position, nearest.pose.position))[None]
         nodes.lines("/nearest_way", shapes.segments(shapes.straight(ends), dashed=True), FEASIBLE, LINE_WIDTH)
 
-    def _draw_force(self, snapshot: Snapshot, missing: Missing | None) -> None:
+    def _draw_force(self, snapshot: Snapshot, missing: MissingWrench | None) -> None:
         """Draw the missing force at the center of mass."""
         size = 0.0 if missing is None else float(np.linalg.norm(missing.force))
         if missing is None or size == 0.0:
@@ -193,7 +193,7 @@ class MissingFeature(Feature):
         self._nodes.arrows("/missing", np.stack((start, tip))[None], INFEASIBLE, *(_ARROW * self._page.size))
         self._nodes.label("/missing_name", missing_label(missing, force_unit(snapshot.robot)), tip)
 
-    def _draw_limits(self, snapshot: Snapshot, missing: Missing | None) -> None:
+    def _draw_limits(self, snapshot: Snapshot, missing: MissingWrench | None) -> None:
         """Draw the cables at limits in the colors of these tensions, with their names."""
         nodes, scale = self._nodes, self._page.scale
         limits = () if missing is None else missing.limits

@@ -16,7 +16,7 @@ from sagline.dynamics.vibration.mode_list import MASSLESS, ListedMode, listed_mo
 from sagline.dynamics.vibration.response import MOTIONS, ResponseCurves, response_curves
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
 from sagline.robot.equilibrium import Equilibrium
-from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
+from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import block, refused, sentence, waiting
@@ -225,7 +225,7 @@ class ModesFeature(Feature):
         snapshot, settings = view.snapshot, view.settings
         if isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
             return None, None
-        if view.playing or not self._ready(Reading.MODES):
+        if view.playing or not self._ready(Computation.MODES):
             return None, None
         place = snapshot.pose.position.tobytes() + snapshot.pose.quaternion.tobytes()
         return snapshot.plan.state, (place, settings.changes, settings.model, settings.tension, id(view.played))

@@ -15,7 +15,7 @@ from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer import shapes
 from sagline.viewer.camera import Camera, camera_of, ray_distance, screen_point
-from sagline.viewer.feature import Feature, Reading, View
+from sagline.viewer.feature import Computation, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, Reserve, push_response, semi_axes
 from sagline.viewer.readout import LATER, box, definitions, refused, sentence
@@ -152,11 +152,11 @@ class PushFeature(Feature):
             self._show_none("")
         elif state is None:
             self._show_none(sentence("A push is answered where the platform is held at rest."))
-        elif not ready(Reading.REST) or not ready(Reading.FREQUENCIES):
+        elif not ready(Computation.REST) or not ready(Computation.FREQUENCIES):
             late = "A push is answered as soon as forward kinematics and stiffness are compiled."
             self._show_none(sentence(late))
         else:
-            response = push_response(state, push, redistribution=ready(Reading.VERDICTS))
+            response = push_response(state, push, redistribution=ready(Computation.VERDICTS))
             drawn_for = None
             if self._ellipsoid.value and np.isfinite(response.compliance).all():
                 drawn_for = readable(semi_axes(response.compliance)[0], LARGE * self._size)

@@ -12,7 +12,7 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.feature import BackgroundTask, Feature, Reading, View
+from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import LATER, block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
@@ -140,7 +140,7 @@ class RegionFeature(Feature):
     def follow(self, view: View) -> None:
         """Draw the workspace at the orientation that is shown."""
         self._arrange()
-        if not self._ready(Reading.WORKSPACE):
+        if not self._ready(Computation.WORKSPACE):
             if self._anything:
                 self._hull_html.content = sentence(LATER.capitalize())
             return

@@ -20,7 +20,7 @@ from sagline.tension.method import kernel_options, takes_default_kernel
 from sagline.tension.methods import MinimumNorm
 from sagline.tension.polygon import TensionPolygon
 from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
-from sagline.viewer.feature import Feature, Reading, View
+from sagline.viewer.feature import Computation, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.readout import LATER, block, sentence
 from sagline.viewer.server import chosen_by
@@ -30,7 +30,7 @@ from sagline.viewer.tension_scale import force_unit, number
 NEAR: Final = 10.0  # px: marks that are closer share one
 
 
-class Mark(NamedTuple):
+class MethodMark(NamedTuple):
     """A tension distribution method with its result."""
 
     name: str  # as it is chosen
@@ -39,7 +39,7 @@ class Mark(NamedTuple):
     missing: str = ""  # why it has none; "" where it has
 
 
-class Marks:
+class MethodMarks:
     """The answers of all ways at a pose, kept for as long as nothing but the way changes.
 
     A robot that is moved is given solvers of its own, which answer a dozen times as fast; it takes them longer to be
@@ -49,10 +49,10 @@ class Marks:
     def __init__(self) -> None:
         """Begin with none."""
         self._key: tuple[object, ...] = ()
-        self._found: tuple[Mark, ...] = ()
+        self._found: tuple[MethodMark, ...] = ()
         self._solvers: dict[str, InverseSolver] | None = None
 
-    def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[Mark, ...]:
+    def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[MethodMark, ...]:
         """The answers at the pose of a plan, at rest under its wrench."""
         state = plan.state
         place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
@@ -72,9 +72,9 @@ class Marks:
         return self._found
 
 
-def grouped(marks: tuple[Mark, ...], field: DotField) -> list[tuple[tuple[float, float], list[Mark]]]:
+def grouped(marks: tuple[MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[MethodMark]]]:
     """Marks that have an answer, with those that would lie on each other together, each at its place [px]."""
-    groups: list[tuple[tuple[float, float], list[Mark]]] = []
+    groups: list[tuple[tuple[float, float], list[MethodMark]]] = []
     for mark in marks:
         if mark.missing:
             continue
@@ -97,7 +97,7 @@ def _solvers(plan: Plan, names: list[str]) -> dict[str, InverseSolver]:
     return found
 
 
-def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> Mark:
+def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> MethodMark:
     state = plan.state
     robot, pose = state.one_robot, state.pose
     if solver is not None:
@@ -107,9 +107,9 @@ def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> M
         try:
             found = inverse(robot, pose, state.cables.model, METHODS[name], state.wrench)
         except InvalidValueError as error:
-            return Mark(name, letter, np.full(robot.cable_count, np.nan), str(error))
+            return MethodMark(name, letter, np.full(robot.cable_count, np.nan), str(error))
         tension, status = found.chord_tension, PoseStatus(int(found.status))
-    return Mark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
+    return MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
 
 
 MOST_REDUNDANT: Final = 2  # dimensions of a drawing
@@ -117,7 +117,7 @@ SHARING: Final = "sharing"  # topic of a way of sharing that is chosen
 
 
 def polygon_figure(
-    snapshot: Snapshot, marks: tuple[Mark, ...] = (), field: DotField | None = None, back: str = ""
+    snapshot: Snapshot, marks: tuple[MethodMark, ...] = (), field: DotField | None = None, back: str = ""
 ) -> str:
     """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
     if remark := why_none(snapshot):
@@ -167,7 +167,7 @@ def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
         return None
 
 
-def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[Mark, ...], *, movable: bool) -> str:
+def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[MethodMark, ...], *, movable: bool) -> str:
     corners, places = field.corners, [field.place(corner) for corner in field.corners]
     outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
     if field.redundant == 2:
@@ -205,7 +205,7 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     )
 
 
-def _marks(field: DotField, marks: tuple[Mark, ...]) -> str:
+def _marks(field: DotField, marks: tuple[MethodMark, ...]) -> str:
     """A mark for each tension distribution method, with its letter; those in one place share it."""
     parts = []
     for (x, y), group in grouped(marks, field):
@@ -235,7 +235,7 @@ def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     return f"{how} Sides: the limit that each is. Width {unit.written(width)}, height {unit.written(height)}."
 
 
-def _key(snapshot: Snapshot, marks: tuple[Mark, ...], back: str) -> str:
+def _key(snapshot: Snapshot, marks: tuple[MethodMark, ...], back: str) -> str:
     """The ways of sharing by their letters, to choose; and what is chosen by hand, and how to take it back."""
     if not marks:
         return ""
@@ -293,7 +293,7 @@ class TensionsFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Build nothing yet."""
         self._panel, self._ready = page.panel, page.ready
-        self._marks = Marks()
+        self._marks = MethodMarks()
         self._field: DotField | None = None  # where the dot can go
         self._key: tuple[object, ...] = ()  # of the pose that the field is of
         self._aim: Array | None = None  # coordinates that were chosen last, (r,)
@@ -306,7 +306,7 @@ class TensionsFeature(Feature):
         before, self._field = self._field, None
         if not isinstance(snapshot, Snapshot):
             self._panel.show_polygon(sentence(snapshot.why_no_choice))
-        elif not self._ready(Reading.POLYGON):
+        elif not self._ready(Computation.POLYGON):
             self._panel.show_polygon(polygon_later())
         elif view.played is not None or snapshot.plan is None or why_none(snapshot):
             self._panel.show_polygon(polygon_figure(snapshot))
@@ -320,7 +320,7 @@ class TensionsFeature(Feature):
             self._key = key
             if self._field is not None and self._aim is None:
                 self._aim = self._field.polygon.coordinates(snapshot.tension)
-            further, verdicts = self._ready(Reading.SHARING), self._ready(Reading.VERDICTS)
+            further, verdicts = self._ready(Computation.SHARING), self._ready(Computation.VERDICTS)
             marks = self._marks.at(snapshot.plan, further=further, verdicts=verdicts) if self._field else ()
             self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.way))
 
