@@ -25,7 +25,7 @@ AGAIN = 5.0  # s: after which the client asks once more
 ODD: tuple[Any, ...] = (
     None, True, "", "nonsense", "50", "1e308", float("nan"), float("inf"), -1.0, 0.0, 1e308, -1e-320, 2**62, [], [1, 2],
     [[1.0]], {}, {"value": 1.0}, b"\x00\xff", "x" * 10_000, [float("nan")] * 3, [0.0] * 4, ["a", "b", "c"], [None] * 3,
-    [1e308] * 3, [1e-320] * 4, [1.0, 0.0, 0.0, 0.0], "MinimumNorm", "straight", "Closest (depends_on_history the way)",
+    [1e308] * 3, [1e-320] * 4, [1.0, 0.0, 0.0, 0.0], "MinimumNorm", "straight", "Closest (depends on history)",
 )  # fmt: skip
 
 

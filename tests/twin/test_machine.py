@@ -247,7 +247,11 @@ def test_what_cannot_be_a_machine() -> None:
         (ROBOT, {"seed": -1}, ("seed", "-1")),
         (ROBOT, {"period": 0.0123456}, ("period", "0.0123456 s")),
         (ROBOT, {"faults": ["cell 8 sticks"]}, ("fault", None, "cell 0 to 7")),
-        (ROBOT, {"start": sl.Pose.from_euler([9.0, 0.0, 1.0], 0.0, 0.0, 0.0)}, ("start", "a pose that is not feasible")),
+        (
+            ROBOT,
+            {"start": sl.Pose([9.0, 0.0, 1.0], np.eye(3))},
+            ("start", "a pose that is not feasible"),
+        ),
         (ROBOT.replace(mass=5000.0), {"surveyed": True, "nominal": ROBOT}, ("start", "a pose that is not feasible")),
     ]
     for robot, given, parts in rows:

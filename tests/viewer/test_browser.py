@@ -168,7 +168,7 @@ def test_a_run_plays_in_the_page(browser: Browser) -> None:
 
 def test_the_scene_can_be_taken_away(browser: Browser, tmp_path: FilePath) -> None:
     with opened(browser, sl.load_robot("cogiro")) as (page, _):
-        page.get_by_text("Take away").click()
+        page.get_by_text("Export").click()
         with page.expect_download() as download:
             page.get_by_role("button", name="Scene (GLB)").click()
         download.value.save_as(tmp_path / "scene.glb")
@@ -209,7 +209,7 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         assert page.evaluate("document.documentElement.dataset.mantineColorScheme") == theme
         least_contrast(page)
         page.get_by_label("Follow the run").uncheck()
-        page.get_by_text("Take away").click()
+        page.get_by_text("Export").click()
         page.get_by_label("Cable model").first.click()
         page.get_by_text("parabolic").wait_for()
         least_contrast(page)

@@ -130,14 +130,14 @@ def test_a_pose_that_cannot_be_held_leads_to_one_that_can(browser: Browser, name
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
         viewer.scene.gizmo.position = 0.5 * (low + high) + np.array([0.42, 0.2, 0.3]) * (high - low)
         viewer.refresh()
-        page.get_by_text("Held nearest").wait_for()
+        page.get_by_text("Nearest feasible").wait_for()
         page.get_by_role("button", name="Go there").wait_for()
         least_contrast(page)
         assert page.evaluate(OVERFLOWING) == []
         await_that(page, lambda: not viewer.feature(MissingFeature).waiting)
         page.get_by_role("button", name="Go there").click()
         page.get_by_text("Feasible", exact=True).wait_for()
-        page.get_by_text("Held nearest").wait_for(state="hidden")
+        page.get_by_text("Nearest feasible").wait_for(state="hidden")
 
 
 @pytest.mark.soak

@@ -101,7 +101,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
     monkeypatch.setattr(export, "RATE", 0.5)
     run = a_run(name)
     with opened(browser, run.robot, run, width=width) as (page, viewer):
-        page.get_by_text("Take away").click()
+        page.get_by_text("Export").click()
         page.evaluate(KEEP_NOTES)
         film_button = page.get_by_role("button", name="Film of the run")
         film_button.click()
@@ -137,7 +137,7 @@ def test_a_browser_without_an_encoder_records_the_film_as_it_is_shown(
     run = a_run("article-suspended")
     with opened(browser, run.robot, run) as (page, _):
         page.evaluate("delete window.VideoEncoder")  # as over plain HTTP
-        page.get_by_text("Take away").click()
+        page.get_by_text("Export").click()
         with page.expect_download(timeout=1e3 * PATIENCE) as download:
             page.get_by_role("button", name="Film of the run").click()
         file = tmp_path / download.value.suggested_filename
@@ -151,7 +151,7 @@ def test_a_browser_without_an_encoder_records_the_film_as_it_is_shown(
 def test_a_picture_is_as_large_as_paper_without_gizmo_and_names(browser: Browser, tmp_path: FilePath) -> None:
     robot = sl.load_robot("article-suspended")
     with opened(browser, robot, width=1200) as (page, _):
-        page.get_by_text("Take away").click()
+        page.get_by_text("Export").click()
         screen = np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB"), dtype=float)
         with page.expect_download(timeout=1e3 * PATIENCE) as download:
             page.get_by_role("button", name="Picture (PNG)").click()

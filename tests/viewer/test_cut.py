@@ -97,13 +97,13 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         assert f"{peak.tension / ROBOT.tension_max[peak.cable]:.2f} times" in page.text
         await_that(lambda: page.told("clock")["time"] == whole.duration)
         assert isinstance(page.viewer.view and page.viewer.view.snapshot, InMotion)
-        client.set(handle(page, "Calm"), True)
+        client.set(handle(page, "Undo the cut"), True)
         await_that(lambda: played() is None)
         after = page.viewer.view
         assert after is not None
         np.testing.assert_array_equal(after.snapshot.pose.position, POSE.position)
         np.testing.assert_array_equal(after.snapshot.tension, before.snapshot.tension)
-        assert not handle(page, "Calm").visible
+        assert not handle(page, "Undo the cut").visible
 
 
 def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
@@ -136,10 +136,10 @@ def test_cut_by_cut_all_is_put_back() -> None:
         first = cuts._before[-1].kept.played
         cuts.undo()
         assert player.played is first
-        assert handle(server, "Calm").visible
+        assert handle(server, "Undo the cut").visible
         cuts.undo()
         assert player.played is given
-        assert not handle(server, "Calm").visible
+        assert not handle(server, "Undo the cut").visible
     finally:
         stop_server(server)
 

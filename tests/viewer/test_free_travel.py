@@ -42,7 +42,7 @@ def test_from_outside_ways_lead_back() -> None:
     assert found.crossed.tolist() == [True, False, False, False, False, False]
     assert found.distance[0] == pytest.approx(1.9 - np.sqrt(RADIUS**2 - 0.01), abs=1e-4)
     html = travel_text(found, NEWTON)
-    assert "Way back" in html
+    assert "Workspace" in html
     assert "workspace, cable 5" in html
 
 
@@ -56,4 +56,4 @@ def test_a_platform_beyond_the_box_finds_back_if_an_axis_leads_there() -> None:
     assert found.crossed.tolist() == [False] * 5 + [True]
     assert found.distance[5] == pytest.approx(5.0 - RADIUS, abs=1e-3)
     assert "3.500 m along −z" in travel_text(found, NEWTON)
-    assert "no axis" in travel_text(free_travel(ball, np.array([3.0, 3.0, 5.0]), ALL, LOW, HIGH), NEWTON)
+    assert "No boundary" in travel_text(free_travel(ball, np.array([3.0, 3.0, 5.0]), ALL, LOW, HIGH), NEWTON)

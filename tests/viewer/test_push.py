@@ -175,6 +175,6 @@ def test_what_nothing_holds_is_told() -> None:
     state = rest("cogiro")
     found = replace(push_response(state, push_of(state)), compliance=np.full((3, 3), np.nan), loaded=None)
     told = push.response_text(found, None)
-    assert "no rest" in told
-    assert "nothing holds" in told
+    assert "no equilibrium" in told
+    assert "no cable resists" in told
     assert found.scaled_pose(1.0) is None

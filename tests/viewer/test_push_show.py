@@ -100,7 +100,7 @@ def test_who_keeps_it_lets_go_by_the_button(page: Shown) -> None:
         await_that(lambda: push_of(page) is not None and show._hold is None)
         client.drag([0.7, 0.5, 1.5])  # it stays where it acts, and is answered at the new place
         await_that(lambda: (now := push_of(page)) is not None and now.state.pose.position[0] == 0.7)
-        client.set(handle(page, "Let go"), True)
+        client.set(handle(page, "Release"), True)
         await_that(lambda: push_of(page) is None)
         client.drag(POSE.position)
         await_that(lambda: np.array_equal(page.position, POSE.position))

@@ -116,7 +116,7 @@ def test_a_slider_changes_the_robot(page: Shown) -> None:
 def test_the_same_pose_shows_the_same_tensions_whatever_the_way_there(page: Shown) -> None:
     generator = np.random.default_rng(20)
     method = handle(page, "Tensions")
-    forget = handle(page, "Forget the way here")
+    forget = handle(page, "Reset history")
 
     def tensions_at(client: Client, position: Any) -> np.ndarray:
         client.drag(position)
@@ -296,7 +296,7 @@ def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pyt
             (Computation.MARGIN, "in any direction"),
             (Computation.FREQUENCIES, " Hz</span></div>"),
             (Computation.POLYGON, 'class="polygon"'),
-            (Computation.REST, "Really rests"),
+            (Computation.REST, "Equilibrium"),
         ):
             assert text not in page.text
             ready.add(reading)

@@ -84,7 +84,7 @@ def of_plan(plan: Plan) -> SharedMotion:
     notes = ["Poses without times: one a second."] * (plan.path is None)
     if not isinstance(plan.state.cables.model, Catenary):
         name = type(plan.state.cables.model).__name__.lower()
-        notes.append(f"Planned with the {name} model; cables are drawn as they hang at these tensions.")
+        notes.append(f"Planned with the {name} model; cables are drawn as catenaries with these tensions.")
     return SharedMotion(
         plan.state.one_robot, "run", time - time[0], plan.state.pose.position, plan.state.pose.quaternion,
         plan.chord_tension, "along the chord", plan.chord_tension, plan.unstrained_length, which, tuple(verdicts),
@@ -96,7 +96,9 @@ def _why(gap: Gap) -> str:
     if gap.status is not PoseStatus.INFEASIBLE:
         return f"Not feasible: {gap.status.text.partition(';')[0]}"
     short = (
-        f"short of up to {n(gap.shortfall, '.3g', 'N')}" if np.isfinite(gap.shortfall) else "no force alone would do"
+        f"short of up to {n(gap.shortfall, '.3g', 'N')}"
+        if np.isfinite(gap.shortfall)
+        else "no force alone is sufficient"
     )
     cables = f"; at their limits: cables {', '.join(map(str, gap.cables))}" if gap.cables else ""
     return f"Not feasible: {short}{cables}"
@@ -116,7 +118,7 @@ def of_simulation(simulation: Simulation) -> SharedMotion:
             broken[time >= event.time, event.cable] = True
     tension = np.where(broken, np.nan, simulation.tensions)
     drawn = np.where(broken, np.nan, chord_tension(robot, simulation.pose, simulation.length))
-    notes = ("Cables with mass are drawn as cables of their lengths hang at rest.",) * (simulation.nodes is not None)
+    notes = ("Cables with mass are drawn as catenaries of the same lengths at rest.",) * (simulation.nodes is not None)
     pose = simulation.pose
     return SharedMotion(
         robot, "simulation", time - time[0], pose.position, pose.quaternion, tension, "at the frame end", drawn,

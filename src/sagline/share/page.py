@@ -42,17 +42,17 @@ def robot_page(robot: Robot) -> str:
     return _filled(
         title=robot.name,
         about=_about(robot),
-        plays="lets you drag the platform, and its cables tighten and sag",
+        plays="shows how the cables tighten and sag when the platform is dragged",
         described=f"{robot.name}: its platform on cables. {AROUND}",
         hint="Drag the platform; drag beside it to look around.",
-        controlled="Where the platform is",
+        controlled="Position of the platform",
         controls=_sliders(robot),
         over=RING + HOME,
         quantity="along the chord",
         robot=robot,
         still=robot_drawing(robot, at, plan.chord_tension),
         table=_table(robot, plan.chord_tension, plan.unstrained_length),
-        notes=("Tensions of least norm within the limits, exact elastic catenaries, the platform at rest.",),
+        notes=("Tensions of least norm within their limits, elastic catenaries, platform at rest.",),
         facts=facts,
         states="",
     )
@@ -172,5 +172,5 @@ def _precision() -> str:
     """Largest rounding of the values that a page keeps, in words."""
     return (
         f"Kept to {0.5e6 * POSITION:g} µm of positions and lengths, {0.5e6 * TURN:g} µrad of rotations, "
-        f"{50.0 * TENSION:g} % of tensions. Cables are computed here, as they hang."
+        f"{50.0 * TENSION:g} % of tensions. The catenaries are computed in this page."
     )

@@ -139,7 +139,7 @@ class ControlPanel:
             self._mass = self.watched(
                 gui.add_slider(
                     "Platform + load [kg]", lightest, heaviest, step, written_mass(robot.mass),
-                    hint="Mass of the platform with its load; the inertia grows with it.",
+                    hint="Mass of the platform with its load; the inertia scales with it.",
                 )
             )  # fmt: skip
             self._density = self.watched(
@@ -152,17 +152,17 @@ class ControlPanel:
                 gui.add_dropdown(
                     "Cable model",
                     tuple(MODELS),
-                    hint="With an approximate model, orange shows where the platform rests.",
+                    hint="With an approximate model, the orange platform shows the pose of equilibrium.",
                 )
             )
             self._method = self.watched(
-                gui.add_dropdown("Tensions", tuple(METHODS), hint="How redundant cables share the load.")
+                gui.add_dropdown("Tensions", tuple(METHODS), hint="Tension distribution method.")
             )
             self._forgetting = gui.add_button(
-                "Forget the way here",
+                "Reset history",
                 icon=viser.Icon.ERASER,
                 visible=False,
-                hint="The tensions depend on the poses before this one; begin again from this pose alone.",
+                hint="The tensions depend on earlier poses; start again from this pose.",
             )
             self._forgetting.on_click(lambda _: self._forget())
 
@@ -174,9 +174,7 @@ class ControlPanel:
                 gui.add_slider("Error drawn ×", 1.0, 200.0, 1.0, 1.0, hint="Position error of the orange platform.")
             )
             self._ghost = self.watched(
-                gui.add_checkbox(
-                    "Straight cables beside", False, hint="Drawn where a cable hangs visibly apart from it."
-                )
+                gui.add_checkbox("Straight cables beside", False, hint="Drawn where the sag of a cable is visible.")
             )
 
 

@@ -150,10 +150,12 @@ def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
     ]
     if snapshot.plan is not None:
         extra = unit.written(float(capacity_margin(snapshot.plan.state))) if capacity else LATER
-        rows.append(("Spare force", f"{extra}, in any direction, the load shared anew" if capacity else extra))
+        rows.append(("Spare force", f"{extra}, in any direction, with redistributed tensions" if capacity else extra))
     if (error := snapshot.error) is not None:
         away = float(np.linalg.norm(error))
-        rows.append(("Really rests", f"{n(away, unit='m')} off" if away > EXACT else "where it is wanted"))
+        rows.append(
+            ("Equilibrium", f"{n(away, unit='m')} from the planned pose" if away > EXACT else "at the planned pose")
+        )
     return definitions(rows)
 
 
@@ -220,7 +222,7 @@ def _pulley_line(robot: Robot) -> str:
     if winches.dead_cable.any():
         text += f", dead cable {_span(winches.dead_cable, 'm')}"
     if not dead_runs(robot)[1].all():
-        text += ", drawn upright and only as far as it rises: where it runs is not known"
+        text += ", drawn vertically over its known height; its path is not known"
     return text + "</div>"
 
 

@@ -43,7 +43,7 @@ def model_name(model: CableModel) -> str:
 def method_name(method: TensionMethod) -> str:
     """Name of a tension distribution method, with a remark where it depends on the poses before."""
     name = BY_HAND if isinstance(method, ByHand) else type(method).__name__
-    return f"{name} (depends_on_history the way)" if depends_on_history(method) else name
+    return f"{name} (depends on history)" if depends_on_history(method) else name
 
 
 def depends_on_history(method: TensionMethod) -> bool:
@@ -131,7 +131,7 @@ class Snapshot:
             return self.status.text
         shortfall = float(self.plan.shortfall)
         missing = force_unit(self.robot).written(shortfall)
-        short = f"short of {missing}" if np.isfinite(shortfall) else "no force alone would do"
+        short = f"short of {missing}" if np.isfinite(shortfall) else "no force alone is sufficient"
         blocking = ", ".join(str(i) for i in np.flatnonzero(self.plan.blocking))
         return f"{short}; at their limits: cables {blocking}" if blocking else short
 

@@ -130,7 +130,7 @@ def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ..
         known = short[np.isfinite(short)]
         parts = ["not feasible"]
         if np.isinf(short).any():
-            parts.append("no force alone would do")
+            parts.append("no force alone is sufficient")
         elif known.size:
             parts.append(f"short of up to {unit.written(float(known.max()))}")
         blocking = np.flatnonzero(plan.blocking[rows][lost].any(axis=0))

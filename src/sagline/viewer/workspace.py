@@ -178,9 +178,9 @@ def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
         if share >= LEAST
     )
     if key:
-        text += f"<br><b>Its wall by what limits</b> &nbsp;{key}"
+        text += f"<br><b>Boundary by limiting cable</b> &nbsp;{key}"
     if found.open_faces:
-        text += f"<br>It goes on beyond the robot's box at {escape(', '.join(found.open_faces))}."
+        text += f"<br>It extends beyond the robot's box at {escape(', '.join(found.open_faces))}."
     return text
 
 
@@ -317,16 +317,16 @@ def travel_text(found: FreeTravel, unit: ForceUnit) -> str:
     if crossed:
         nearest = min(crossed, key=lambda k: float(found.distance[k]))
         length, way = f"{found.distance[nearest]:.3f} m", NAMES[found.which[nearest]]
-        head += f"<b>Boundary</b> {length} along {way}" if found.inside else f"<b>Way back</b> {length} along {way}"
+        head += f"<b>Boundary</b> {length} along {way}" if found.inside else f"<b>Workspace</b> {length} along {way}"
         head += _limited(int(found.cable[nearest]))
     else:
-        head += "Along no axis is there a boundary in the robot's box."
+        head += "No boundary along any axis within the robot's box."
     rows = "".join(
         f"<tr><td>{NAMES[which]}</td><td>{distance:.3f} m</td>"
         f"<td>{_end(bool(crossed), int(cable), found.inside)}</td></tr>"
         for which, distance, crossed, cable in zip(found.which, found.distance, found.crossed, found.cable, strict=True)
     )
-    return block(f"{head}<table><tr><th>way</th><th>length</th><th>ends at</th></tr>{rows}</table>")
+    return block(f"{head}<table><tr><th>direction</th><th>length</th><th>ends at</th></tr>{rows}</table>")
 
 
 def _limited(cable: int) -> str:

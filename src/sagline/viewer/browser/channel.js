@@ -6,7 +6,7 @@
       banner = document.createElement("div");
       banner.id = "sagline-lost";
       banner.setAttribute("role", "alert");
-      banner.textContent = "Disconnected: is sagline view still running? The page comes back when it does.";
+      banner.textContent = "Disconnected. Is sagline view still running? The page reconnects by itself.";
       document.body.append(banner);
     }
     if (banner) banner.hidden = !lost;

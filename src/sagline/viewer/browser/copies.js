@@ -1,6 +1,6 @@
 // What is copied: shown in a dialog, and put onto the clipboard where the browser lets us; else the text is selected.
 (() => {
-  const HEADS = { code: "What is shown, in Python", link: "A link to what is shown" };
+  const HEADS = { code: "Python code of this state", link: "Link to this state" };
 
   const copy = async (dialog) => {
     const area = dialog.querySelector("textarea");
@@ -9,10 +9,10 @@
     area.select();
     try {
       await navigator.clipboard.writeText(area.value);
-      told.textContent = "It is on the clipboard.";
+      told.textContent = "Copied to the clipboard.";
     } catch {
       const done = document.execCommand("copy"); // where there is no clipboard: on a page that is not of this machine
-      told.textContent = done ? "It is on the clipboard." : "The browser keeps its clipboard: copy the selected text.";
+      told.textContent = done ? "Copied to the clipboard." : "The browser refuses: copy the selected text.";
     }
   };
   const make = (body, buttons) => {

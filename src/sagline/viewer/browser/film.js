@@ -47,7 +47,7 @@
     drop();
     const mine = { about, count: 0, panel: panel(about) };
     film = mine;
-    mine.panel.say("Filming: keep this page in view. Others see nothing of it.");
+    mine.panel.say("Recording: keep this page visible. Other users do not see it.");
     const maker = sagline.filming(about);
     sagline.keep(async (blob) => {
       if (!clock) return; // it was to try things out

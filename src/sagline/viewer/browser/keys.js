@@ -6,18 +6,18 @@
   const SIZES = [0.1, 0.2, 0.5, 1, 2, 5, 10];
   const TURNS_CAMERA = new Set(["ArrowRight", "ArrowLeft", "ArrowUp", "ArrowDown"]);
   const HELP = "Arrow keys move the platform along x and y, Page Up and Page Down along z; with Shift they turn it. "
-    + "Plus and minus change the step, Home goes back home. Press question mark for all keys.";
+    + "Plus and minus change the step, Home moves the platform home. Press question mark for all keys.";
   const list = [
     ["On the robot (press Tab until it has the focus)"],
     ["← →", "move along x; with Shift turn about z"],
     ["↑ ↓", "move along y; with Shift turn about x"],
     ["Page Up, Page Down", "move along z; with Shift turn about y"],
     ["+ −", "larger and smaller steps"],
-    ["Home", "the platform back home"],
+    ["Home", "move the platform home"],
     ["On the page"],
-    ["Tab, Shift Tab", "the next control, the one before"],
+    ["Tab, Shift Tab", "next control, previous control"],
     ["← → on a slider", "change its value; Home and End: the ends"],
-    ["W A S D, Q E", "move the camera, where nothing is typed"],
+    ["W A S D, Q E", "move the camera, outside of text fields"],
     ["arrow keys, off the robot", "turn the camera"],
     ["?", "this list"],
   ];

@@ -278,10 +278,10 @@
 
   for (const [keys, words] of [
     ["On the timeline"],
-    ["← →", "the sample before, the next one; with Shift ten, with Ctrl from event to event"],
-    ["Page Up, Page Down", "a tenth of the time on, or back"],
+    ["← →", "previous or next sample; with Shift ten samples, with Ctrl to the next event"],
+    ["Page Up, Page Down", "forward or back by a tenth of the duration"],
     ["Space", "play, pause"],
-    ["+ − 0", "look closer, from farther, at the whole"],
+    ["+ − 0", "zoom in, zoom out, show all"],
   ]) window.sagline.key(keys, words);
 
   on("timeline", showTracks);

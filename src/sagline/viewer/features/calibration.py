@@ -86,16 +86,16 @@ def parameters_text(found: Calibration) -> str:
         cells = (n(_root_mean_square(each), ".2g", unit) for each in (moved, error, parameters.prior_deviation[mine]))
         title = name.replace("_", " ")
         rows += f"<tr><td>{title}</td>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
-    head = "<tr><th></th><th>moved</th><th>error now</th><th>before</th></tr>"
+    head = "<tr><th></th><th>change</th><th>error</th><th>error before</th></tr>"
     items = "".join(f"<li>{_direction_text(one)}</li>" for one in (*found.gauge, *found.cannot_tell_apart))
-    remark = f"<b>Left open, or hardly told</b><ul>{items}</ul>" if items else ""
+    remark = f"<b>Not observed, or weakly identifiable</b><ul>{items}</ul>" if items else ""
     return block(f"<table>{head}{rows}</table>{remark}")
 
 
 def ellipsoids_text(factor: float, *, relative: bool) -> str:
     """HTML of the meaning of the ellipsoids."""
-    but = ", but for what moves all anchors together" if relative else ""
-    return sentence(f"Ellipsoids: one standard error{but}, drawn {factor:g} times as large; lines: from where it was.")
+    but = ", without the common motion of all anchors" if relative else ""
+    return sentence(f"Ellipsoids: one standard error{but}, enlarged {factor:g} times; lines: change of the position.")
 
 
 def outliers_text(found: Calibration, chosen: int | None) -> str:
@@ -109,7 +109,7 @@ def outliers_text(found: Calibration, chosen: int | None) -> str:
     )
     rest = len(found.outliers) - MOST_LISTED
     more = f'<div class="quiet">and {rest:,} more</div>' if rest > 0 else ""
-    return block(f'<b>What does not fit</b><div class="rows"><table>{rows}</table></div>{more}')
+    return block(f'<b>Outliers</b><div class="rows"><table>{rows}</table></div>{more}')
 
 
 def pose_residuals(found: Calibration, number: int) -> str:
@@ -181,12 +181,12 @@ class CalibrationFeature(Feature):
         with page.panel.readings.add_tab("Calibration"):
             gui.add_html(verdict_text(found))
             self._wanted: Any = gui.add_checkbox("Errors of the anchors", True)
-            hint = "Without what only shifts all of them or turns them together, which readings may leave open."
+            hint = "Without a common displacement and rotation, which readings may not determine."
             self._relative: Any = gui.add_checkbox("Relative to one another", False, hint=hint)
-            hint = "How many times as large the errors are drawn."
+            hint = "Scale of the drawn errors."
             self._factor: Any = gui.add_number("Drawn ×", factor, min=1.0, hint=hint)
             self._ellipsoids_html = gui.add_html("")
-            hint = "Click one, and the platform goes there."
+            hint = "Click one to move the platform there."
             self._poses_wanted: Any = gui.add_checkbox("Poses of the log", True, hint=hint)
             gui.add_html(key_text(np.bincount(self._bands, minlength=len(COLORS)).astype(np.int64)))
             self._field: Any = gui.add_text(FIELD, "", hint="Number of a row; empty for none.")

@@ -77,15 +77,15 @@ def outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
     far = int(np.argmax(away))
     times = f", {peak.tension / peak.limit:.2f} times its limit" if np.isfinite(peak.limit) else ""
     rows = [
-        ("Farthest", f"{n(away[far], '.3g', 'm')} away at {simulation.time[far] - simulation.time[0]:.2f} s"),
+        ("Largest displacement", f"{n(away[far], '.3g', 'm')} at {simulation.time[far] - simulation.time[0]:.2f} s"),
         ("Highest tension", f"{unit.written(peak.tension)} in cable {peak.cable} at {peak.time:.2f} s{times}"),
     ]
     slack = sorted({event.cable for event in simulation.events if event.kind == "slack" and event.cable is not None})
     if slack:
         rows.append(("Slack", f"cable{'s' * (len(slack) > 1)} {', '.join(map(str, slack))}"))
-    rows.append(("Losses", f"{n(simulation.damping.loss_time, '.2g', 's')} of the cables' stretch, assumed"))
+    rows.append(("Damping", f"loss time {n(simulation.damping.loss_time, '.2g', 's')} of the cables, assumed"))
     if not whole:
-        rows.append(("So far", f"{simulation.time[-1] - simulation.time[0]:.2f} s; the rest is being simulated"))
+        rows.append(("Simulated", f"{simulation.time[-1] - simulation.time[0]:.2f} s so far"))
     return box("bad" if peak.tension > peak.limit else "quiet", f"Cable {cut} is cut", definitions(rows))
 
 
@@ -110,12 +110,16 @@ class CutFeature(Feature):
         gui = page.server.gui
         with gui.add_folder("Cut a cable", expand_by_default=False):
             self._cable: Any = gui.add_dropdown("Cable to cut", tuple(map(str, range(page.robot.cable_count))))
-            hint = "With mass they swing and take longer to compute."
+            hint = "Cables with mass vibrate and take longer to compute."
             self._mass = gui.add_dropdown("Cables in motion", tuple(CABLE_MASS), hint=hint)
             button = gui.add_button("Cut", icon=viser.Icon.SCISSORS)
             self._text = gui.add_html(HELP)
         self._undo: Any = gui.add_button(
-            "Calm", icon=viser.Icon.ARROW_BACK_UP, visible=False, order=TOP, hint="Put everything back as it was."
+            "Undo the cut",
+            icon=viser.Icon.ARROW_BACK_UP,
+            visible=False,
+            order=TOP,
+            hint="Restore the state before the cut.",
         )
         self._button: Any = gui.add_button("Cut", icon=viser.Icon.SCISSORS, visible=False, order=TOP)
         self._cable.on_update(lambda event: page.later(self._mark) if event.client is not None else None)
@@ -155,7 +159,7 @@ class CutFeature(Feature):
         """Simulate the break of the chosen cable from the equilibrium that is shown, and play it as it comes."""
         state, view = self._page.state, self._page.view
         if state is None or view is None:
-            self._text.content = sentence("A cable is cut at rest, where the platform is held: drag it there first.")
+            self._text.content = sentence("A cable can be cut at a feasible pose at rest. Drag the platform to one.")
             return
         if not self._page.ready(Computation.SIMULATION):
             self._text.content = sentence("The simulation is still being compiled.")

@@ -63,7 +63,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     thin = _DEAD_RADIUS * shapes.size_of(robot)
     for i, (run, known) in enumerate(zip(*shapes.dead_runs(robot), strict=True)):
         if run[0, 2] != run[1, 2]:
-            name = f"dead cable {i}" if known else f"dead cable {i}, its way not known"
+            name = f"dead cable {i}" if known else f"dead cable {i}, path not known"
             _add(scene, name, shapes.rod(run, thin), STEEL)
     _add(scene, "platform", shapes.platform(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
@@ -146,7 +146,7 @@ def moments(duration: float, speed: float) -> Array:
     """
     length = duration / speed
     if length > LONGEST:
-        step = "Choose a higher speed above: the film has the speed at which it plays."
+        step = "Choose a higher speed on the timeline; the film has the same speed."
         raise InvalidValueError("film", f"{length:,.0f} s long at this speed", f"at most {LONGEST:g} s", step)
     return np.linspace(0.0, duration, max(2, 1 + round(length * RATE)))
 
@@ -181,7 +181,7 @@ class ExportFeature(Feature):
         self._page, self._server, self._extent = page, server, page.extent
         self._exporters: dict[int, Exporter] = {}
         gui = server.gui
-        with gui.add_folder("Take away", expand_by_default=False):
+        with gui.add_folder("Export", expand_by_default=False):
             self._paper = gui.add_dropdown("Picture for", tuple(PAPERS))
             self._strip = gui.add_checkbox("With legend", True, hint="The robot's name and the colors of tensions.")
             buttons = [
@@ -249,14 +249,12 @@ class ExportFeature(Feature):
             send(exporter)
         except (RuntimeError, TimeoutError, SaglineError) as error:
             if client.client_id in self._server.get_clients():
-                client.add_notification(
-                    "Nothing to take away", _why(error), with_close_button=True, auto_close_seconds=8.0
-                )
+                client.add_notification("Nothing exported", _why(error), with_close_button=True, auto_close_seconds=8.0)
         finally:
             exporter.taking.release()
 
 
 def _why(error: Exception) -> str:
     if isinstance(error, TimeoutError):
-        return "The page gave no picture for too long: keep it in view until the pictures are taken."
+        return "The page sent no picture in time. Keep it visible until the pictures are taken."
     return str(error)

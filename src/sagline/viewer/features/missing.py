@@ -38,11 +38,11 @@ def explanation(
         place = ", ".join(number(x, ".3f") for x in nearest.pose.position)
         button = f"<button {chosen_by(GO, '')}>Go there</button>"
         level = ", the platform level" if nearest.turned else ""
-        rows.append(("Held nearest", f"{distance_of(nearest)} away at {place} m{level}. {button}"))
+        rows.append(("Nearest feasible", f"{distance_of(nearest)} away at {place} m{level}. {button}"))
     elif searching:
-        rows.append(("Held nearest", "looked for …"))
+        rows.append(("Nearest feasible", "searching …"))
     elif snapshot.status not in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED):
-        rows.append(("Held nearest", "nowhere within the robot, turned like this or level"))
+        rows.append(("Nearest feasible", "none within the robot, at this orientation or level"))
     return block(definitions(rows, "missing"))
 
 
@@ -65,8 +65,8 @@ def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str,
     if _has_moment(missing):
         turning = ", ".join(number(part, ".4g") for part in missing.moment)
         rows = [
-            ("Missing force", f"{size}, which alone would not do: x, y, z {parts} {unit.name}"),
-            ("and moment", f"{_moment(missing)}: {turning} N m about x, y, z through the center of mass"),
+            ("Missing force", f"{size}, not sufficient alone: x, y, z {parts} {unit.name}"),
+            ("with moment", f"{_moment(missing)}: {turning} N m about x, y, z through the center of mass"),
         ]
     for lower in (True, False):
         cables = [str(each.cable) for each in missing.limits if each.lower is lower]
@@ -83,10 +83,10 @@ def _other_rows(snapshot: Snapshot) -> list[tuple[str, str]]:
     if status in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED) and snapshot.plan is not None:
         other = OTHERWISE if status is PoseStatus.NOT_COVERED else "MinimumNorm"
         here = escape(method_name(snapshot.plan.tension))
-        return [("Shared by", f"{here}, which has no answer. <button {chosen_by(SHARING, other)}>{other}</button>")]
+        return [("Method", f"{here} has no solution here. <button {chosen_by(SHARING, other)}>{other}</button>")]
     if status is PoseStatus.SINGULAR:
         try:
-            return [("No cable resists", escape(unresisted_motion(snapshot.robot, snapshot.pose).text))]
+            return [("Unconstrained motion", escape(unresisted_motion(snapshot.robot, snapshot.pose).text))]
         except SaglineError:
             return []
     return []
@@ -177,7 +177,7 @@ class MissingFeature(Feature):
             nodes.hide("/nearest", "/nearest_way")
             return
         nodes.body("/nearest", self._body, FEASIBLE, 0.5, nearest.pose)
-        text = f"held here, {distance_of(nearest)} away"
+        text = f"feasible here, {distance_of(nearest)} away"
         nodes.label("/nearest/name", text, (0.0, 0.0, 0.0), "top-center", SMALL)
         ends = np.stack((snapshot.pose.position, nearest.pose.position))[None]
         nodes.lines("/nearest_way", shapes.segments(shapes.straight(ends), dashed=True), FEASIBLE, LINE_WIDTH)

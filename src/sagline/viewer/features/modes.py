@@ -106,16 +106,16 @@ def _swing_text(vibration: Vibration, swing: Swing | None, chosen: str) -> str:
         counts = vibration.frequency.size, int(np.isfinite(vibration.massless_frequency).sum())
         there = [f"{word}1 to {count}" for word, count in zip(("", "massless "), counts, strict=True) if count]
         return sentence(f"There is no mode {escape(chosen)}: the list has {' and '.join(there) or 'none'}.")
-    return sentence("Click a frequency, and it moves.")
+    return sentence("Click a frequency to see its mode move.")
 
 
 def _list_text(vibration: Vibration, modes: list[ListedMode], chosen: str) -> str:
-    head = "<tr><th>mode</th><th>Hz</th><th></th><th>platform</th><th>most in</th><th>damping</th></tr>"
+    head = "<tr><th>mode</th><th>Hz</th><th></th><th>platform</th><th>largest in</th><th>damping</th></tr>"
     rows = "".join(_row(mode, chosen) for mode in sorted(modes, key=lambda mode: mode.frequency))
     table = block(f'<div class="modes"><table>{head}{rows}</table></div>')
     if vibration.status is not VibrationStatus.SOLVED:
         return block(escape(vibration.status.text)) + table
-    count = "all of them" if vibration.complete else "not complete"
+    count = "complete" if vibration.complete else "not complete"
     ratio = 100.0 * vibration.damping.modal_damping
     text = f"{vibration.frequency.size} modes with cable mass below {vibration.up_to:g} Hz: {count}."
     return block(f'{text} <span class="quiet">A damping of {ratio:g} % is assumed.</span>') + table
@@ -150,11 +150,11 @@ class ModesFeature(Feature):
         self.swing: Swing | None = None
         gui = page.server.gui
         with page.panel.readings.add_tab("Modes"):
-            hint = "Number of the mode that moves, from the list; massless 1 and so on; empty: none."
+            hint = "Name of the mode that moves, from the list, such as 2 or massless 1; empty for none."
             self._mode: Any = gui.add_text(FIELD, page.mode, hint=hint)
             self._text = gui.add_html("")
             self._up_to: Any = gui.add_slider("Modes up to [Hz]", 1.0, HIGHEST, 1.0, UP_TO)
-            self._list = gui.add_html(waiting("The modes are worked out when the platform rests."))
+            self._list = gui.add_html(waiting("The modes are computed when the platform is at rest."))
             self._force: Any = gui.add_dropdown("Force", MOTIONS, hint="Along an axis, or a moment about one.")
             self._figure = gui.add_html("")
         page.refresh_on(self._mode, self._up_to, self._force)
@@ -178,7 +178,7 @@ class ModesFeature(Feature):
             self._stop_swing()
             self._key, self._state, self._vibration = key, state, None
             self._due = None if state is None else time.monotonic() + RESTED
-            self._text.content = sentence("The modes come when the platform rests.")
+            self._text.content = sentence("The modes are computed when the platform is at rest.")
         elif self._vibration is not None:
             self._choose(self._vibration)
 
@@ -190,7 +190,7 @@ class ModesFeature(Feature):
             state, up_to = self._state, self._highest
             self._task.start(lambda: vibration(state, up_to=up_to, damping=DAMPING), self._receive, self._refuse)
         if self._task.elapsed:
-            self._text.content = sentence(f"Working out the modes: {self._task.elapsed:.0f} s so far")
+            self._text.content = sentence(f"Computing the modes: {self._task.elapsed:.0f} s so far")
         if self.swing is not None:
             phase = 2.0 * np.pi * now / PERIOD
             self._scene.swing(self.swing.state.pose, self.swing.pose(phase), self.swing.courses(phase))
@@ -270,7 +270,7 @@ class ModesFeature(Feature):
         if not _has_modes(vibration):
             return sentence("No response: there are no modes.")
         if curves is None:
-            return waiting("The response is worked out.")
+            return waiting("The response is being computed.")
         axis = self._axis
         motion, unit = ("rotation", "N m") if axis.startswith("about") else ("motion along", "N")
         with_mass = [mode for mode in modes if mode.kind != MASSLESS]

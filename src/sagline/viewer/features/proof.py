@@ -186,11 +186,11 @@ def _residual_text(state: Equilibrium, forces: tuple[PlatformForce, ...], missin
     if can_rotate(state):
         left += f" and {n(moment, '.2g', 'N m')} about the center of mass"
     if missing is None:
-        return f"Cables as they pull at the platform, weight and load close up to {left}."
+        return f"The forces of the cables, weight and load sum to zero up to {left}."
     gap = n(float(np.linalg.norm(missing[:3])), ".4g", "N")
     if np.linalg.norm(missing[3:]) > 0.0:
         gap += f", with a moment of {n(float(np.linalg.norm(missing[3:])), '.4g', 'N m')}"
-    return f"The gap is the missing force, {gap}; with it and the cables at their limits the forces close up to {left}."
+    return f"The gap is the missing force, {gap}. With it, and cables at their limits, the sum is zero up to {left}."
 
 
 def _table(state: Equilibrium, forces: tuple[PlatformForce, ...]) -> str:
@@ -225,8 +225,8 @@ def _cells(force: Array, moment: Array, decimals: int, *, turning: bool) -> str:
 
 LONG: Final = 0.22  # of the robot's size: the longest arrow in the scene
 _ARROW: Final = np.array([0.0045, 0.011, 0.03])  # radii of shaft and head, length of the head; of the robot's size
-NOT_AT_REST: Final = "In motion, and in a log, forces do not add up to nothing: the proof is one of a pose at rest."
-UNKNOWN: Final = "There are no tensions here, and no force is known that would do: nothing to add up."
+NOT_AT_REST: Final = "The force balance is shown for a pose at rest, not for a motion or a log."
+UNKNOWN: Final = "Neither tensions nor a missing force are known here."
 
 
 class ProofFeature(Feature):

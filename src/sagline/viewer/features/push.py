@@ -41,14 +41,14 @@ def response_text(response: PushResponse, drawn_for: float | None) -> str:
     unit = force_unit(response.state.one_robot)
     redistributed = LATER
     if response.redistributed is not None:
-        redistributed = f"{_reserve_text(response, response.redistributed, unit)}, the platform kept where it is"
+        redistributed = f"{_reserve_text(response, response.redistributed, unit)}, at the same pose"
     rows = [
         ("Force", unit.written(response.force)),
-        ("It moves", _motion_text(response)),
+        ("Displacement", _motion_text(response)),
         ("Tensions", _tensions(response, unit)),
-        ("Lengths held", _reserve_text(response, response.reserve, unit)),
-        ("Shared anew", redistributed),
-        ("Gives way", _compliance_text(response, drawn_for)),
+        ("Fixed lengths", _reserve_text(response, response.reserve, unit)),
+        ("Redistributed", redistributed),
+        ("Compliance", _compliance_text(response, drawn_for)),
     ]
     within = response.loaded is not None and response.reserve.force >= response.force
     return box("quiet" if within else "bad", "Pushed" if within else "Pushed beyond a limit", definitions(rows))
@@ -57,7 +57,7 @@ def response_text(response: PushResponse, drawn_for: float | None) -> str:
 def _motion_text(response: PushResponse) -> str:
     """Displacement and rotation."""
     if response.loaded is None:
-        return "no rest was found with this force"
+        return "no equilibrium with this force"
     rotation = n(np.degrees(np.linalg.norm(response.rotation)), ".2g", "°")
     return f"{n(1e3 * np.linalg.norm(response.displacement), '.3g', 'mm')}, {rotation}"
 
@@ -68,7 +68,7 @@ def _reserve_text(response: PushResponse, reserve: Reserve, unit: ForceUnit) -> 
         return "no limit found"
     more = reserve.force - response.force
     limit = "" if reserve.cable is None else f" (cable {reserve.cable}, {'upper' if reserve.upper else 'lower'} limit)"
-    return f"{unit.written(more)} more{limit}" if more >= 0.0 else f"{unit.written(-more)} too much{limit}"
+    return f"{unit.written(more)} more{limit}" if more >= 0.0 else f"{unit.written(-more)} beyond the limit{limit}"
 
 
 def _tensions(response: PushResponse, unit: ForceUnit) -> str:
@@ -80,7 +80,7 @@ def _tensions(response: PushResponse, unit: ForceUnit) -> str:
 
 def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
     if not np.isfinite(response.compliance).all():
-        return "freely: nothing holds it in some direction"
+        return "unlimited: no cable resists a motion in some direction"
     least, middle, most = (n(1e3 * length, ".2g", "mm/N") for length in semi_axes(response.compliance)[0])
     drawn = "" if drawn_for is None else f"; drawn as for {n(drawn_for, '.3g', 'N')}"
     return f"{least}, {middle} and {most}{drawn}"
@@ -118,14 +118,14 @@ class PushFeature(Feature):
             )
             hint = "Direction of the force, of any length."
             self._direction: Any = gui.add_vector3("Along x, y, z", (0.0, 0.0, -1.0), step=0.01, hint=hint)
-            hint = "Where it acts, in the platform's own frame; at first its center of mass."
+            hint = "Point of application in the platform frame; at first the center of mass."
             self._at: Any = gui.add_vector3("At x, y, z [m]", tuple(center), step=0.001, hint=hint)
             self._keep: Any = gui.add_checkbox(
                 "Keep after release", False, hint="Or hold Shift when you release the mouse."
             )
-            hint = "How far a force of any direction moves that place."
+            hint = "Displacement of that point by a force of any direction."
             self._ellipsoid: Any = gui.add_checkbox("Stiffness ellipsoid", True, hint=hint)
-            self._release: Any = gui.add_button("Let go", icon=viser.Icon.HAND_STOP, visible=False)
+            self._release: Any = gui.add_button("Release", icon=viser.Icon.HAND_STOP, visible=False)
         for handle in (self._force, self._direction, self._at, self._ellipsoid):
             handle.on_update(lambda event: page.refresh() if event.client is not None else None)
         self._release.on_click(lambda _: page.later(self.release))
@@ -151,9 +151,9 @@ class PushFeature(Feature):
         if push is None:
             self._show_none("")
         elif state is None:
-            self._show_none(sentence("A push is answered where the platform is held at rest."))
+            self._show_none(sentence("The response to a force is computed at a feasible pose at rest."))
         elif not ready(Computation.REST) or not ready(Computation.FREQUENCIES):
-            late = "A push is answered as soon as forward kinematics and stiffness are compiled."
+            late = "The response is shown when forward kinematics and stiffness are compiled."
             self._show_none(sentence(late))
         else:
             response = push_response(state, push, redistribution=ready(Computation.VERDICTS))
@@ -174,11 +174,11 @@ class PushFeature(Feature):
         length, farthest = float(np.linalg.norm(along)), float(np.abs(at).max())
         for bad, item, value, allowed in (
             (size < 0.0, "force", f"{size:g} N", ">= 0 N"),
-            (length == 0.0, "direction", "0, 0, 0", "one that leads somewhere"),
+            (length == 0.0, "direction", "0, 0, 0", "not 0, 0, 0"),
             (farthest > FARTHEST, "place", f"{farthest:g} m", f"within {FARTHEST:g} m"),
         ):
             if bad:
-                raise InvalidValueError(f"push: {item}", value, allowed, "Type another, or let go.")
+                raise InvalidValueError(f"push: {item}", value, allowed, "Type another, or release the force.")
         return Push(size * along / length, at)
 
     def _type(self, push: Push) -> None:
@@ -301,5 +301,5 @@ def _numbers(value: Any, count: int, item: str, allowed: str) -> Array:
     except (TypeError, ValueError, OverflowError):
         found = np.empty(0)
     if found.shape != (count,) or not np.isfinite(found).all():
-        raise InvalidValueError(f"push: {item}", "no such numbers", allowed, "Type another, or let go.")
+        raise InvalidValueError(f"push: {item}", "no such numbers", allowed, "Type another, or release the force.")
     return found

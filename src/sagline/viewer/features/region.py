@@ -49,7 +49,7 @@ POINTS: Final = 40  # of a slice, along each axis of its plane
 COARSE: Final = 7  # points along each axis whose margins give the range of the colors
 BY_CABLE, BY_MARGIN = "limiting cable", "margin"
 PLANES: Final = {"level": 2, "upright, along x": 1, "upright, along y": 0}  # names of planes, and their normals
-_NOTHING: Final = sentence("Nothing is computed until something is asked for.")
+_NOTHING: Final = sentence("Choose one or several of these.")
 
 
 class _SupersededError(SaglineError):
@@ -93,11 +93,11 @@ class RegionFeature(Feature):
     def _build_tab(self, page: Page) -> None:
         gui = page.server.gui
         with page.panel.readings.add_tab("Workspace"):
-            hint = "Further load that is to be borne, of this size along each axis."
+            hint = "Additional force in the wrench set, up to this size along each axis."
             self._force = gui.add_number("Force ± [N]", 0.0, min=0.0, hint=hint)
-            hint = "The same about each axis, about the center of mass."
+            hint = "Additional moment about each axis through the center of mass."
             self._moment = gui.add_number("Moment ± [N m]", 0.0, min=0.0, hint=hint)
-            hint = "Where the platform may go, turned as it is now, with these loads."
+            hint = "Positions that are feasible at this orientation with these loads."
             self._region_box: Any = gui.add_checkbox("Region", False, hint=hint)
             self._color: Any = gui.add_dropdown("Region colored by", (BY_CABLE, BY_MARGIN), visible=False)
             self._hull_html = gui.add_html("")
@@ -106,7 +106,7 @@ class RegionFeature(Feature):
             names = tuple(name for name, normal in PLANES.items() if normal in planes_of(page.robot))
             self._plane: Any = gui.add_dropdown("Plane", names, visible=False)
             self._key_html = gui.add_html("")
-            hint = "How far along each axis, the platform turned as it is."
+            hint = "Free travel along each axis at this orientation."
             self._travel_box: Any = gui.add_checkbox("Where can I go", False, hint=hint)
             self._travel_html = gui.add_html(_NOTHING)
         page.refresh_on(
@@ -162,7 +162,7 @@ class RegionFeature(Feature):
     def tick(self) -> None:
         """Write the progress of a hull."""
         if self._region_box.value and self._task.elapsed:
-            text = f"The region is worked out: {100.0 * self._progress:.0f} %, {self._task.elapsed:.0f} s so far"
+            text = f"Computing the region: {100.0 * self._progress:.0f} %, {self._task.elapsed:.0f} s so far"
             self._hull_html.content = sentence(text)
 
     def _arrange(self) -> None:

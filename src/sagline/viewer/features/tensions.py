@@ -124,7 +124,7 @@ def polygon_figure(
         return sentence(remark)
     drawn = field_of(snapshot) if field is None else field
     if drawn is None:
-        return sentence("No tensions within the limits balance the platform: there is nothing to choose from.")
+        return sentence("No tensions within the limits balance the platform.")
     return (
         block(_drawing(snapshot, drawn, marks, movable=field is not None))
         + sentence(_description(snapshot, drawn, movable=field is not None))
@@ -141,8 +141,8 @@ def why_none(snapshot: Snapshot) -> str:
     """Why the feasible tensions of a robot have no drawing; "" where they have."""
     redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
     if redundant > MOST_REDUNDANT:
-        return f"{redundant} redundant cables: their feasible tensions have no picture in a plane."
-    return "As many cables as freedoms: the balance leaves nothing to choose." if redundant == 0 else ""
+        return f"{redundant} redundant cables: the feasible tensions cannot be drawn in a plane."
+    return "No redundant cable: the force balance determines the tensions." if redundant == 0 else ""
 
 
 def field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
@@ -198,7 +198,7 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     text += "" if plan is None else f", {method_name(plan.tension)}"
     share = (point[0] - field.low[0]) / max(float(field.high[0] - field.low[0]), 1e-9)
     return (
-        '<g class="handle" tabindex="0" role="slider" aria-label="Tensions, in the field of all that are feasible" '
+        '<g class="handle" tabindex="0" role="slider" aria-label="Tensions in the set of feasible ones" '
         f'aria-roledescription="slider of {field.redundant} dimensions" aria-valuemin="0" aria-valuemax="100" '
         f'aria-valuenow="{100.0 * share:.0f}" aria-valuetext="{escape(text)}">'
         f'<circle cx="{x:.1f}" cy="{y:.1f}" r="18" class="reach"/>{dot}</g>'
@@ -226,13 +226,13 @@ def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     if field.redundant == 1:
         ends = field.polygon.vertices[:, 0]
         point = float(field.polygon.coordinates(snapshot.tension)[0])
-        span = f"{ends.min():.4g} to {ends.max():.4g} N" if np.isfinite(ends).all() else "without an end"
+        span = f"{ends.min():.4g} to {ends.max():.4g} N" if np.isfinite(ends).all() else "unbounded"
         text = f"One redundant cable: λ may be {span}; chosen: {number(point, '.4g')} N."
         return f"{text} {how}" if movable else text
     if not field.polygon.bounded:
-        return f"{how} Sides: the limit that each is; one without a name is none, there it goes on."
+        return f"{how} Sides: limits of the cables; the set is unbounded at a side without a name."
     width, height = np.ptp(field.corners, axis=0)
-    return f"{how} Sides: the limit that each is. Width {unit.written(width)}, height {unit.written(height)}."
+    return f"{how} Sides: limits of the cables. Width {unit.written(width)}, height {unit.written(height)}."
 
 
 def _key(snapshot: Snapshot, marks: tuple[MethodMark, ...], back: str) -> str:
@@ -254,7 +254,7 @@ def _key(snapshot: Snapshot, marks: tuple[MethodMark, ...], back: str) -> str:
     remark = ""
     if by_hand:
         again = f" <button {chosen_by(SHARING, back)}>Back to {escape(back)}</button>" if back else ""
-        kept = "where the platform is dragged, the tensions stay as near to these as balance and limits allow"
+        kept = "at other poses the tensions stay as close to these as force balance and limits allow"
         remark = f'<div class="hand"><b>{BY_HAND.capitalize()}</b>: {kept}.{again}</div>'
     return block(f'{remark}<div class="ways">{"".join(parts)}</div>')
 
