@@ -10,7 +10,7 @@ from sagline import article_balance
 from sagline.core.errors import MOST
 from sagline.viewer import readout
 from sagline.viewer.robot_scene import cable_segments, chord_segments
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from tests.refusal import refused
 from tests.tiers import extended, wide
 
@@ -74,7 +74,7 @@ def test_ends_that_no_cable_reaches_are_named(count: int) -> None:
         assert solver.status is sl.PoseStatus.NO_CHORD
         assert np.isnan(solver.unstrained_length).all()
         both = sl.Pose(np.stack((robot_middle(robot), pose.position)), np.stack((pose.matrix, pose.matrix)))
-        snapshot = taken_at(robot, pose, Settings(mass=robot.mass), None)
+        snapshot = snapshot_at(robot, pose, Settings(mass=robot.mass), None)
         for refuse in (sl.inverse, sl.structure_matrix, article_balance):
             with pytest.raises(sl.CableGeometryError) as error:
                 refuse(robot, pose)

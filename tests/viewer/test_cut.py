@@ -92,18 +92,18 @@ def test_it_swings_as_simulate_says_and_calm_puts_all_back(page: Shown) -> None:
         peak = cut.peak_of(by_itself, 2)
         others = np.delete(by_itself.largest_tension, 2)  # type: ignore[arg-type]
         assert peak.tension == others.max()
-        await_that(lambda: "So far" not in page.text)
+        await_that(lambda: " so far" not in page.text)
         assert f"{peak.tension:.1f} N in cable {peak.cable}" in page.text
         assert f"{peak.tension / ROBOT.tension_max[peak.cable]:.2f} times" in page.text
         await_that(lambda: page.told("clock")["time"] == whole.duration)
         assert isinstance(page.viewer.view and page.viewer.view.snapshot, InMotion)
-        client.set(handle(page, "Undo the cut"), True)
+        client.set(handle(page, "Undo cut"), True)
         await_that(lambda: played() is None)
         after = page.viewer.view
         assert after is not None
         np.testing.assert_array_equal(after.snapshot.pose.position, POSE.position)
         np.testing.assert_array_equal(after.snapshot.tension, before.snapshot.tension)
-        assert not handle(page, "Undo the cut").visible
+        assert not handle(page, "Undo cut").visible
 
 
 def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
@@ -112,7 +112,7 @@ def test_what_was_put_on_meanwhile_is_not_played_over() -> None:
         given, first, second = PlayedSimulation(made.simulation()), made.simulation(50), made.simulation(60)
         viewer = Page(server, FEATURES, given.robot, given)
         cuts, player = viewer.feature(CutFeature), viewer.player
-        cuts._asked, before = 1, Before(given.home, player.save())
+        cuts._requested, before = 1, Before(given.home, player.save())
         cuts._play(1, first, 3, before)
         cuts._play(1, second, 3, before)
         assert isinstance(player.played, PlayedSimulation)
@@ -131,15 +131,15 @@ def test_cut_by_cut_all_is_put_back() -> None:
         viewer = Page(server, FEATURES, given.robot, given)
         cuts, player = viewer.feature(CutFeature), viewer.player
         for number in (1, 2):
-            cuts._asked = number
+            cuts._requested = number
             cuts._play(number, made.simulation(50), 3, Before(given.home, player.save()))
         first = cuts._before[-1].kept.played
         cuts.undo()
         assert player.played is first
-        assert handle(server, "Undo the cut").visible
+        assert handle(server, "Undo cut").visible
         cuts.undo()
         assert player.played is given
-        assert not handle(server, "Undo the cut").visible
+        assert not handle(server, "Undo cut").visible
     finally:
         stop_server(server)
 

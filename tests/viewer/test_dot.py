@@ -18,7 +18,7 @@ from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
 from sagline.viewer.features.tensions import MethodMarks, field_of, grouped, polygon_figure
 from sagline.viewer.page import Page, Source, home_pose
-from sagline.viewer.snapshot import METHODS, Settings, Snapshot, taken_at
+from sagline.viewer.snapshot import METHODS, Settings, Snapshot, snapshot_at
 from tests.effort import best_rate
 from tests.tiers import extended, wide
 from tests.viewer.client import Client, await_that
@@ -77,7 +77,7 @@ def nearest_by_program(polygon: sl.TensionPolygon, low: Any, high: Any, at: np.n
 @pytest.mark.parametrize("name", ["cogiro", "falcon-7", "ipanema-1"])
 def test_dot_stays_at_the_nearest_point_of_the_field(name: str) -> None:
     robot, generator = sl.load_robot(name), np.random.default_rng(3)
-    field = field_of(taken_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
+    field = field_of(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
     assert field is not None
     polygon = field.polygon
     for _ in range(10):
@@ -92,7 +92,7 @@ def test_dot_stays_at_the_nearest_point_of_the_field(name: str) -> None:
 
 def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
     robot = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
-    snapshot = taken_at(robot, home_pose(robot), Settings(mass=robot.mass), None)
+    snapshot = snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None)
     field = field_of(snapshot)
     assert field is not None
     assert None in field.sides
@@ -104,7 +104,7 @@ def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
         if side is not None:
             assert at_limit[side.cable]
     one = sl.load_robot("falcon-7").replace(tension_max=np.inf)
-    line = field_of(taken_at(one, home_pose(one), Settings(mass=one.mass), None))
+    line = field_of(snapshot_at(one, home_pose(one), Settings(mass=one.mass), None))
     assert line is not None
     assert np.isfinite(line.corners).all()
 
@@ -222,7 +222,7 @@ def test_what_is_no_place_is_not_heard(page: Shown, value: Any) -> None:
 def test_marks_are_where_their_ways_are() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
-    snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
+    snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
     field, found = field_of(snapshot), MethodMarks()
     assert field is not None
     assert snapshot.plan is not None
@@ -284,7 +284,7 @@ def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
 def test_what_a_way_misses_is_told() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([5.0, 3.0, 2.2], np.eye(3))
-    snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
+    snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
     assert snapshot.plan is not None
     assert not sl.inverse(robot, pose, tension=sl.ClosedForm()).feasible
     marks = MethodMarks().at(snapshot.plan, further=True)
@@ -296,10 +296,10 @@ def test_what_a_way_misses_is_told() -> None:
 
 def test_a_field_keeps_its_place_while_the_dot_moves() -> None:
     settings = Settings(mass=HEAVY.mass)
-    first = field_of(taken_at(HEAVY, home_pose(HEAVY), settings, None))
+    first = field_of(snapshot_at(HEAVY, home_pose(HEAVY), settings, None))
     assert isinstance(first, DotField)
     hand = ByHand(target=first.tension(first.corners[0]))
-    second = field_of(taken_at(HEAVY, home_pose(HEAVY), Settings(mass=HEAVY.mass, tension=hand), None), first)
+    second = field_of(snapshot_at(HEAVY, home_pose(HEAVY), Settings(mass=HEAVY.mass, tension=hand), None), first)
     assert second is not None
     assert second.scale == first.scale
     np.testing.assert_array_equal(second.middle, first.middle)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 
 ROBOT = sl.load_robot("article-suspended")
@@ -19,7 +19,7 @@ def exported(robot: sl.Robot, pose: sl.Pose) -> Any:
 
     from sagline.viewer.features.export import scene_as_glb
 
-    glb = scene_as_glb(taken_at(robot, pose, Settings(mass=50.0), None), TensionScale.of(robot))
+    glb = scene_as_glb(snapshot_at(robot, pose, Settings(mass=50.0), None), TensionScale.of(robot))
     scene = trimesh.load(BytesIO(glb), file_type="glb")
     assert isinstance(scene, trimesh.Scene)
     return scene

@@ -37,7 +37,7 @@ def pixel() -> bytes:
 
 
 def taking(page: Shown) -> bool:
-    return any(visitor.taking.locked() for visitor in tuple(page.viewer.feature(ExportFeature)._exporters.values()))
+    return any(visitor.busy.locked() for visitor in tuple(page.viewer.feature(ExportFeature)._exporters.values()))
 
 
 def said(messages: Iterable[dict[str, Any]], topic: str) -> list[Any]:

@@ -11,7 +11,7 @@ from sagline.viewer.features import FEATURES
 from sagline.viewer.features.proof import cable_forces, force_polygon_figure, forces_on_platform, residual
 from sagline.viewer.missing import missing_of
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from sagline.viewer.tension_scale import force_unit
 from tests.tiers import wide
 from tests.viewer.client import Client, await_that
@@ -133,7 +133,7 @@ def test_the_largest_force_has_three_digits_at_least(name: str) -> None:
 
 def test_the_gap_is_the_missing_force() -> None:
     robot = sl.load_robot("cogiro")
-    snapshot = taken_at(robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), Settings(mass=robot.mass), None)
+    snapshot = snapshot_at(robot, sl.Pose([6.3, 2.1, 5.4], np.eye(3)), Settings(mass=robot.mass), None)
     missing = missing_of(snapshot)
     assert missing is not None
     pulls = forces_on_platform(missing.state, missing.wrench)

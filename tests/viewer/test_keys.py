@@ -14,7 +14,7 @@ from sagline.viewer.feature import View
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.keyboard import MOST, TURN, nudged, place_of, screen_reader_text
 from sagline.viewer.page import Page, home_pose
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 from tests.tiers import extended
 from tests.viewer.client import Client, await_that
@@ -101,7 +101,7 @@ def test_turns_are_about_the_axes_of_the_world() -> None:
 
 def said(pose: sl.Pose) -> Any:
     set_to = Settings(ROBOT.mass)
-    snapshot = taken_at(ROBOT, pose, set_to, None)
+    snapshot = snapshot_at(ROBOT, pose, set_to, None)
     return screen_reader_text(View(snapshot, set_to, TensionScale.of(ROBOT), False))
 
 

@@ -17,7 +17,7 @@ from sagline.viewer.features import FEATURES
 from sagline.viewer.features.modes import ModesFeature
 from sagline.viewer.page import Page, home_pose
 from sagline.viewer.playback import PlayedSimulation
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from sagline.viewer.swing import PERIOD, mode_of
 from sagline.viewer.tension_scale import TensionScale
 from tests.effort import best_rate
@@ -212,7 +212,7 @@ def test_of_work_aside_the_latest_alone_counts() -> None:
 @pytest.mark.parametrize("name", wide(["cogiro", "falcon-7", "fast"]))
 def test_every_natural_frequency_among_the_readings_is_pressed_to_see_its_mode(name: str) -> None:
     robot = sl.load_robot(name)
-    seen = taken_at(robot, home_pose(robot), Settings(robot.mass), None)
+    seen = snapshot_at(robot, home_pose(robot), Settings(robot.mass), None)
     assert seen.plan is not None
     frequency = sl.modes(seen.plan.state).frequency
     text = readout.numbers(seen, TensionScale.of(robot), np.append(frequency, [0.0, np.nan]))

@@ -7,14 +7,14 @@ import pytest
 
 import sagline as sl
 from sagline.viewer.features.tensions import polygon_figure
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 
 ROBOT = sl.load_robot("article-suspended")
 HERE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
 
 
 def test_drawing_has_the_shape_of_the_polygon_and_the_dot_in_its_place() -> None:
-    html = polygon_figure(taken_at(ROBOT, HERE, Settings(mass=50.0, tension=sl.Centroid()), None))
+    html = polygon_figure(snapshot_at(ROBOT, HERE, Settings(mass=50.0, tension=sl.Centroid()), None))
     polygon = sl.tension_polygon(ROBOT, HERE)
     found = re.search(r'<polygon points="(.*?)"', html)
     assert found is not None
@@ -30,7 +30,7 @@ def test_drawing_has_the_shape_of_the_polygon_and_the_dot_in_its_place() -> None
 
 
 def test_sides_are_named_outside_of_the_polygon() -> None:
-    html = polygon_figure(taken_at(ROBOT, HERE, Settings(mass=50.0), None))
+    html = polygon_figure(snapshot_at(ROBOT, HERE, Settings(mass=50.0), None))
     found = re.search(r'<polygon points="(.*?)"', html)
     assert found is not None
     corners = np.array([[float(part) for part in point.split(",")] for point in found[1].split()])
@@ -49,8 +49,8 @@ def test_other_redundancies_are_told_in_words() -> None:
     seven = sl.load_robot("falcon-7")
     assert seven.test_box is not None
     middle = sl.Pose(0.5 * (seven.test_box.low + seven.test_box.high), np.eye(3))
-    html = polygon_figure(taken_at(seven, middle, Settings(mass=seven.mass), None))
+    html = polygon_figure(snapshot_at(seven, middle, Settings(mass=seven.mass), None))
     ends = sl.tension_polygon(seven, middle).vertices[:, 0]
     assert f"{ends.min():.4g} to {ends.max():.4g} N" in html
-    outside = taken_at(ROBOT, sl.Pose([7.2, 3.0, 1.5], np.eye(3)), Settings(mass=50.0), None)
+    outside = snapshot_at(ROBOT, sl.Pose([7.2, 3.0, 1.5], np.eye(3)), Settings(mass=50.0), None)
     assert "No tensions" in polygon_figure(outside)

@@ -11,7 +11,7 @@ from sagline.viewer import shapes
 from sagline.viewer.page import home_pose
 from sagline.viewer.robot_scene import RobotScene
 from sagline.viewer.server import PageServer, start_server, stop_server
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 from tests.tiers import wide
 
@@ -62,7 +62,7 @@ def test_pulleys_turn_and_exit_points_move_with_the_platform(server: PageServer)
     assert np.asarray(wheels.batched_positions) == pytest.approx(robot.frame_anchors, abs=1e-6)
     seen = []
     for position in ([0.0, 0.0, 2.0], [1.0, 0.5, 2.5]):
-        snapshot = taken_at(robot, sl.Pose(position, np.eye(3)), Settings(mass=robot.mass), None)
+        snapshot = snapshot_at(robot, sl.Pose(position, np.eye(3)), Settings(mass=robot.mass), None)
         stage.show(snapshot, TensionScale.of(robot), 1.0, 1.0, ghost=True)
         assert np.asarray(wheels.batched_wxyzs) == pytest.approx(
             shapes.pulley_rotations(robot, snapshot.pose), abs=1e-6

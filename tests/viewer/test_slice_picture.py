@@ -28,10 +28,10 @@ def test_lines_are_where_the_margin_is_round(normal: int) -> None:
 def test_each_line_says_its_margin_apart_from_the_others() -> None:
     cut = slice_of(ball, Plane(2, 0.0), LOW, HIGH, (60, 60))
     marks = picture_of(cut, SCALE, UNIT).marks
-    assert [mark.text for mark in marks] == ["0 N", "−25 N", "25 N", "50 N", "75 N"]
-    places = np.array([mark.place for mark in marks])
+    assert [text for text, _ in marks] == ["0 N", "−25 N", "25 N", "50 N", "75 N"]
+    places = np.array([place for _, place in marks])
     margins = ball(places).margin
-    np.testing.assert_allclose(margins, [float(mark.text[:-2].replace("−", "-")) for mark in marks], atol=1.0)
+    np.testing.assert_allclose(margins, [float(text[:-2].replace("−", "-")) for text, _ in marks], atol=1.0)
     away = np.linalg.norm(places[:, None] - places, axis=2)[np.triu_indices(len(places), 1)]
     assert away.min() >= APART * 3.8
 

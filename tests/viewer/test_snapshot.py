@@ -8,7 +8,7 @@ import pytest
 import sagline as sl
 from sagline.viewer.readout import legend
 from sagline.viewer.robot_scene import cable_colors, cable_segments, chord_segments, scaled_position
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 
 ROBOT = sl.load_robot("article-suspended")
@@ -16,7 +16,7 @@ HERE = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
 
 
 def test_snapshot_shows_the_plan_of_its_pose() -> None:
-    snapshot = taken_at(ROBOT, HERE, Settings(mass=50.0), None)
+    snapshot = snapshot_at(ROBOT, HERE, Settings(mass=50.0), None)
     plan = sl.inverse(ROBOT, HERE)
     assert snapshot.feasible
     assert snapshot.reason == ""
@@ -28,7 +28,7 @@ def test_snapshot_shows_the_plan_of_its_pose() -> None:
 
 def test_margins_are_those_of_the_tension_that_is_limited() -> None:
     robot = ROBOT.replace(tension_limits_of="frame_end")
-    snapshot = taken_at(robot, HERE, Settings(mass=50.0), None)
+    snapshot = snapshot_at(robot, HERE, Settings(mass=50.0), None)
     plan = sl.inverse(robot, HERE)
     weight = robot.cables.linear_density * 9.81 * plan.unstrained_length
     winch = np.hypot(plan.horizontal_tension, plan.vertical_force - weight)
@@ -43,8 +43,8 @@ def test_settings_change_the_robot() -> None:
     assert robot.inertia == pytest.approx(1.5 * ROBOT.inertia)
     assert robot.cables.linear_density == pytest.approx(0.134)
     assert robot.cables.axial_stiffness == pytest.approx(22e3)
-    heavier = taken_at(robot, HERE, Settings(mass=75.0), None)
-    assert heavier.tension.sum() > 1.4 * taken_at(ROBOT, HERE, Settings(mass=50.0), None).tension.sum()
+    heavier = snapshot_at(robot, HERE, Settings(mass=75.0), None)
+    assert heavier.tension.sum() > 1.4 * snapshot_at(ROBOT, HERE, Settings(mass=50.0), None).tension.sum()
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_senseless_settings_are_refused(wrong: dict[str, Any]) -> None:
 
 
 def test_approximate_model_rests_where_forward_finds_it() -> None:
-    snapshot = taken_at(ROBOT, HERE, Settings(mass=50.0, model=sl.Empirical()), None)
+    snapshot = snapshot_at(ROBOT, HERE, Settings(mass=50.0, model=sl.Empirical()), None)
     lengths = sl.inverse(ROBOT, HERE, model=sl.Empirical()).unstrained_length
     found = sl.forward(ROBOT, lengths, start=HERE)
     assert snapshot.error == pytest.approx(found.pose.position - HERE.position, abs=1e-9)
@@ -70,7 +70,7 @@ def test_approximate_model_rests_where_forward_finds_it() -> None:
 
 def test_infeasible_pose_says_by_how_much_and_which_cables() -> None:
     outside = sl.Pose([7.2, 3.0, 1.5], np.eye(3))
-    snapshot = taken_at(ROBOT, outside, Settings(mass=50.0), None)
+    snapshot = snapshot_at(ROBOT, outside, Settings(mass=50.0), None)
     plan = sl.inverse(ROBOT, outside)
     assert not snapshot.feasible
     assert f"short of {float(plan.shortfall):.1f} N;" in snapshot.reason
@@ -82,7 +82,7 @@ def test_infeasible_pose_says_by_how_much_and_which_cables() -> None:
 
 def test_what_is_missing_is_told_in_the_unit_of_the_readings() -> None:
     heavy, outside = sl.load_robot("fast"), sl.Pose([100.0, 0.0, 200.0], np.eye(3))
-    snapshot = taken_at(heavy, outside, Settings(mass=heavy.mass), None)
+    snapshot = snapshot_at(heavy, outside, Settings(mass=heavy.mass), None)
     missing = 1e-3 * float(sl.inverse(heavy, outside).shortfall)
     assert missing > 1.0
     assert f" {missing:.2f} kN;" in snapshot.reason
@@ -91,14 +91,14 @@ def test_what_is_missing_is_told_in_the_unit_of_the_readings() -> None:
 
 def test_platform_on_an_anchor_is_no_accident() -> None:
     on_anchor = sl.Pose(ROBOT.frame_anchors[0] - ROBOT.platform_anchors[0], np.eye(3))
-    snapshot = taken_at(ROBOT, on_anchor, Settings(mass=50.0), None)
+    snapshot = snapshot_at(ROBOT, on_anchor, Settings(mass=50.0), None)
     assert not snapshot.feasible
     assert "coincide" in snapshot.reason
     assert np.isfinite(cable_segments(snapshot, 1.0)).all()
 
 
 def test_ghosts_are_drawn_only_where_they_are_apart_from_their_cables() -> None:
-    snapshot = taken_at(ROBOT, HERE, Settings(mass=50.0), None)
+    snapshot = snapshot_at(ROBOT, HERE, Settings(mass=50.0), None)
     assert snapshot.plan is not None
     sag = snapshot.plan.state.cables.sag
     apart = 0.042  # m: two cables hang less below their chords, the others visibly more
@@ -117,7 +117,7 @@ def test_cables_over_pulleys_are_drawn_on_them_whether_they_hold_or_not() -> Non
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=0.2, dead_cable=2.0))
     outside = sl.Pose([7.2, 3.0, 1.5], np.eye(3))
     for pose, model in ((HERE, sl.Catenary()), (outside, sl.Elastic())):
-        snapshot = taken_at(robot, pose, Settings(mass=50.0), None)
+        snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
         assert snapshot.feasible is (pose is HERE)
         courses = snapshot.courses(1.0)
         np.testing.assert_array_equal(courses[:, 0], ROBOT.frame_anchors)
@@ -138,7 +138,7 @@ def test_cables_over_pulleys_are_drawn_on_them_whether_they_hold_or_not() -> Non
 def test_a_platform_dragged_into_a_pulley_says_so() -> None:
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=0.2))
     corner = ROBOT.frame_anchors[3] - ROBOT.platform_anchors[3]
-    snapshot = taken_at(robot, sl.Pose(corner + np.array([0.1, 0.1, -1.0]), np.eye(3)), Settings(mass=50.0), None)
+    snapshot = snapshot_at(robot, sl.Pose(corner + np.array([0.1, 0.1, -1.0]), np.eye(3)), Settings(mass=50.0), None)
     assert not snapshot.feasible
     assert snapshot.reason.startswith("cable 2: ")
     assert "0.282842712 m; allowed: > 0.4 m there" in snapshot.reason

@@ -94,7 +94,7 @@ def test_nothing_is_computed_until_it_is_asked_for(page: Shown, client: Client) 
     client.drag([0.5, 0.5, 2.0])
     await_that(lambda: page.position[0] == 0.5)
     assert not show_of(page).waiting
-    assert all(page.node(name) is None for name in ("/slice/picture", "/hull/0", "/ways"))
+    assert all(page.node(name) is None for name in ("/slice/picture", "/hull/0", "/travel"))
     assert "Nothing is" in page.text
 
 
@@ -129,7 +129,7 @@ def test_a_slice_follows_a_drag_thirty_times_a_second(page: Shown, client: Clien
 @extended
 def test_ways_end_where_the_robot_can_no_more(page: Shown, client: Client) -> None:
     choose(page, client, ways=True, force=50.0)
-    arrows = page.node("/ways")
+    arrows = page.node("/travel")
     assert arrows is not None
     ends = arrows.points[:, 1].astype(float)
     low = ends[:, 2] > 0.05  # not that which ends on the floor

@@ -18,7 +18,7 @@ from sagline.viewer.features.state import code_of
 from sagline.viewer.page import Page, Source
 from sagline.viewer.panel import mass_range
 from sagline.viewer.playback import PlayedPlan, PlayedSimulation
-from sagline.viewer.snapshot import METHODS, MODELS, Settings, Snapshot, depends_on_history, taken_at
+from sagline.viewer.snapshot import METHODS, MODELS, Settings, Snapshot, depends_on_history, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 from tests.tiers import extended, wide
 from tests.viewer.client import PATIENCE, Client, await_that
@@ -91,7 +91,7 @@ def a_case(seed: int) -> None:
     changed = set_to.applied(robot)
     for _ in range(3 if depends_on_history(set_to.tension) else 1):
         try:
-            snapshot = taken_at(changed, a_pose(robot, random), set_to, previous, wrench=wrench)
+            snapshot = snapshot_at(changed, a_pose(robot, random), set_to, previous, wrench=wrench)
         except sl.InvalidValueError:  # this robot cannot be shared so: the page says it, and shows nothing
             return
         previous = snapshot.plan if snapshot.feasible else previous
@@ -110,7 +110,7 @@ def test_arguments_are_written_where_they_are_not_usual() -> None:
     robot = sl.load_robot("cogiro")
     tension = sl.QuadraticProgram(target=300.0, variable="frame_end")
     set_to = Settings(robot.mass, model=sl.Empirical(k_h=5.0), tension=tension)
-    snapshot = taken_at(robot, sl.Pose([0.0, 0.0, 2.0], np.eye(3)), set_to, None)
+    snapshot = snapshot_at(robot, sl.Pose([0.0, 0.0, 2.0], np.eye(3)), set_to, None)
     code = code_of(View(snapshot, set_to, TensionScale.of(robot), False), robot, Source())
     assert "model=sl.Empirical(k_h=5.0)," in code
     method = re.search(r"tension=sl\.QuadraticProgram\((.*?)\),", code, re.DOTALL)
@@ -145,7 +145,7 @@ def test_beside_a_run_its_robot_is_that_of_the_file(tmp_path: Path) -> None:
     robot, file = sl.load_robot("article-suspended"), tmp_path / "run.nc"
     sl.inverse(robot.replace(mass=77.0), path_of(robot)).save(file)
     set_to = Settings(77.0)
-    snapshot = taken_at(robot.replace(mass=77.0), sl.Pose([0.1, 0.2, 1.6], np.eye(3)), set_to, None)
+    snapshot = snapshot_at(robot.replace(mass=77.0), sl.Pose([0.1, 0.2, 1.6], np.eye(3)), set_to, None)
     view = View(snapshot, set_to, TensionScale.of(robot), False)
     same(code_of(view, robot.replace(mass=77.0), Source.of_file("plan", file)), snapshot)
 

@@ -6,7 +6,7 @@ import pytest
 import sagline as sl
 from sagline import vibration
 from sagline.viewer import shapes
-from sagline.viewer.snapshot import Settings, taken_at
+from sagline.viewer.snapshot import Settings, snapshot_at
 from sagline.viewer.swing import Swing, mode_of
 from tests.tiers import wide
 
@@ -25,7 +25,7 @@ def swings(name: str, up_to: float = 8.0) -> list[Swing]:
 def test_at_rest_it_is_what_the_page_shows(name: str) -> None:
     for swing in swings(name):
         robot, pose = swing.state.one_robot, swing.state.pose
-        seen = taken_at(robot, pose, Settings(robot.mass), None)
+        seen = snapshot_at(robot, pose, Settings(robot.mass), None)
         np.testing.assert_allclose(swing.courses(0.0), seen.courses(1.0), atol=1e-9)
         np.testing.assert_allclose(swing.pose(0.0).matrix, pose.matrix, atol=1e-12)
         break

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import sagline as sl
-from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_history, model_name, taken_at
+from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_history, model_name, snapshot_at
 from sagline.viewer.tension_scale import ForceUnit, number
 
 
@@ -28,7 +28,7 @@ def test_the_choices_are_named_as_the_readings_name_them() -> None:
     pose = sl.Pose([0.5, 0.2, 2.0], np.eye(3))
     assert all(model_name(model) == name for name, model in MODELS.items())
     for name, method in METHODS.items():
-        snapshot = taken_at(robot, pose, Settings(mass=50.0, tension=method), None)
+        snapshot = snapshot_at(robot, pose, Settings(mass=50.0, tension=method), None)
         assert snapshot.origin == f"catenary (exact), {name}"
 
 

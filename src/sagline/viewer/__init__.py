@@ -1,1 +1,1 @@
-"""The viewer: a robot in the browser, its cables hanging as they hang, following the platform that one drags."""
+"""Viewer: a robot in the browser whose sagging cables follow the dragged platform."""

@@ -1,4 +1,4 @@
-"""Tensions chosen by hand in the field of feasible tensions."""
+"""Tensions chosen by hand in a drawing of the feasible tensions."""
 
 from __future__ import annotations
 
@@ -16,35 +16,33 @@ BY_HAND: Final = "chosen by hand"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ByHand(QuadraticProgram):
-    """The feasible tensions nearest to those that were chosen: these themselves, where the platform was then.
+    """The feasible tensions nearest to chosen ones; at the pose where they were chosen, these tensions themselves.
 
-    Chord tensions that balance a pose differ from those of the minimum norm by a point of the null space, and so do
-    those nearest to them: with the pulls of sagging cables the former move a little, the point stays. Elsewhere the
-    tensions stay as near to the chosen ones as balance and limits allow.
+    Tensions in force balance differ from those of the minimum norm by a point of the null space. The sag forces shift
+    the minimum norm a little, the point stays. At other poses the tensions stay as close as balance and limits allow.
     """
 
 
 WIDTH, BORDER = 340, 26  # px
 HEIGHTS: Final = (0, 74, 190)  # px, by the number of redundant cables
-BEYOND: Final = 0.5  # how far a field without an end goes on, of the size of what is finite
+BEYOND: Final = 0.5  # of the size of the finite part: extension of an unbounded drawing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DotField:
     """Drawing of the feasible tensions."""
 
-    polygon: TensionPolygon  # all of them
-    # of what is drawn, in coordinates of the null space [N], shape (h, r), r 1 or 2; where the polygon has no end the
-    # drawing has
+    polygon: TensionPolygon
+    # of the drawing, in coordinates of the null space [N], shape (h, r), r 1 or 2; an unbounded polygon is clipped
     corners: Array
-    # the limit that each side of it is, from corner k to corner k + 1 (at corner k for an interval)
+    # limit of each side, from corner k to corner k + 1 (at corner k for an interval)
     sides: tuple[Side | None, ...]
     low: Array  # lowest coordinates of the drawing [N], shape (r,)
     high: Array  # highest [N], shape (r,)
 
     @classmethod
     def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
-        """The field of a polygon that is not empty, of one or two redundant cables."""
+        """Drawing of a nonempty polygon of one or two redundant cables."""
         corners, sides = polygon.vertices, polygon.sides
         if before is not None:
             low, high = before.low, before.high
@@ -61,27 +59,27 @@ class DotField:
 
     @property
     def height(self) -> int:
-        """Of the drawing [px]."""
+        """Height of the drawing [px]."""
         return HEIGHTS[self.redundant]
 
     @property
     def middle(self) -> Array:
-        """Coordinates in the middle of the drawing [N], shape (r,)."""
+        """Coordinates of the middle of the drawing [N], shape (r,)."""
         return np.asarray(0.5 * (self.low + self.high))
 
     @property
     def scale(self) -> float:
-        """Pixels a newton."""
-        room = np.array([WIDTH, self.height])[: self.redundant] - 2.0 * BORDER
-        return float(np.min(room / np.maximum(self.high - self.low, 1e-9)))
+        """Pixels per newton."""
+        inside = np.array([WIDTH, self.height])[: self.redundant] - 2.0 * BORDER
+        return float(np.min(inside / np.maximum(self.high - self.low, 1e-9)))
 
     def place(self, at: Array) -> tuple[float, float]:
-        """Place of coordinates (r,) in the drawing [px], from its left upper corner on."""
+        """Position of coordinates (r,) in the drawing [px], from its upper left corner."""
         away = self.scale * (at - self.middle)
         return 0.5 * WIDTH + float(away[0]), 0.5 * self.height - float(away[1] if self.redundant > 1 else 0.0)
 
     def nearest(self, at: Array) -> Array:
-        """The point of the field that is nearest to coordinates (r,)."""
+        """Nearest feasible point to coordinates (r,)."""
         if self.redundant == 1:
             return np.clip(at, self.corners.min(axis=0), self.corners.max(axis=0))
         starts, ends = self.corners, np.roll(self.corners, -1, axis=0)
@@ -94,7 +92,7 @@ class DotField:
         return np.asarray(feet[int(np.argmin(np.linalg.norm(feet - at, axis=1)))])
 
     def tension(self, at: Array) -> Array:
-        """Chord tensions at coordinates (r,) of the field [N], shape (m,)."""
+        """Chord tensions at coordinates (r,) [N], shape (m,)."""
         return np.maximum(self.polygon.origin + at @ self.polygon.basis, 0.0)
 
 
@@ -116,7 +114,7 @@ def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
 def _clipped(
     corners: Array, sides: tuple[Side | None, ...], low: Array, high: Array
 ) -> tuple[Array, tuple[Side | None, ...]]:
-    """Part of a field within a box; sides of the box are no limits."""
+    """Part of a polygon within a box; the sides of the box are not limits."""
     if corners.shape[1] == 1:
         return np.clip(corners, low, high), sides
     for axis, sign, end in ((0, 1.0, high[0]), (0, -1.0, -low[0]), (1, 1.0, high[1]), (1, -1.0, -low[1])):

@@ -24,7 +24,7 @@ class Camera(NamedTuple):
 
     @classmethod
     def of(cls, camera: Any) -> Camera | None:
-        """The camera of a client; None until it has sent a sensible one."""
+        """The camera of a client; None until it has sent a valid one."""
         try:
             turn, place = np.asarray(camera.wxyz, dtype=np.float64), np.asarray(camera.position, dtype=np.float64)
             pixels = np.array([camera.image_width, camera.image_height], dtype=np.float64)
@@ -94,7 +94,7 @@ def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: 
 
 
 def screen_point(value: Any) -> tuple[float, float] | None:
-    """Point of a picture in a message, (0, 0) at the upper left, (1, 1) at the lower right; None for nonsense."""
+    """Point of a picture in a message, (0, 0) at the upper left, (1, 1) at the lower right; None for invalid data."""
     try:
         x, y = (float(each) for each in value)
     except (TypeError, ValueError, OverflowError):
@@ -103,10 +103,10 @@ def screen_point(value: Any) -> tuple[float, float] | None:
 
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera
-FIELD = 0.7  # rad, of view, upright: a longer lens than viser's bends less
-BORDER = 1.06  # of the box, to stay off the edges
+FIELD = 0.7  # rad, vertical field of view: narrower than viser's, for less distortion
+BORDER = 1.06  # of the box, for a margin at the edges
 _USUAL = 1.3  # width over height until a client has sent its own
-_MOVED = 1e-3  # of the box: a camera farther from where it was put has been moved by hand
+_MOVED = 1e-3  # of the box: a camera farther from its set position has been moved by the user
 _UP: Final = np.array([0.0, 0.0, 1.0])
 
 
@@ -152,11 +152,11 @@ class Framing:
         self._low, self._high = low, high
         size = float(np.linalg.norm(high - low))
         self._near = _MOVED * size
-        self.farthest = 100.0 * size + float(np.abs([low, high]).max())  # m: no camera is asked for there
-        self._places: dict[int, list[Array]] = {}  # where each client's camera has been put
-        self._wanted: dict[int, Array] = {}  # what each client that is not known yet looks from and at
-        self._directed: set[int] = set()  # clients that look from where they were asked to, and are let be
-        self._lock = threading.Lock()  # clients' cameras are heard in a pool of threads
+        self.farthest = 100.0 * size + float(np.abs([low, high]).max())  # m: limit of camera positions
+        self._places: dict[int, list[Array]] = {}  # set positions of each client's camera
+        self._wanted: dict[int, Array] = {}  # position and target for clients that have not connected yet
+        self._directed: set[int] = set()  # clients whose camera follows a link, without framing
+        self._lock = threading.Lock()  # messages of cameras arrive in a pool of threads
         camera = server.initial_camera
         self._first, camera.look_at = fitted(low, high, _USUAL)
         camera.position = self._first
@@ -166,7 +166,7 @@ class Framing:
         server.on_client_disconnect(self._disconnect)
 
     def look(self, client: int, camera: Array) -> None:
-        """Have a client look from a place at another, as if its camera had been moved by hand."""
+        """Set position and target of the camera of a client, as if the user had moved it."""
         with self._lock:
             self._wanted[client] = camera
             known = self._server.get_clients().get(client)
@@ -178,14 +178,14 @@ class Framing:
         known = self._server.get_clients().get(client)
         if known is None:
             return None
-        with self._lock:  # a camera that is just being put somewhere has not been moved by hand
+        with self._lock:  # a camera that is being set has not been moved by the user
             try:
                 camera = np.array([known.camera.position, known.camera.look_at], dtype=np.float64).reshape(6)
             except (TypeError, ValueError):
-                return None  # nonsense
+                return None  # invalid data
             places = np.array([self._first, *self._places.get(client, [])])
-        still = len(places) == 1 or np.linalg.norm(places - camera[:3], axis=1).min() < self._near
-        return None if still or not np.all(np.abs(camera) <= self.farthest) else camera
+        unmoved = len(places) == 1 or np.linalg.norm(places - camera[:3], axis=1).min() < self._near
+        return None if unmoved or not np.all(np.abs(camera) <= self.farthest) else camera
 
     def _connect(self, client: viser.ClientHandle) -> None:
         client.camera.on_update(self._follow)
@@ -198,14 +198,14 @@ class Framing:
             self._directed.discard(client.client_id)
 
     def _follow(self, camera: viser.CameraHandle) -> None:
-        """Fit the box anew when the picture has other proportions, unless someone looks from elsewhere."""
+        """Frame the box again when the picture has other proportions, unless the user has moved the camera."""
         try:
             shape = np.array([camera.image_width, camera.image_height, camera.fov], dtype=np.float64)
             place = np.array(camera.position, dtype=np.float64).reshape(3)
         except (TypeError, ValueError):
-            return  # nonsense
+            return  # invalid data
         if not (np.all((shape > 0.0) & (shape < [1e5, 1e5, 3.0])) and 0.05 < shape[0] / shape[1] < 20.0):
-            return  # a hidden window, or nonsense
+            return  # a hidden window, or invalid data
         with self._lock:
             self._fit(camera, place, float(shape[0] / shape[1]), float(shape[2]))
 
@@ -213,13 +213,13 @@ class Framing:
         places = self._places.setdefault(camera.client.client_id, [])
         wanted = self._wanted.pop(camera.client.client_id, None)
         if wanted is not None:
-            places.append(self._first)  # from now on it is where nobody has put it
+            places.append(self._first)  # the camera counts as moved by the user from now on
             self._directed.add(camera.client.client_id)
             with camera.client.atomic():
                 camera.position, camera.look_at = wanted[:3], wanted[3:]
             return
         if camera.client.client_id in self._directed:
-            return  # whatever a page that has not heard yet still tells of its camera
+            return  # the page may still report its camera from before
         known = np.array([self._first, *places])
         if places and not np.linalg.norm(known - place, axis=1).min() < self._near:
             return

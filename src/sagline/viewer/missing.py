@@ -26,8 +26,8 @@ from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 ATTEMPTS: Final = 4
-MORE: Final = 1.0 + 1e-9  # times as large: exactly at the border rounding decides
-NEAR: Final = 1e-4  # of a tension: what is this near to a limit is at it
+MORE: Final = 1.0 + 1e-9  # factor on the wrench: exactly at the border, rounding would decide
+NEAR: Final = 1e-4  # of a tension: distance to a limit that counts as at the limit
 _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
 
@@ -35,7 +35,7 @@ class AtLimit(NamedTuple):
     """A cable at a limit."""
 
     cable: int  # its number
-    lower: bool  # whether it is the lower one; else the upper
+    lower: bool  # whether it is the lower limit, else the upper
 
     @property
     def name(self) -> str:
@@ -48,7 +48,7 @@ class MissingWrench:
     """Smallest wrench with which a pose is feasible, a force alone where one suffices."""
 
     wrench: Array  # about the center of mass, world axes [N, N m], shape (6,)
-    state: Equilibrium  # the equilibrium with it, the blocking cables at their limits
+    state: Equilibrium  # with this wrench, the blocking cables at their limits
     limits: tuple[AtLimit, ...]  # the cables at limits
 
     @property
@@ -63,7 +63,7 @@ class MissingWrench:
 
 
 def missing_of(snapshot: Snapshot) -> MissingWrench | None:
-    """Missing wrench of an infeasible pose; None where another reason holds, or none was found."""
+    """Missing wrench of an infeasible pose; None for other reasons, or where none was found."""
     plan = snapshot.plan
     if plan is None or snapshot.status not in _EXPLAINED:
         return None
@@ -93,7 +93,7 @@ def _step(plan: Plan) -> Array:
     lever = float(np.abs(matrix[turning]).max(initial=0.0)) or 1.0  # m: a moment counts as the force at this arm
     unit = np.where(turning, 1.0 / lever, 1.0)
     low = robot.tension_min
-    high = np.maximum(robot.tension_max, low * (1.0 + 1e-9) + 1e-9)  # the solver wants room
+    high = np.maximum(robot.tension_max, low * (1.0 + 1e-9) + 1e-9)  # the solver needs low < high
     found = lsq_linear(unit[:, None] * matrix, unit * (freedom @ needed), (low, high), tol=1e-12)
     rest: Array = freedom.T @ (freedom @ needed - matrix @ found.x)
     return rest
@@ -110,24 +110,24 @@ def _limits(plan: Plan, held: Plan) -> tuple[AtLimit, ...]:
 
 
 NODES: Final = 15  # of the first grid, along each axis
-AROUND: Final = 2  # points of a finer one to each side
+AROUND: Final = 2  # points of a finer grid to each side
 STARTS: Final = 4
 ITERATIONS: Final = 40
 FINEST: Final = 1e-6  # of the region's size
-BLOCK: Final = 250  # positions: a few milliseconds, after which other threads run
-INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # of the region's size: the border itself is no place to stay
+BLOCK: Final = 250  # positions at once: a few milliseconds, then other threads run
+INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # of the region's size, from the border inward
 
 
 class NearestFeasible(NamedTuple):
     """The nearest feasible pose."""
 
     pose: Pose
-    distance: float  # distance to it [m]
+    distance: float  # [m]
     turned: bool  # whether the orientation differs too
 
 
 def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestFeasible | None:
-    """The nearest feasible pose within the robot's region, turned as a pose or level; None where none was found."""
+    """Nearest feasible pose within the robot's region, at the orientation of a pose or level; None for none."""
     for turned in (False, True):
         start = Pose(pose.position, np.eye(3)) if turned else pose
         if turned and np.allclose(start.matrix, pose.matrix):
@@ -135,7 +135,7 @@ def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array 
         try:
             search = _Search(robot, start, model, wrench)
             found = search.nearest(pose.position)
-        except SaglineError:  # a pattern that does not turn so
+        except SaglineError:  # a motion pattern without this rotation
             continue
         if found is not None:
             there = Pose.from_quaternion(found, start.quaternion)

@@ -1,4 +1,4 @@
-"""Off-screen scenes, pictures of them, and the legend beneath."""
+"""Off-screen scenes, their pictures, and the legend below."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from sagline.core.arrays import Array
 from sagline.core.errors import InvalidValueError
 from sagline.viewer.feature import View
 from sagline.viewer.player import Played
-from sagline.viewer.readout import spaced
+from sagline.viewer.readout import spaced_ticks
 from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
 from sagline.viewer.server import Messages
 from sagline.viewer.tension_scale import force_unit
 
-HEIGHT: Final = 4.0  # of the size of its text
+HEIGHT: Final = 4.0  # of the text size
 _STOPS = 16  # of the bar's colors
 
 
@@ -36,33 +36,33 @@ def strip_of(view: View, *remarks: str) -> dict[str, Any]:
         "title": view.snapshot.robot.name,
         "remark": ", ".join((*remarks, *larger)),
         "colors": ["#{:02x}{:02x}{:02x}".format(*map(int, color)) for color in colors],
-        "ticks": [[f"{tick / unit.newtons:g}", place] for tick, place in spaced(scale)],
+        "ticks": [[f"{tick / unit.newtons:g}", place] for tick, place in spaced_ticks(scale)],
         "legend": f"Chord tension [{unit.name}]",
     }
 
 
 PATIENCE: Final = 30.0  # s to wait for a picture
 NAMES: Final = ("/names", "/platform/notice")  # nodes that are in no picture
-STATIC: Final = ("/hull", "/slice")  # nodes that are the same at any time of what is played
-BORDER: Final = 1.06  # of the robot, to stay off the edges
+STATIC: Final = ("/hull", "/slice")  # nodes that do not change over time
+BORDER: Final = 1.06  # of the robot, for a margin at the edges
 SHAPES: Final = 0.8, 2.4  # width over height of a picture, least and most
-DEEPEST: Final = 950.0  # m from the camera: of a picture that is asked for viser's client draws nothing beyond 1000 m
-_FIRST: Final = 32  # px, of a picture that is thrown away
+DEEPEST: Final = 950.0  # m from the camera: in requested pictures viser draws nothing beyond 1000 m
+_FIRST: Final = 32  # px, of a picture that is discarded
 
 
 class Shot(NamedTuple):
-    """A picture that a client's page is asked for."""
+    """A picture that is requested from a client's page."""
 
-    height: int  # its rows
-    width: int  # its columns
-    field: float  # upright field of view [rad]
-    pixel: float  # size of its pixels where the robot is [m]
-    # how far before the client's camera it is taken, for a robot so large that its end is too far away [m]
+    height: int  # [px]
+    width: int  # [px]
+    field: float  # vertical field of view [rad]
+    pixel: float  # size of a pixel at the distance of the robot [m]
+    # distance in front of the client's camera, for robots that end beyond the drawing distance [m]
     forward: float
 
     @classmethod
     def of(cls, camera: viser.CameraHandle, low: Array, high: Array, width: int, height: int = 0) -> Shot:
-        """A picture of as much of a box as a client's window shows, whatever the window's proportions."""
+        """A picture of the part of a box that a client's window shows, for any proportions of the window."""
         right, up, far, forward = _seen(camera, low, high)
         rows = height or round(width / float(np.clip(right / up, *SHAPES)))
         slope = BORDER * max(up, right * rows / width)
@@ -80,7 +80,7 @@ def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, f
             raise ValueError(edge)
     except (TypeError, ValueError, ZeroDivisionError):
         step = "Reload the page."
-        raise InvalidValueError("camera", "nowhere", "a place, a direction and a lens", step) from None
+        raise InvalidValueError("camera", "not known", "a position, a direction and a field of view", step) from None
     depth = place[:, 2]
     far, forward = float(depth.mean()), max(0.0, float(depth.max()) - DEEPEST)
     if depth.min() <= forward:  # some of the box is behind the camera
@@ -107,22 +107,22 @@ class OffscreenScene:
         played: Played | None,
         line_width: float,
     ) -> None:
-        """Build the scene of what is played, or else of what is shown."""
+        """Build the scene of what is played, or of the view."""
         self._client, self._shot = client, shot
         snapshot = view.snapshot
         robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.home)
         self._robot_scene = RobotScene(client.scene, robot, home, live=False, pixel=line_width * shot.pixel)
         if played is not None:
             self._robot_scene.show_traces(*played.traces(TRACE_POINTS, view.settings.error_scale))
-        drawn = set(client.scene._handle_from_node_name)  # viser lists its nodes nowhere else
+        drawn = set(client.scene._handle_from_node_name)  # viser has no public list of its nodes
         for name in sorted(set(server.scene._handle_from_node_name) - drawn):
             if name.startswith(NAMES) or (played is not None and not name.startswith(STATIC)):
                 client.scene.add_frame(name, show_axes=False, visible=False)
         self.show(view)
-        self._render(_FIRST, _FIRST, "jpeg")  # names come a picture late
+        self._render(_FIRST, _FIRST, "jpeg")  # labels appear one picture late
 
     def show(self, view: View) -> None:
-        """Have something in the picture."""
+        """Draw a view."""
         settings = view.settings
         with self._client.atomic():
             self._robot_scene.place(view.snapshot.pose)
@@ -131,7 +131,7 @@ class OffscreenScene:
             )
 
     def take(self, kind: Literal["png", "jpeg"]) -> None:
-        """Have the page take a picture, and keep it; returns when it has."""
+        """Have the page take and keep a picture; wait until it has."""
         self._render(self._shot.height, self._shot.width, kind)
 
     def _render(self, height: int, width: int, kind: Literal["png", "jpeg"]) -> None:
@@ -152,7 +152,7 @@ def offscreen_scene(
     line_width: float,
     played: Played | None = None,
 ) -> Iterator[OffscreenScene]:
-    """An off-screen scene while inside."""
+    """Context of an off-screen scene."""
     try:
         yield OffscreenScene(client, server, shot, view, played, line_width)
     finally:
@@ -167,16 +167,16 @@ TOPIC: Final = "picture"
 class Paper(NamedTuple):
     """A size of print."""
 
-    width: float  # of the picture [in]
-    dots: int  # an inch
+    width: float  # [in]
+    dots: int  # per inch
 
     @property
     def pixels(self) -> int:
-        """Columns of the picture."""
+        """Width [px]."""
         return round(self.width * self.dots)
 
 
-# widths of the IEEE's columns; what is finer than 300 dots an inch is for lines
+# widths of IEEE columns; 600 dots per inch for line drawings
 PAPERS: Final = {
     "Column, 89 mm at 600 dpi": Paper(3.5, 600),
     "Page, 182 mm at 300 dpi": Paper(7.16, 300),
@@ -195,7 +195,7 @@ def save_picture(
     *,
     strip: bool,
 ) -> None:
-    """Have a client's page save a picture of what is shown, from where its camera is, without gizmo and names."""
+    """Have a client's page save a picture of the view from its camera, without gizmo and labels."""
     text = TEXT * paper.dots / 72.0
     beneath = round(HEIGHT * text) if strip else 0
     shot = Shot.of(client.camera, *extent, paper.pixels)

@@ -29,7 +29,7 @@ from sagline.viewer.panel import ControlPanel
 from sagline.viewer.player import Beside, Configuration, InMotion, Played, Player
 from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
 from sagline.viewer.server import Channel
-from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, taken_at
+from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 
 FRAME_TIME = 1.0 / 60.0  # s: least time between updates
@@ -260,7 +260,7 @@ class Page:
         if self._changed is None or self._changed[0] != settings.changes:
             self._changed = (settings.changes, settings.applied(self.robot))
         robot, pose, confirmed = self._changed[1], self.scene.dragged_pose(), self.ready(Computation.REST)
-        snapshot = taken_at(robot, pose, settings, self._previous, confirmed=confirmed, wrench=self.wrench)
+        snapshot = snapshot_at(robot, pose, settings, self._previous, confirmed=confirmed, wrench=self.wrench)
         if not depends_on_history(settings.tension):
             self._forget()  # the tensions of another method are no history
         elif snapshot.feasible:

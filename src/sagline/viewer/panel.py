@@ -21,7 +21,7 @@ _LIGHTEST, _HEAVIEST = 0.1, 4.0  # of the robot's own mass
 
 
 class ControlPanel:
-    """Sliders, choices and readings. Reading a value twice is free; nothing here calls back but `changed`."""
+    """Sliders, choices and readings."""
 
     def __init__(
         self,
@@ -31,11 +31,11 @@ class ControlPanel:
         changed: Callable[[], None],
         forget: Callable[[], None],
     ) -> None:
-        """Build the panels; `changed` is called, from any thread, when a value changes, `forget` to forget the way."""
+        """Build the panels; any thread calls `changed` when a value changes, and `forget` to reset the history."""
         self._gui = server.gui
         self._changed = changed
         self._forget = forget
-        self._way = next(iter(METHODS))
+        self._method_name = next(iter(METHODS))
         self._by_hand: ByHand | None = None
         self._gui.main_panel.dock_left()
         self._gui.main_panel.set_width(LEFT_WIDTH)
@@ -51,7 +51,7 @@ class ControlPanel:
                 self._polygon = self._gui.add_html("")
         readings.dock_right()
         readings.set_width(RIGHT_WIDTH)
-        readings.expand()  # in the bottom sheet of a small screen it would start closed
+        readings.expand()  # in the bottom sheet of a small screen it starts closed
 
     @property
     def ghost(self) -> bool:
@@ -75,16 +75,16 @@ class ControlPanel:
         chosen = self._method.value
         if chosen == BY_HAND and self._by_hand is not None:
             return self._by_hand
-        self._way = chosen if chosen in METHODS else next(iter(METHODS))
-        return METHODS[self._way]
+        self._method_name = chosen if chosen in METHODS else next(iter(METHODS))
+        return METHODS[self._method_name]
 
-    def show_what_if(self, still: str) -> None:
-        """Show what would change the robot, or in its place why it cannot be changed."""
-        shown = not still
+    def show_what_if(self, reason: str) -> None:
+        """Show the controls that change the robot, or the reason why it cannot be changed."""
+        shown = not reason
         for handle in (self._mass, self._density, self._stiffness, self._model, self._method):
             handle.visible = shown
         self._of_run.visible = not shown
-        self._of_run.content = readout.block(f'<div class="quiet">{still}</div>')
+        self._of_run.content = readout.block(f'<div class="quiet">{reason}</div>')
         self._forgetting.visible = shown and depends_on_history(self._tension())
 
     def read_out(self, verdict: str, numbers: str) -> None:
@@ -93,36 +93,36 @@ class ControlPanel:
         self._numbers.content = numbers
 
     def explain(self, text: str) -> None:
-        """Say why a pose is not feasible, and what would help; "" for nothing."""
+        """Write why a pose is not feasible, and how to change that; "" for nothing."""
         self._explained.content, self._explained.visible = text, bool(text)
 
     def show_polygon(self, polygon: str) -> None:
-        """Show what tensions there are to choose from."""
+        """Show the feasible tensions."""
         self._polygon.content = polygon
 
     @property
-    def way(self) -> str:
-        """The way of sharing that was chosen last, by its name."""
-        return self._way
+    def method_name(self) -> str:
+        """Name of the tension distribution method that was chosen last."""
+        return self._method_name
 
-    def choose_way(self, name: str) -> None:
-        """Choose a way of sharing, one of `METHODS`."""
+    def choose_method(self, name: str) -> None:
+        """Choose a tension distribution method, one of `METHODS`."""
         self._method.value = name
 
     def choose_by_hand(self, method: ByHand) -> None:
-        """Choose tensions by hand; the list of the ways has them too from then on."""
+        """Choose tensions by hand; the list of methods contains this choice from then on."""
         self._by_hand = method
         if BY_HAND not in self._method.options:
             self._method.options = (*METHODS, BY_HAND)
         self._method.value = BY_HAND
         self._changed()
 
-    def wait(self, what: str) -> None:
-        """Say what the numbers wait for."""
-        self._verdict.content = readout.waiting(what)
+    def wait(self, reason: str) -> None:
+        """Write why the numbers are not there yet."""
+        self._verdict.content = readout.waiting(reason)
 
     def refuse(self, message: str) -> None:
-        """Say why a setting cannot be had."""
+        """Write why a setting is refused."""
         self._verdict.content = readout.refused(message)
 
     def watched(self, handle: Any) -> Any:
@@ -187,7 +187,7 @@ def _slid(slider: Any) -> float:
 
 
 def written_mass(mass: float) -> float:
-    """A mass [kg] to as many digits as its field has room for; one that a calibration has found has more."""
+    """A mass [kg] with the digits that its field shows; a calibrated mass has more."""
     return float(f"{mass:.5g}")
 
 

@@ -18,11 +18,11 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.statics.stiffness import stiffness
 
-FORCES: Final = 24  # tried at once: each iteration narrows the bounds of a limit to a 23rd
+FORCES: Final = 24  # trials in an iteration, which narrows the bounds of a limit to a 23rd
 ITERATIONS: Final = 4
-SMALLEST: Final = 1e-4  # of the largest force that is tried: the first one
-BEYOND: Final = 1e3  # largest force that is tried, of the robot's own where its cables have no upper limit
-AT_LIMIT: Final = 1e-9  # of the largest tension: a tension this little beyond its limit stands at it
+SMALLEST: Final = 1e-4  # of the largest force: the first trial
+BEYOND: Final = 1e3  # largest force, of the robot's weight and tensions, if its cables have no upper limit
+AT_LIMIT: Final = 1e-9  # of the largest tension: excess over a limit that counts as at the limit
 
 
 class Push(NamedTuple):
@@ -50,11 +50,11 @@ class Reserve(NamedTuple):
 class PushResponse:
     """Response of a platform to a force, the unstrained lengths kept."""
 
-    push: Push  # the force
-    state: Equilibrium  # the equilibrium without it
-    loaded: Equilibrium | None  # the equilibrium with it; None where none was found
+    push: Push
+    state: Equilibrium  # without the force
+    loaded: Equilibrium | None  # with the force; None where none was found
     reserve: Reserve  # largest force before a tension is at its limit, the lengths kept
-    # largest force before no tensions within the limits hold this pose; None where not known yet
+    # largest force with feasible tensions at this pose; None where not known yet
     redistributed: Reserve | None
     compliance: Array  # of the point at which it acts, world axes [m/N], shape (3, 3); NaN where not known
 

@@ -22,8 +22,8 @@ from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number
 
 LATER = "compiling …"
-EXACT: Final = 1e-9  # m: nearer than that a platform rests where it is wanted; the rest is rounding
-_ALONE = 1e-9  # of a robot's highest tension: a tension this near to its limit is at it
+EXACT: Final = 1e-9  # m: smaller distances are rounding
+_ALONE = 1e-9  # of a robot's highest tension: distance to a limit that counts as at the limit
 
 
 def block(content: str) -> str:
@@ -44,7 +44,7 @@ def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
 
 
 def headline(snapshot: Snapshot) -> str:
-    """The verdict in a word or two; what is neither feasible nor proved infeasible is named by its status."""
+    """The verdict in a word or two; a pose neither feasible nor proved infeasible is named by its status."""
     if snapshot.feasible:
         return "Feasible"
     if snapshot.status is PoseStatus.INFEASIBLE:
@@ -58,7 +58,7 @@ def refused(message: str) -> str:
 
 
 def waiting(what: str = "The first run on a machine compiles the numerical core; later ones start at once.") -> str:
-    """Box shown until the numbers are: at the first run the numerical core is compiled before."""
+    """Box shown before the numbers: the first run compiles the numerical core."""
     return box("quiet", "Getting ready", escape(what))
 
 
@@ -77,7 +77,7 @@ def numbers(
 
 
 def legend(scale: TensionScale, robot: Robot) -> str:
-    """The colors of the tensions, as a bar with round numbers below."""
+    """Colors of the tensions, as a bar with round numbers below."""
     stops = np.linspace(0.0, 1.0, 12)
     values = scale.low * (scale.high / scale.low) ** stops
     colors = ",".join(
@@ -87,7 +87,7 @@ def legend(scale: TensionScale, robot: Robot) -> str:
     marks = "".join(
         f'<span style="position:absolute;left:{100 * place:.1f}%;transform:translateX(-{100 * place:.0f}%)">'
         f"{tick / unit.newtons:g}</span>"
-        for tick, place in spaced(scale)
+        for tick, place in spaced_ticks(scale)
     )
     return block(
         f"<b>Chord tension [{unit.name}]</b>"
@@ -130,8 +130,8 @@ def cable_table(heads: Iterable[str], columns: Sequence[Sequence[str]], colors: 
     return f"<table><tr>{''.join(f'<th>{head}</th>' for head in heads)}</tr>{rows}</table>"
 
 
-def spaced(scale: TensionScale) -> list[tuple[float, float]]:
-    """The ticks and their places, without those that would run into the one before."""
+def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:
+    """Ticks and their positions, without those that would overlap the one before."""
     kept: list[tuple[float, float]] = []
     for tick in scale.ticks():
         place = float(scale.fraction(np.array(tick)))
@@ -141,7 +141,7 @@ def spaced(scale: TensionScale) -> list[tuple[float, float]]:
 
 
 def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
-    """The quantities of a feasible pose, each by its name."""
+    """Quantities of a feasible pose, with their names."""
     unit = force_unit(snapshot.robot)
     tension = snapshot.tension
     rows = [
@@ -262,5 +262,5 @@ def _span(values: Array, unit: str) -> str:
 
 
 def css_color(color: Array | Color) -> str:
-    """A color (3,) of 0 to 255 as CSS has it."""
+    """A color (3,) of 0 to 255 in CSS notation."""
     return "#{:02x}{:02x}{:02x}".format(*(int(part) for part in color))

@@ -23,7 +23,7 @@ from sagline.viewer.tension_scale import Colors, TensionScale
 
 
 class Nodes:
-    """Nodes of a scene by name: made when they are first drawn, changed in place afterward.
+    """Nodes of a scene by name, created when they are first drawn and updated afterward.
 
     Attributes:
         scene: The scene.
@@ -35,11 +35,11 @@ class Nodes:
         self._made: dict[str, Any] = {}
 
     def draw(self, name: str, make: Callable[..., Any], *, visible: bool = True, **values: Any) -> Any:
-        """Show a node with these values; `make`, a method of the scene, adds it where there is none."""
+        """Show a node with these values; `make`, a method of the scene, creates it."""
         node = self._made.get(name)
         points = values.get("points")
         if node is not None and points is not None and len(node.points) != len(points):
-            node.remove()  # points and colors of another number would not arrive together
+            node.remove()  # another number of points and colors would not arrive together
             node = None
         if node is None:
             node = self._made[name] = make(name, visible=visible, **values)
@@ -50,7 +50,7 @@ class Nodes:
         return node
 
     def lines(self, name: str, segments: Array, color: Any, width: float) -> None:
-        """Draw segments (k, 2, 3) so wide [px], in one color or in those of their ends; nothing for none."""
+        """Draw segments (k, 2, 3) of a width [px], in one color or in those of their ends."""
         if not len(segments):
             self.hide(name)
             return
@@ -77,7 +77,7 @@ class Nodes:
         )
 
     def label(self, name: str, text: str, position: Any, anchor: str = "bottom-center", scale: float = 1.0) -> None:
-        """Write a text at a position; nothing for none."""
+        """Write a text at a position."""
         self.draw(
             name,
             self.scene.add_label,
@@ -102,7 +102,7 @@ class Nodes:
         )
 
     def hide(self, *names: str) -> None:
-        """Hide nodes; those that were never drawn are passed over."""
+        """Hide nodes, if they exist."""
         for name in names:
             if name in self._made:
                 self._made[name].visible = False
@@ -114,13 +114,13 @@ class Nodes:
             count += 1
 
     def remove(self, *names: str) -> None:
-        """Remove nodes, and those below them; those that were never drawn are passed over."""
+        """Remove nodes and those below them, if they exist."""
         for name in names:
             for found in [each for each in self._made if each == name or each.startswith(f"{name}/")][::-1]:
                 self._made.pop(found).remove()
 
 
-# All stand out from the white and from the dark background, 3 : 1 or more but for the floor.
+# Contrast to the white and to the dark background: 3 : 1 or more, except for the floor.
 STEEL, DRUM, FLOOR, SECTION = (120, 128, 138), (104, 112, 122), (172, 178, 186), (132, 138, 146)
 PLATFORM, INFEASIBLE, REST = (58, 134, 201), (220, 56, 48), (200, 118, 16)
 TRUTH = (150, 90, 190)
@@ -129,17 +129,17 @@ WANTED, ACTUAL = PLATFORM, REST  # the paths of these two platforms
 GHOST = (128, 134, 142)
 CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # px
 TRACE_POINTS = 600
-NEAR = 0.03  # of the robot's size: anchors this close share a label
-FAR = 5.0  # sizes of the robot from its middle: no gizmo is dragged there, only nonsense comes from there
-APART = 0.0035  # of the robot's size: a straight cable nearer to the hanging one would be drawn on it
+NEAR = 0.03  # of the robot's size: anchors this close have one label
+FAR = 5.0  # of the robot's size: largest distance of the platform from the middle; larger ones are invalid data
+APART = 0.0035  # of the robot's size: smaller distances between chord and cable are not visible
 _ARM = 0.12  # longest arm of the axes, of the robot's size
-_BELOW: Final = np.array([0.02, 0.07, 0.03])  # room for the axes and their names around the robot, of its size
-_ABOVE: Final = np.array([0.02, 0.0, 0.08])  # room for the cables' names
+_BELOW: Final = np.array([0.02, 0.07, 0.03])  # space for the axes and their names, of the robot's size
+_ABOVE: Final = np.array([0.02, 0.0, 0.08])  # space for the names of cables
 _GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, of the robot's size
 
 
 class RobotScene:
-    """The robot's parts in a scene. Every client of a server's scene sees, and may drag, the same."""
+    """The robot's parts in a scene, which all clients of a server see and may drag."""
 
     def __init__(
         self, scene: viser.SceneApi, robot: Robot, home: Pose, *, live: bool = True, pixel: float = 0.0
@@ -157,7 +157,7 @@ class RobotScene:
         self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
         self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
         self._scene.add_mesh_simple("/rest/body", body.vertices, body.faces, color=REST, opacity=0.55)
-        self._truth: Any = None  # made when it is known for the first time
+        self._truth: Any = None  # created when it is known for the first time
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
         blank = np.zeros((robot.cable_count * (shapes.points_per_cable(robot) - 1), 2, 3))
@@ -176,7 +176,7 @@ class RobotScene:
         return gizmo
 
     def extent(self, pose: Pose) -> tuple[Array, Array]:
-        """Lowest and highest corner of what there is to see with the platform at a pose, names and axes too [m]."""
+        """Lowest and highest corner of all that is drawn with the platform at a pose, with names and axes [m]."""
         corners = np.vstack((self._low, self._high, pose.transform(self._body.vertices), self._winches.vertices))
         return corners.min(axis=0) - _BELOW * self._size, corners.max(axis=0) + _ABOVE * self._size
 
@@ -191,7 +191,7 @@ class RobotScene:
         return Pose.from_quaternion(position, unit(np.roll(wxyz, -1)))
 
     def check_near(self, position: Array) -> None:
-        """Refuse what is no position, or one far outside of the robot."""
+        """Refuse invalid positions, and those far outside of the robot."""
         far = FAR * self._size
         if not np.all(np.abs(position - 0.5 * (self._low + self._high)) < far):
             raise InvalidValueError(
@@ -199,14 +199,14 @@ class RobotScene:
             )
 
     def place(self, pose: Pose) -> None:
-        """Put the platform, and with it its gizmo, at a pose."""
+        """Move the platform with its gizmo to a pose."""
         self._gizmo.position = pose.position
         self._gizmo.wxyz = np.roll(pose.quaternion, 1)
 
     def show(
         self, snapshot: Configuration, scale: TensionScale, sag_scale: float, error_scale: float, *, ghost: bool
     ) -> None:
-        """Draw a snapshot, or a moment of a simulation; the platform itself follows the gizmo."""
+        """Draw a configuration; the platform itself follows the gizmo."""
         self._cables.points = cable_segments(snapshot, sag_scale).astype(np.float32)
         self._cables.colors = cable_colors(snapshot, scale)
         if self._wheels is not None:
@@ -232,19 +232,19 @@ class RobotScene:
             _move(self._truth, drawn.pose, drawn.truth, error_scale)
 
     def swing(self, rest: Pose, pose: Pose, courses: Array) -> None:
-        """Draw the platform elsewhere than its gizmo, which stays at its rest, and the cables (m, P, 3) with it."""
+        """Draw the platform and the cables (m, P, 3) displaced, with the gizmo at the rest pose."""
         back = rest.rotation.inv()
         self._platform.position = back.as_matrix() @ (pose.position - rest.position)
         self._platform.wxyz = np.roll((back * pose.rotation).as_quat(), 1)
         self._cables.points = shapes.segments(courses, dashed=False).astype(np.float32)
 
     def settle(self) -> None:
-        """Put the platform back to where its gizmo is."""
+        """Move the platform back to its gizmo."""
         self._platform.position = np.zeros(3)
         self._platform.wxyz = np.array([1.0, 0.0, 0.0, 0.0])
 
     def show_traces(self, wanted: Array, actual: Array) -> None:
-        """Draw the desired and the actual path (n, 3) in place of any before; gaps where they are NaN."""
+        """Draw the desired and the actual path (n, 3), which replace those before; with gaps at NaN."""
         while self._traces:
             self._traces.pop().remove()
         for name, points, color in (("/wanted", wanted, WANTED), ("/actual", actual, ACTUAL)):
@@ -260,9 +260,9 @@ class RobotScene:
         return {"thickness": pixels * self._pixel, "thickness_units": "world"}
 
     def _build_lights(self) -> None:
-        """Light from the sky, and a little from below, without shadows: a page may have no graphics card.
+        """Add light from above and below, without shadows and environment map, for pages without a graphics card.
 
-        There the picture of surroundings that viser takes its light from is five seconds of work; nothing moves then.
+        There, the environment map of viser would block the page for five seconds.
         """
         self._scene.configure_environment_map(hdri=None)
         self._scene.configure_default_lights(cast_shadow=False)
@@ -294,7 +294,7 @@ class RobotScene:
             )
 
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
-        """The pulleys as large as they are; they turn with the platform."""
+        """Pulleys in their size; they swivel with the platform."""
         wheel, which = shapes.wheel(), self._over_pulleys
         return self._scene.add_batched_meshes_simple(
             "/pulleys", wheel.vertices, wheel.faces, shapes.pulley_rotations(robot, pose)[which],
@@ -303,7 +303,7 @@ class RobotScene:
         )  # fmt: skip
 
     def _build_dead_cables(self, robot: Robot) -> None:
-        """The runs behind the pulleys, dashed where only what they rise is known."""
+        """Dead cables, dashed where only their rise is known."""
         runs, upright = shapes.dead_runs(robot)
         for name, which in (("/dead", upright), ("/dead_assumed", ~upright)):
             shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
@@ -312,7 +312,7 @@ class RobotScene:
                 self._scene.add_line_segments(name, pieces, STEEL, **self._wide(GHOST_WIDTH))
 
     def _build_axes(self) -> None:
-        """The directions of the world at a corner of the floor; their arms of a round length are the scale."""
+        """World axes at a corner of the floor, with a round length as the scale."""
         arm = shapes.round_below(_ARM * self._size)
         corner = self._low - np.array([0.0, 0.06 * self._size, 0.0])
         arms = np.stack((np.zeros((3, 3)), arm * np.eye(3)), axis=1) + corner
@@ -328,7 +328,7 @@ class RobotScene:
         least, most = (share * self._size for share in _GIZMO)
         return self._scene.add_transform_controls(
             "/platform", scale=float(np.clip(1.6 * np.abs(body.vertices).max(), least, most)), line_width=2.0,
-            depth_test=True,  # what lies behind the platform does not hide it
+            depth_test=True,  # drawn in front of what is behind the platform
             opacity=0.8,
             active_axes=(bool(free[0]), bool(free[1]), bool(free[2])),
             disable_rotations=robot.motion_pattern not in ROTATING,
@@ -367,7 +367,7 @@ def cable_colors(drawn: Configuration, scale: TensionScale) -> Colors:
 
 
 def _neighbors(points: Array, near: float) -> list[tuple[Array, list[int]]]:
-    """Points (m, 3) in groups about as close as `near`: the middle of each group, and who is in it."""
+    """Points (m, 3) in groups about as close as `near`: middle and members of each group."""
     groups: list[list[int]] = []
     for i, point in enumerate(points):
         home = next((group for group in groups if np.linalg.norm(points[group[0]] - point) < near), None)

@@ -166,7 +166,7 @@ def _quiet() -> Iterator[None]:
         for name, level in levels.items():
             logging.getLogger(name).setLevel(level)
         for each in ours:
-            with suppress(ValueError):  # somebody may have taken it away
+            with suppress(ValueError):  # it may have been removed
                 warnings.filters.remove(each)  # type: ignore[attr-defined]
 
 

@@ -1,4 +1,4 @@
-"""Recorded sessions of the controller, read from logs, as the timeline plays them."""
+"""Logs of the controller, as the timeline plays them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from sagline.viewer.timeline import (
 )
 
 PER_METER = 1e3  # mm
-MOST_EVENTS = 8  # that are listed, the newest
+MOST_EVENTS = 8  # in the list, the newest
 NO_CHOICE = "Tensions of a log are not chosen: they are those that the load cells read."
 WRONG = (State.FAULT, State.EMERGENCY)
 
@@ -66,7 +66,7 @@ class PlayedLog:
     unchanged = "A log keeps its robot and loads; drag the platform to change them."
 
     def __post_init__(self) -> None:
-        """Find what to show where nothing is known: what was known before, or first."""
+        """Find the cycle whose position is shown for each cycle."""
         known = np.flatnonzero(np.isfinite(self.position[:, 0]))
         last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
         rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
@@ -160,23 +160,23 @@ class PlayedLog:
         return planned, np.where(np.isfinite(away), planned + error_scale * away, actual)
 
     def track(self) -> Track:
-        """Tensions, what they are off, what lengths and platform are off, and what happened."""
+        """Charts of the tensions and of the errors of tensions, lengths and position, and the events."""
         unit, cables, axes = force_unit(self.robot), cable_names(self.robot), ("x", "y", "z")
         limits = tension_limits(self.robot, unit.newtons, at="frame_end")
 
-        def off(value: Array, wanted: Array, scale: float = PER_METER) -> Callable[[slice], Array]:
-            return lambda rows: scale * (value[rows] - wanted[rows])
+        def error(value: Array, reference: Array, scale: float = PER_METER) -> Callable[[slice], Array]:
+            return lambda rows: scale * (value[rows] - reference[rows])
 
         name, decimals, newtons = unit.name, unit.decimals, unit.newtons
         charts = [
             Chart("Tension, measured", name, decimals, cables, lambda rows: self.tension[rows] / newtons, limits),
-            Chart("Tension less the planned one", "N", 1, cables, off(self.tension, self.planned_tension, 1.0)),
-            Chart("Length set less measured", "mm", 2, cables, off(self.set_length, self.length)),
-            Chart("Estimated less planned", "mm", 2, axes, off(self.position, self.planned)),
+            Chart("Tension less the planned one", "N", 1, cables, error(self.tension, self.planned_tension, 1.0)),
+            Chart("Length set less measured", "mm", 2, cables, error(self.set_length, self.length)),
+            Chart("Estimated less planned", "mm", 2, axes, error(self.position, self.planned)),
         ]
         paths = [("planned", WANTED), ("estimated", ACTUAL)]
         if self.true is not None:
-            charts.append(Chart("True less planned", "mm", 2, axes, off(self.true, self.planned)))
+            charts.append(Chart("True less planned", "mm", 2, axes, error(self.true, self.planned)))
             paths.append(("true", TRUTH))
         marks = tuple(
             TimelineMark(event.time - self.began, f"{event.name}: {event.text}", bad=event.kind is EventKind.FAULT)
@@ -199,7 +199,7 @@ class LogFollower:
     """Reader of a log in a file, and of the log of its twin, also while they grow."""
 
     def __init__(self, file: os.PathLike[str] | str, truth: os.PathLike[str] | str | None = None) -> None:
-        """Name the files."""
+        """Open the log and the log of the twin."""
         self._reader = LogReader(file)
         self._truth = None if truth is None else LogReader(truth)
         self._parts: list[dict[str, Any]] = []
@@ -216,7 +216,7 @@ class LogFollower:
         return self._reader.log.robot
 
     def more(self) -> PlayedLog | None:
-        """Read what is new; the whole session, None if nothing is new, or nothing is there."""
+        """Read new cycles; the whole log, None if there is nothing new."""
         grown = self._reader.more()
         if self._truth is not None and self._truth.more():
             grown = True
@@ -250,7 +250,7 @@ class LogFollower:
         whole = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         stamp, began = whole.pop("stamp"), float(whole["time"][0])
         true, turned = self._true(stamp)
-        whole["time"] = np.round(whole["time"] - began, 9)  # 0.3 and not less: who asks for 0.3 s means this cycle
+        whole["time"] = np.round(whole["time"] - began, 9)  # exactly 0.3, so that this time selects the cycle
         events = tuple(self.log.events)
         return PlayedLog(robot=robot, began=began, true=true, true_quaternion=turned, events=events, **whole)
 

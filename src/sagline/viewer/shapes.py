@@ -20,9 +20,9 @@ from sagline.robot.reach import bounds as bounds
 from sagline.robot.robot import Robot
 from sagline.statics.tables import touching_angle
 
-POINTS = 41  # along a hanging cable: an odd number, so that dashes end as they begin
+POINTS = 41  # along a free cable: odd, so that dashes begin and end alike
 WRAP_POINTS = 16  # along the cable on a pulley
-_UPRIGHT = 1e-6  # of a run's length, that its rise may be less
+_UPRIGHT = 1e-6  # of the length of a dead cable: largest difference to its rise if it is vertical
 
 
 def points_per_cable(robot: Robot) -> int:
@@ -43,17 +43,17 @@ def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
 
 
 def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
-    """Both ends of every hanging cable in the world [m], shape (m, 2, 3); it starts at its exit point, or anchor."""
+    """Both ends of every free cable in the world [m], shape (m, 2, 3), from its exit point, or frame anchor."""
     platform_ends = pose.transform(robot.platform_anchors)
     return locked(np.stack((robot.frame_anchors if exits is None else exits, platform_ends), axis=1))
 
 
 def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
-    """The straight guided runs behind the pulleys, upright: of a run only its length and its rise are known.
+    """Dead cables as vertical lines below the frame anchors: only their lengths and rises are known.
 
     Returns:
-        Frame anchors and the points as much lower as the runs rise [m], shape (m, 2, 3); and whether a run is upright,
-        as its length and its rise say, shape (m,).
+        Frame anchors and the points lower by the rises [m], shape (m, 2, 3); and whether each is truly vertical by its
+        length and rise, shape (m,).
     """
     winches = robot.winches
     low = robot.frame_anchors.copy()
@@ -67,7 +67,7 @@ def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
 def drum_axes(robot: Robot) -> Array:
     """Ends of the axes of the drums whose radius is known [m], shape (k, 2, 3).
 
-    A drum touches the foot of its run on the side away from the robot's middle, level; its way around is not known.
+    A drum touches the lower end of its dead cable on the side away from the robot's middle; its axis is horizontal.
     """
     winches = robot.winches
     if winches is None or winches.drum_radius is None:
@@ -90,7 +90,7 @@ def straight(ends: Array) -> Array:
 
 
 def catenaries(ends: Array, cables: CableState, sag_scale: float) -> Array:
-    """Points along the cables as they hang (m, POINTS, 3), their sag below the chord drawn some times as large."""
+    """Points along catenaries (m, POINTS, 3), the sag below the chord scaled by a factor."""
     run = ends[:, 1] - ends[:, 0]
     span = np.hypot(run[:, 0], run[:, 1])
     level = np.divide(run[:, :2], span[:, None], out=np.zeros((len(run), 2)), where=span[:, None] > 0.0)
@@ -114,7 +114,7 @@ def courses(robot: Robot, pose: Pose, state: Equilibrium | None, sag_scale: floa
 
 
 def resampled(points: Array, count: int) -> Array:
-    """Values at points (m, P, 3) at so many, at equal steps of the first ones' number, shape (m, count, 3)."""
+    """Points (m, P, 3) interpolated at a number of equal steps, shape (m, count, 3)."""
     place = np.linspace(0.0, points.shape[1] - 1.0, count)
     first = np.minimum(place.astype(np.intp), points.shape[1] - 2)
     rest = (place - first)[:, None]
@@ -179,7 +179,7 @@ def round_below(length: float) -> float:
 
 
 def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
-    """A beam along an axis; or dashes about so long, with gaps as long, that begin and end with one."""
+    """A beam along an axis; or dashes about so long, with gaps as long, with a dash at each end."""
     pieces = 2 * round(0.5 * float(np.linalg.norm(end - start)) / dash) + 1
     cuts = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (end - start)
     return [box(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
@@ -197,8 +197,8 @@ def winches(robot: Robot) -> Solid:
 
 
 def wheel() -> Solid:
-    """A pulley of radius 1 as it stands for a cable along x: it is entered at the origin, its middle is at x = 1."""
-    from trimesh.creation import annulus  # of an extra, which figures do without that only ask for sizes here
+    """A pulley of radius 1 for a cable along x that enters at the origin; its middle is at x = 1."""
+    from trimesh.creation import annulus  # in an extra that figures do without
 
     rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
     spokes = [rod(np.array([inner, outer]), _SPOKE) for inner, outer in _spokes()]
@@ -245,7 +245,7 @@ def platform(robot: Robot) -> Solid:
         return flat
     try:
         return _hull(anchors)
-    except QhullError:  # the anchors lie in a plane that is not level
+    except QhullError:  # the anchors are in an inclined plane
         return flat
 
 
@@ -289,7 +289,7 @@ def merged(parts: list[Solid]) -> Solid:
 
 
 def _hull(points: Array) -> Solid:
-    """The convex hull; its triangles share no corners, so that each is shaded flat."""
+    """The convex hull; its triangles have separate corners, for flat shading."""
     hull = ConvexHull(points)
     corners = points[hull.simplices]  # (f, 3, 3)
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -298,20 +298,20 @@ def _hull(points: Array) -> Solid:
     return Solid(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
-THINNEST: Final = 0.03  # of its longest axis: a flat one is still seen
+THINNEST: Final = 0.03  # of its longest axis: least axis of a drawn ellipsoid
 
 
 class Ellipsoids(NamedTuple):
-    """Some ellipsoids."""
+    """Ellipsoids of errors."""
 
-    middle: Array  # where they are [m], shape (k, 3)
+    middle: Array  # [m], shape (k, 3)
     turn: Array  # their axes, as quaternions, scalar first, shape (k, 4)
     radius: Array  # one standard error along each of their axes [m], shape (k, 3)
-    which: Indices  # whose they are, shape (k,)
+    which: Indices  # numbers of their points, shape (k,)
 
     @classmethod
     def of(cls, points: Array, covariance: Array) -> Ellipsoids:
-        """Those of points, without those of which nothing is known or everything."""
+        """Ellipsoids of points, without unknown and exact ones."""
         known = np.isfinite(covariance).all(axis=(1, 2)) & covariance.any(axis=(1, 2))
         which = np.flatnonzero(known).astype(np.int64)
         squares, axes = np.linalg.eigh(covariance[which])
@@ -321,7 +321,7 @@ class Ellipsoids(NamedTuple):
         return cls(points[which], turn, np.sqrt(np.maximum(squares, 0.0)), which)
 
     def drawn(self, factor: float) -> Array:
-        """Their radii as they are drawn, some times as large [m], shape (k, 3)."""
+        """Radii as drawn, scaled by a factor [m], shape (k, 3)."""
         longest = self.radius.max(axis=1, keepdims=True)
         return np.asarray(factor * np.maximum(self.radius, THINNEST * longest))
 
@@ -334,7 +334,7 @@ def readable(radius: Array, size: float) -> float:
 
 def ball() -> Solid:
     """A ball of radius 1."""
-    from trimesh.creation import icosphere  # a fifth of what starts the viewer, and few see a ball
+    from trimesh.creation import icosphere  # imported only when needed: a fifth of the start time
 
     mesh = icosphere(subdivisions=2)
     return Solid(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))

@@ -16,9 +16,9 @@ from sagline.viewer.readout import block, css_color
 from sagline.viewer.tension_scale import Colors, ForceUnit
 from sagline.workspaces.region import Slice
 
-INSIDE: Final = 4  # bands above 0, the last without an end
-OUTSIDE: Final = 2  # bands below 0, the first without a beginning
-# Lightness tells them apart as well as hue does, for all eyes and on both backgrounds.
+INSIDE: Final = 4  # bands above 0, the last unbounded
+OUTSIDE: Final = 2  # bands below 0, the first unbounded
+# They differ in lightness and in hue, for color-blind users and on both backgrounds.
 _COLORS: Final = np.array(
     [[196, 92, 40], [222, 150, 104], [126, 196, 186], [64, 160, 150], [22, 122, 116], [8, 84, 84]], dtype=np.uint8
 )
@@ -43,7 +43,7 @@ class MarginScale:
         return self.step * np.arange(1.0 - OUTSIDE, INSIDE)
 
     def bands(self, margin: Array) -> Indices:
-        """The band of each margin, 0 the farthest outside; what is 0 but for rounding is inside."""
+        """The band of each margin, 0 the farthest outside; zero with rounding errors is inside."""
         steps = np.floor(np.asarray(margin) / self.step + 1e-6)
         return np.asarray(np.clip(steps, -OUTSIDE, INSIDE - 1)).astype(np.int64) + OUTSIDE
 
@@ -68,16 +68,9 @@ def bare(edge: float, unit: ForceUnit) -> str:
     return f"{edge / unit.newtons:g}".replace("-", "−")
 
 
-APART = 0.12  # of the slice's longer side: the least distance between two of the margins that stand on its lines
-FINER = 3  # points of the picture for one of the grid, each way
-INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # of 255: the robot behind it is seen
-
-
-class Mark(NamedTuple):
-    """Label of a line."""
-
-    text: str
-    place: Array  # place [m], shape (3,)
+APART = 0.12  # of the slice's longer side: least distance of two labels
+FINER = 3  # pixels for a point of the grid, along each axis
+INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # of 255: the robot behind stays visible
 
 
 class Picture(NamedTuple):
@@ -86,12 +79,14 @@ class Picture(NamedTuple):
     image: NDArray[np.uint8]  # red, green, blue and opacity, the first row the lowest, shape (h, w, 4)
     boundary: Array  # segments of the line where the margin is 0, in the world [m], shape (b, 2, 3)
     lines: Array  # segments between the other bands, shape (s, 2, 3)
-    marks: list[Mark]  # what stands on the lines
+    marks: list[tuple[str, Array]]  # labels and their positions [m], shape (3,)
 
 
 def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
     """Colors and lines of a slice, each line with its margin."""
-    margin = np.clip(cut.margin, scale.edges[0] - scale.step, scale.edges[-1] + scale.step)  # infinite ones have lines
+    margin = np.clip(
+        cut.margin, scale.edges[0] - scale.step, scale.edges[-1] + scale.step
+    )  # infinite margins have contours
     fine = _finer(_finer(margin).T).T
     opacity = np.where(fine >= 0.0, INSIDE_OPACITY, OUTSIDE_OPACITY).astype(np.uint8)
     found = contour_generator(cut.across, cut.up, margin, line_type=LineType.ChunkCombinedOffset)
@@ -102,23 +97,23 @@ def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
     return Picture(np.dstack((scale.colors(fine), opacity)), boundary, others, marks)
 
 
-def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[Mark]:
-    """Labels of the lines: each at the end of its line that is farthest in a direction of its own, 0 first."""
-    room = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
-    marks: list[Mark] = []
+def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[tuple[str, Array]]:
+    """Labels of the lines, 0 first, each at the point of its line that is farthest in a direction of its own."""
+    apart = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
+    marks: list[tuple[str, Array]] = []
     for k, (edge, segments) in enumerate(lines):
         middles = segments.mean(axis=1)
-        taken = [np.linalg.norm(middles - mark.place, axis=1) < room for mark in marks]
+        taken = [np.linalg.norm(middles - place, axis=1) < apart for _, place in marks]
         free = middles[~np.logical_or.reduce([np.zeros(len(middles), dtype=bool), *taken])]
         if len(free):
             way = 2.0 * np.pi * (0.1 + k / len(lines))
             along = free[:, list(cut.plane.axes)] @ np.array([np.cos(way), np.sin(way)])
-            marks.append(Mark(f"{bare(edge, unit)} {unit.name}", free[along.argmax()]))
+            marks.append((f"{bare(edge, unit)} {unit.name}", free[along.argmax()]))
     return marks
 
 
 def _finer(values: Array) -> Array:
-    """Points between those of each row, and beyond its ends, so that each stands for a pixel of the same width."""
+    """Values interpolated between those of each row, for pixels of equal width."""
     count = values.shape[1]
     places = np.clip((np.arange(FINER * (count - 1)) + 0.5) / FINER, 0.0, count - 1.0)
     first = np.minimum(places.astype(np.intp), count - 2)
@@ -127,12 +122,12 @@ def _finer(values: Array) -> Array:
 
 
 def _segments(found: Any, cut: Slice) -> Array:
-    """Pieces of lines (s, 2, 3) in the world."""
+    """Segments of contours (s, 2, 3) in the world."""
     (points,), (offsets,) = found  # one chunk
     if points is None:
         return np.empty((0, 2, 3))
     starts = np.ones(len(points), dtype=bool)
-    starts[offsets[1:] - 1] = False  # the last of each line begins nothing
+    starts[offsets[1:] - 1] = False  # the last point of a line begins no segment
     first = np.flatnonzero(starts)
     pairs = np.stack((points[first], points[first + 1]), axis=1)
     placed = np.empty((len(pairs), 2, 3))

@@ -28,7 +28,7 @@ from sagline.viewer import shapes
 from sagline.viewer.by_hand import BY_HAND, ByHand
 from sagline.viewer.tension_scale import force_unit
 
-MODEL_NAMES: dict[type[CableModel], str] = {  # those that say more than the name of their class
+MODEL_NAMES: dict[type[CableModel], str] = {  # names that say more than that of the class
     Catenary: "catenary (exact)",
     Empirical: "empirical (the article's)",
     Elastic: "elastic, weightless",
@@ -53,7 +53,7 @@ def depends_on_history(method: TensionMethod) -> bool:
 
 # the exact one first
 MODELS: Final = MappingProxyType({model_name(make()): make() for make in reversed(ALL_MODELS.values())})
-# those that remember come last: by default what is shown depends on the pose alone
+# methods that depend on history are last: the default depends on the pose alone
 METHODS: Final = MappingProxyType(
     {
         method_name(method): method
@@ -66,16 +66,16 @@ METHODS: Final = MappingProxyType(
 class Settings:
     """The robot's changes, how it is solved, and how it is drawn."""
 
-    mass: float  # mass of the platform with its load [kg], > 0; the inertia grows with it
+    mass: float  # of the platform with its load [kg], > 0; the inertia scales with it
     density: float = 1.0  # factor on the cables' linear density, > 0
     stiffness: float = 1.0  # factor on the cables' axial stiffness, > 0
-    model: CableModel = field(default_factory=Catenary)  # cable model that the lengths are planned with
-    tension: TensionMethod = field(default_factory=MinimumNorm)  # how the load is shared
-    sag_scale: float = 1.0  # how many times its sag a cable is drawn with, >= 0
-    error_scale: float = 1.0  # how many times its position error the platform as it really hangs is drawn with, >= 0
+    model: CableModel = field(default_factory=Catenary)  # of the planned lengths
+    tension: TensionMethod = field(default_factory=MinimumNorm)
+    sag_scale: float = 1.0  # factor on the drawn sag, >= 0
+    error_scale: float = 1.0  # factor on the drawn position error, >= 0
 
     def __post_init__(self) -> None:
-        """Check what no robot checks."""
+        """Check the factors."""
         checked(self.density, "cable density", "times", above=0.0)
         checked(self.stiffness, "cable stiffness", "times", above=0.0)
         checked(self.sag_scale, "drawn sag", "times", low=0.0)
@@ -100,13 +100,12 @@ class Settings:
 class Snapshot:
     """A robot held at one pose."""
 
-    robot: Robot  # the robot, as the settings have changed it
-    pose: Pose  # where the platform is wanted
+    robot: Robot  # with the changes of the settings
+    pose: Pose  # planned pose
     plan: Plan | None  # the plan for this pose; None where a cable has no chord
-    # where the platform would really rest on exact cables of the planned lengths; None where the plan has no answer or
-    # the model is exact
+    # pose of equilibrium with catenaries of the planned lengths; None if the pose is not feasible or the model is exact
     rest: Pose | None
-    refusal: str = ""  # which cable over a pulley has no chord, and why; "" where all have
+    refusal: str = ""  # reason why a cable over a pulley has no chord; "" where all have one
     # tensions from which a method that depends on history continued [N], shape (m,); None for none
     previous: Array | None = None
 
@@ -122,7 +121,7 @@ class Snapshot:
 
     @property
     def reason(self) -> str:
-        """Why it is not feasible, with the shortfall and the blocking cables; "" where it is."""
+        """Why it is not feasible, with the shortfall and the blocking cables; "" if it is."""
         if self.feasible:
             return ""
         if self.plan is None:
@@ -137,12 +136,12 @@ class Snapshot:
 
     @property
     def tension(self) -> Array:
-        """Chord tensions [N], shape (m,); NaN where there is no answer."""
+        """Chord tensions [N], shape (m,); NaN without a solution."""
         return np.full(self.robot.cable_count, np.nan) if self.plan is None else self.plan.chord_tension
 
     @property
     def margin(self) -> Array:
-        """Distance of each limited tension to its nearer limit [N], shape (m,); NaN where there is none."""
+        """Distance of each limited tension to its nearer limit [N], shape (m,); NaN for none."""
         return self.tension if self.plan is None else cable_margins(self.plan.state)
 
     def nearer_limit(self, cable: int) -> str:
@@ -155,7 +154,7 @@ class Snapshot:
 
     @property
     def origin(self) -> str:
-        """Model and way of sharing that the tensions come from; "" where there are none."""
+        """Cable model and tension distribution method; "" without tensions."""
         if self.plan is None:
             return ""
         return f"{model_name(self.plan.state.cables.model)}, {method_name(self.plan.tension)}"
@@ -171,7 +170,7 @@ class Snapshot:
         return shapes.courses(self.robot, self.pose, state, sag_scale)
 
 
-def taken_at(
+def snapshot_at(
     robot: Robot,
     pose: Pose,
     settings: Settings,
@@ -192,7 +191,7 @@ def taken_at(
 
 
 def _remembered(previous: Plan | None, tension: TensionMethod) -> Array | None:
-    """The tensions that a way of sharing goes on from, in its variable [N], shape (m,); None for none."""
+    """Tensions from which a method continues, in its variable [N], shape (m,); None for none."""
     if previous is None or not depends_on_history(tension) or not previous.feasible or previous.at_border:
         return None
     return shared_tension(previous.state, tension.variable)

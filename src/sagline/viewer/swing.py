@@ -82,5 +82,5 @@ class Swing:
 
 def mode_of(vibration: Vibration, name: str) -> ListedMode | None:
     """The mode of this name, "1" or "massless 1"; None where there is none."""
-    wanted = " ".join(name.split())
-    return next((mode for mode in listed_modes(vibration) if mode.name == wanted), None)
+    cleaned = " ".join(name.split())
+    return next((mode for mode in listed_modes(vibration) if mode.name == cleaned), None)

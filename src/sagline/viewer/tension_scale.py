@@ -14,13 +14,13 @@ from sagline.robot.robot import Robot
 
 Color = tuple[int, int, int]  # red, green and blue, 0 to 255
 
-# Hues far apart first, each seen on white and on dark: robots have eight cables, seldom more than twelve.
+# The most different hues first, each visible on white and on dark: most robots have up to eight cables.
 CABLES: Final[tuple[Color, ...]] = (
     (14, 147, 132), (232, 160, 32), (122, 92, 196), (94, 156, 60), (206, 84, 128), (24, 135, 196),
     (158, 104, 66), (150, 146, 20), (70, 96, 210), (210, 100, 56), (44, 170, 110), (176, 80, 176),
     (80, 140, 150), (196, 146, 96), (124, 164, 30), (160, 60, 80),
 )  # fmt: skip
-NONE: Final[Color] = (150, 155, 162)  # where no cable decides
+NONE: Final[Color] = (150, 155, 162)  # where no cable limits
 
 
 def cable_color(cable: int) -> Color:
@@ -30,8 +30,8 @@ def cable_color(cable: int) -> Color:
 
 Colors = NDArray[np.uint8]
 
-# From blue over red to ochre. Each step holds 3 : 1 on the white and on the dark background alike, which leaves little
-# lightness to tell tensions by: blue to yellow does it, which color-blind eyes keep too.
+# From blue over red to ochre. Each step has a contrast of 3 : 1 on the white and on the dark background, so their
+# lightness is similar; blue and yellow are also distinct for color-blind users.
 _STEPS = np.array(
     [[62, 96, 232], [170, 74, 194], [200, 74, 166], [214, 80, 126], [216, 98, 78], [206, 128, 20]], dtype=np.float64
 )
@@ -89,7 +89,7 @@ class ForceUnit(NamedTuple):
     """Unit in which the forces of a robot are written."""
 
     name: str  # "N" or "kN"
-    newtons: float  # one of the unit [N]
+    newtons: float  # size of the unit [N]
     form: str  # format specification, with the decimals
 
     @property
@@ -120,7 +120,7 @@ def number(value: float, form: str) -> str:
 
 
 def force_unit(robot: Robot) -> ForceUnit:
-    """Unit of the forces of a robot, by its highest tension: it does not change while the platform is dragged."""
+    """Unit of the forces of a robot, by its highest tension, the same at all poses."""
     return ForceUnit.up_to(TensionScale.of(robot).high)
 
 

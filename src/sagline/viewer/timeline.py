@@ -1,4 +1,4 @@
-"""Charts, marks and spans of the timeline, and their columns as the page gets them."""
+"""Charts, marks and spans of the timeline, and the message with their columns."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.viewer.tension_scale import ForceUnit
 
-# Cables by number, here and nowhere else: no color of the platform, of its path, of a tension or of a verdict.
-# Each holds 3 : 1 on the panels of both themes.
+# Colors of cables by number in charts; none is used for the platform, its path, tensions or verdicts.
+# Contrast 3 : 1 on the panels of both themes.
 COLORS: Final = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794")  # lines beyond them are dashed
 _ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 
@@ -25,24 +25,24 @@ _ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 class ChartLimit(NamedTuple):
     """A limit of a chart."""
 
-    value: float  # value, in the unit of the chart
+    value: float  # in the unit of the chart
     name: str
-    upper: bool  # whether values are to stay below it
+    upper: bool  # whether it is an upper limit
 
 
 class Span(NamedTuple):
     """A time of an infeasible pose, a violated limit or a fault."""
 
-    start: float  # start [s]
-    end: float  # end [s]
+    start: float  # [s]
+    end: float  # [s]
     why: str  # reason
 
 
 class TimelineMark(NamedTuple):
     """An event."""
 
-    time: float  # time [s]
-    text: str  # description
+    time: float  # [s]
+    text: str
     bad: bool  # whether it is a fault or a failure
 
 
@@ -81,7 +81,7 @@ class Track:
         return slice(max(int(first) - 1, 0), int(stop) + 1)
 
     def step_from(self, time: float, steps: int) -> float:
-        """Time of the sample so many after the one at or before a time [s]."""
+        """Time of the sample a number of steps after that at or before a time [s]."""
         now = int(np.searchsorted(self.time, time, side="right")) - 1
         return float(self.time[min(max(now + steps, 0), self.time.size - 1)])
 
@@ -100,7 +100,7 @@ def tension_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit
     return lower + upper
 
 
-MOST_SPANS: Final = 400  # spans on a timeline: those nearer than its length over that are one
+MOST_SPANS: Final = 400  # on a timeline; nearer ones are joined
 
 
 def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:
@@ -166,20 +166,20 @@ def _cables(which: NDArray[np.intp]) -> str:
 
 MOST_COLUMNS: Final = 1500  # columns
 MOST_MARKS: Final = 300
-_NEAR: Final = 0.6  # of the values' spread: a limit within this of them is drawn, one farther away is written
+_NEAR: Final = 0.6  # of the values' spread: a limit within this distance is drawn, others are written
 _BORDER: Final = 0.05  # of the spread, above and below
 
 
 class Columns(NamedTuple):
     """Samples, or groups of them."""
 
-    time: Array  # when each begins [s], shape (C,)
+    time: Array  # start of each [s], shape (C,)
     low: Array  # least value of each line in it, shape (C, k); NaN where there is none
     high: Array  # largest value
 
 
 def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:
-    """Columns of equally many samples (N,) with values (N, k), at most so many."""
+    """Columns of equal numbers of samples (N,) with values (N, k), at most `most`."""
     if time.size <= most:
         return Columns(time, values, values)
     starts = (np.arange(most) * time.size) // most
@@ -212,9 +212,9 @@ def _columns(track: Track, chart: Chart, start: float, end: float) -> Columns:
     return columns(track.time[rows], chart.values(rows))
 
 
-def _matching(track: Track, wanted: Chart, chart: int) -> Chart:
-    """The chart of a track to show beside another: of that title, or else of that number."""
-    same = [each for each in track.charts if each.title == wanted.title]
+def _matching(track: Track, first: Chart, chart: int) -> Chart:
+    """The chart of a track to show beside another, by its title, or by its number."""
+    same = [each for each in track.charts if each.title == first.title]
     return same[0] if same else track.charts[chart if chart < len(track.charts) else 0]
 
 
@@ -243,7 +243,7 @@ def _track_message(
 
 
 def _most_important(track: Track) -> list[Any]:
-    """Marks of a track; of too many, the bad ones and the last of the others."""
+    """Marks of a track; of too many, the faults and the last of the others."""
     bad = [mark for mark in track.marks if mark.bad][-MOST_MARKS:]
     rest = [mark for mark in track.marks if not mark.bad]
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)

@@ -28,7 +28,7 @@ from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.region import Find, Region, region_of
 from sagline.workspaces.wrench_sets import WrenchSet
 
-OPACITY: Final = 0.35  # the robot inside is seen
+OPACITY: Final = 0.35  # the robot inside stays visible
 
 
 class Patch(NamedTuple):
@@ -41,13 +41,13 @@ class Patch(NamedTuple):
 
     @classmethod
     def of(cls, vertices: Array, faces: Indices, color: tuple[int, int, int]) -> Patch:
-        """A patch of some faces of a larger net, with no more of its corners than they have."""
+        """A patch of some faces of a mesh, with the corners of these faces only."""
         used, index = np.unique(faces, return_inverse=True)
         return cls(vertices[used], index.reshape(-1, 3), color)
 
 
 def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "double") -> None:
-    """Draw patches below a name in place of those before; in `atomic`, so that corners and faces change together."""
+    """Draw patches below a name, which replace those before; in `atomic`, so that corners and faces change together."""
     for k, patch in enumerate(patches):
         nodes.draw(
             f"{name}/{k}",
@@ -63,20 +63,20 @@ def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "dou
     nodes.keep_first(name, len(patches))
 
 
-CELLS: Final = 30  # along each edge of a cube; another box has as many cells, which are cubes too
+CELLS: Final = 30  # along each edge of a cube; another box has the same number of cubic cells
 MOST_CELLS: Final = 64  # along the longest edge
-ROUGH: Final = 2  # times as long are cells in the hull that comes first
-SMALL: Final = 0.25  # of its box: a region that fills less is looked at once more, with cells as much smaller
-LEAST: Final = 0.005  # of the wall: what limits less is not written
+ROUGH: Final = 2  # factor on the size of cells in the first hull
+SMALL: Final = 0.25  # of its box: a smaller region is computed again with smaller cells
+LEAST: Final = 0.005  # of the boundary: smaller shares are not written
 
 
 class WorkspaceQuery(NamedTuple):
     """Robot, orientation, cable model and loads of a workspace."""
 
-    robot: Robot  # the robot, as the settings have changed it
+    robot: Robot  # with the changes of the settings
     quaternion: Array  # orientation of the platform, shape (4,)
     model: CableModel
-    wrenches: WrenchSet  # loads to be borne
+    wrenches: WrenchSet
 
     @property
     def orientations(self) -> Orientations:
@@ -130,7 +130,7 @@ def region_in(query: WorkspaceQuery, rough: bool) -> Region:
 
 
 def region_hull(query: WorkspaceQuery, rough: bool, progress: Callable[[int, int], None]) -> Hull:
-    """The hull of a region at one orientation; `progress` is given the poses done and about how many there will be."""
+    """The hull of a region at one orientation; `progress` receives the number of poses done and the expected total."""
     region, levels = region_in(query, rough), query.levels()
     total = 2 * int(np.prod(np.array(region.cells) + 1))  # vertices take as long as nodes
     done = 0
@@ -153,9 +153,9 @@ def _around(found: Outline, region: Region) -> Region | None:
     """The box around a region that fills little of its own, a cell wider; None where it fills it, or is empty."""
     if not len(found.surface.faces) or region.flat is not None:
         return None
-    room = found.grid.step
-    low = np.maximum(found.surface.vertices.min(axis=0) - room, region.low)
-    high = np.minimum(found.surface.vertices.max(axis=0) + room, region.high)
+    cell = found.grid.step
+    low = np.maximum(found.surface.vertices.min(axis=0) - cell, region.low)
+    high = np.minimum(found.surface.vertices.max(axis=0) + cell, region.high)
     if float(np.prod(high - low)) > SMALL * float(np.prod(region.high - region.low)):
         return None
     return region._replace(low=low, high=high, cells=_cells_of(high - low))
@@ -169,7 +169,7 @@ def _cells_of(size: Array) -> tuple[int, int, int]:
 
 
 def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
-    """HTML: how large it is, what limits it most, and where it goes on."""
+    """HTML of the size of a region, the limiting cables, and the faces of the box that it reaches."""
     parts = f" in {counted(found.parts, 'part')}" if found.parts > 1 else ""
     text = f"<b>Region</b> {n(found.volume, '.3g', region.unit)}{parts}, {escape(str(query.wrenches))}"
     key = color_key(
@@ -185,7 +185,7 @@ def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
 
 
 def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bool) -> str:
-    """HTML: that there is none, and what comes nearest to one; at a rough look, that there is none yet."""
+    """HTML for an empty region, with the best position; for a rough one, that the search continues."""
     if rough:
         return "<b>Region</b> none is seen at a rough look"
     reason = nearest_to(query.levels(), found.grid, region.box.low, region.box.high).reason
@@ -246,8 +246,8 @@ def _quartered(corners: Array) -> Array:
     return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)
 
 
-_STEPS: Final = 20  # along each direction at first: a gap narrower than a step may be missed
-_BISECTIONS: Final = 14  # then: accurate to some 1e-4 of a step
+_STEPS: Final = 20  # of the scan along each direction; narrower gaps may be missed
+_BISECTIONS: Final = 14  # of a step: accurate to about 1e-4 of it
 DIRECTIONS: Final = np.vstack((np.eye(3), -np.eye(3)))  # +x, +y, +z, -x, -y, -z
 NAMES: Final = ("+x", "+y", "+z", "−x", "−y", "−z")
 
@@ -256,7 +256,7 @@ NAMES: Final = ("+x", "+y", "+z", "−x", "−y", "−z")
 class FreeTravel:
     """Free travel from a position in directions of the axes, at one orientation."""
 
-    start: Array  # the position [m], shape (3,)
+    start: Array  # position [m], shape (3,)
     inside: bool  # whether it is within the workspace
     margin: float  # capacity margin there [N]
     which: Indices  # directions in which this robot can move, indices of `DIRECTIONS`, shape (K,)
@@ -282,8 +282,8 @@ def free_travel(find: Find, start: Array, which: Indices, low: Array, high: Arra
     """Distances along directions to the sign change of the margin, by a scan and bisection."""
     ways = DIRECTIONS[which]
     with np.errstate(divide="ignore", invalid="ignore"):
-        room = np.where(ways > 0.0, (high - start) / ways, np.where(ways < 0.0, (low - start) / ways, np.inf))
-    farthest = np.maximum(room.min(axis=1), 0.0)
+        distances = np.where(ways > 0.0, (high - start) / ways, np.where(ways < 0.0, (low - start) / ways, np.inf))
+    farthest = np.maximum(distances.min(axis=1), 0.0)
     at = farthest[:, None] * np.linspace(0.0, 1.0, _STEPS + 1)
     first = find(start[None])
     value, cable = _levels_at(find, start + at[..., None] * ways[:, None])

@@ -56,6 +56,6 @@
     if (!clock) return;
     const edge = width - em;
     write(context, clock.time, edge, top + 1.75 * em, { size: 1.3 * em, weight: 600, align: "right", room: beside });
-    write(context, clock.said, edge, top + 3.15 * em, { size: 0.8 * em, color: BAD, align: "right", room: 2 * beside });
+    write(context, clock.text, edge, top + 3.15 * em, { size: 0.8 * em, color: BAD, align: "right", room: 2 * beside });
   };
 })();

@@ -36,10 +36,10 @@ TOPIC: Final = "row"  # of the messages with the number of a row that is clicked
 LARGEST: Final = 100.0  # times the factor at first
 OPACITY: Final = 0.55
 _DOT: Final = 0.0055  # radius of a pose, of the robot's size
-_ABOVE: Final = 0.02  # of the robot's size: the name of a pose over it
+_ABOVE: Final = 0.02  # of the robot's size: distance of the label of a pose
 NODES: Final[dict[Anchors, str]] = {"frame_anchors": "", "platform_anchors": "/platform"}
-MOST_POSES: Final = 2000  # that are drawn; of more every so-manieth, and all outliers
-MOST_NAMED: Final = 8  # outliers that have their names in the scene
+MOST_POSES: Final = 2000  # drawn poses; of more, a regular selection and all outliers
+MOST_NAMED: Final = 8  # outliers with labels in the scene
 LARGE: Final = 0.04  # of the robot's size: the largest ellipsoid at first
 QUANTILES: Final = (0.95, 0.999)  # of chi squared, between the colors
 COLORS: Final = np.array([PLATFORM, REST, INFEASIBLE], dtype=np.uint8)
@@ -153,7 +153,7 @@ def _root_mean_square(values: Array) -> float:
 
 
 class CalibrationFeature(Feature):
-    """A tab with a calibration, ellipsoids of the errors of the anchors, and the poses of the log to be clicked."""
+    """A tab with a calibration, ellipsoids of the errors of the anchors, and clickable poses of the log."""
 
     def __init__(self, page: Page, found: Calibration) -> None:
         """Build tab and scene of a calibration."""
@@ -167,7 +167,7 @@ class CalibrationFeature(Feature):
         outliers = np.isin(found.rows, [one.row for one in found.outliers]) | (self._bands == self._bands.max())
         some = np.arange(0, len(found.rows), -(-len(found.rows) // MOST_POSES))
         self._drawn = np.union1d(some, np.flatnonzero(outliers)[:MOST_POSES])
-        self._ellipsoids: Hashable = ()  # for which settings they are drawn: none yet
+        self._ellipsoids: Hashable = ()  # settings for which they are drawn
         self._poses: bool | None = None
         self._row: str | None = None
 
@@ -201,7 +201,7 @@ class CalibrationFeature(Feature):
         return tuple(each.value for each in controls)
 
     def follow(self, view: View) -> None:
-        """Draw and write what the controls ask for."""
+        """Draw and write for the values of the controls."""
         try:
             self._follow_ellipsoids()
         except SaglineError as error:
@@ -216,11 +216,11 @@ class CalibrationFeature(Feature):
 
     @property
     def _typed(self) -> str:
-        """The row that is asked for, as it was typed; "" for none."""
+        """The requested row, as typed; "" for none."""
         return " ".join(str(self._field.value).split())[:20]
 
     def _toggle(self, row: Any) -> None:
-        """Ask for a row that is clicked, or for none if it was asked for before."""
+        """Select a clicked row, or none if it was selected before."""
         self._field.value = "" if str(row) == self._typed else str(row)
 
     def _anchors(self, which: Anchors, *, relative: bool) -> Ellipsoids:
@@ -291,7 +291,7 @@ class CalibrationFeature(Feature):
         )
 
     def _draw_poses(self) -> None:
-        """Draw the poses of the log as dots to be clicked, some outliers with their names."""
+        """Draw the poses of the log as clickable dots, some outliers with labels."""
         self._nodes.remove("/log")
         if not self._poses:
             return
@@ -329,6 +329,6 @@ class CalibrationFeature(Feature):
         return sentence("The log has no such row.")
 
     def _pick(self, k: int) -> None:
-        """Ask for the row of a dot that is clicked."""
+        """Select the row of a clicked dot."""
         if 0 <= k < len(self._drawn):
             self._field.value = str(int(self._found.rows[self._drawn[k]]))

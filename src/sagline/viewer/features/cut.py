@@ -31,7 +31,7 @@ PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # s: ends of the parts; the
 DURATION: Final = PARTS[-1]
 ELEMENTS: Final = 10  # of a cable with mass: four times as fast as twice as many
 CABLE_MASS = {"massless": "none", "with cable mass": "lumped"}
-TOP = -10.0  # order of buttons that stand above all else
+TOP = -10.0  # order of buttons above all other controls
 HELP: Final = sentence("Click a cable in the scene, or choose one.")
 MARK: Final = (200, 60, 130)  # 3 : 1 on both backgrounds
 _WIDTH: Final = 7.0  # px
@@ -57,8 +57,8 @@ class Peak(NamedTuple):
 
     cable: int  # number of the cable
     tension: float  # at the frame end [N]
-    time: float  # to a sample [s] after the cut
-    limit: float  # its highest allowed tension [N]; infinite where there is none
+    time: float  # after the cut, to a sample [s]
+    limit: float  # highest allowed tension [N]; infinite for none
 
 
 def peak_of(simulation: Simulation, cut: int) -> Peak:
@@ -71,7 +71,7 @@ def peak_of(simulation: Simulation, cut: int) -> Peak:
 
 
 def outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
-    """HTML: largest displacement of the platform and highest tension after a cut; `whole`: nothing more comes."""
+    """HTML: largest displacement of the platform and highest tension after a cut; `whole` if it is complete."""
     unit, peak = force_unit(simulation.robot), peak_of(simulation, cut)
     away = np.linalg.norm(simulation.pose.position - simulation.pose.position[0], axis=1)
     far = int(np.argmax(away))
@@ -92,8 +92,8 @@ def outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
 class Before(NamedTuple):
     """The page before a cut."""
 
-    pose: Pose  # pose of the platform
-    kept: PlayerState  # what was played
+    pose: Pose  # of the platform
+    kept: PlayerState
 
 
 class CutFeature(Feature):
@@ -104,9 +104,9 @@ class CutFeature(Feature):
         self._page, self._player, self._nodes = page, page.player, Nodes(page.server.scene)
         self._task = BackgroundTask(page.later)
         self._is_marked = False  # whether a cable is marked in the scene
-        self._asked = self._playing = 0  # numbers of the cut asked for last, and of that which is played
-        self._number = 0  # of what is played of it, by the player
-        self._before: list[Before] = []  # of a cut, of one that followed it, and so on
+        self._requested = self._playing = 0  # numbers of the last requested cut, and of the played one
+        self._number = 0  # of the player, for the played cut
+        self._before: list[Before] = []  # states before each of the successive cuts
         gui = page.server.gui
         with gui.add_folder("Cut a cable", expand_by_default=False):
             self._cable: Any = gui.add_dropdown("Cable to cut", tuple(map(str, range(page.robot.cable_count))))
@@ -115,7 +115,7 @@ class CutFeature(Feature):
             button = gui.add_button("Cut", icon=viser.Icon.SCISSORS)
             self._text = gui.add_html(HELP)
         self._undo: Any = gui.add_button(
-            "Undo the cut",
+            "Undo cut",
             icon=viser.Icon.ARROW_BACK_UP,
             visible=False,
             order=TOP,
@@ -151,12 +151,12 @@ class CutFeature(Feature):
         self._button.label = f"Cut cable {cable}"
 
     def tick(self) -> None:
-        """Write the time that the simulation has taken, until there is something to see."""
+        """Write the elapsed time until the first part is played."""
         if self._task.elapsed and self._player.played is None:
             self._text.content = sentence(f"Simulating: {self._task.elapsed:.0f} s so far")
 
     def cut(self) -> None:
-        """Simulate the break of the chosen cable from the equilibrium that is shown, and play it as it comes."""
+        """Simulate the break of the chosen cable from the equilibrium that is shown, and play its parts."""
         state, view = self._page.state, self._page.view
         if state is None or view is None:
             self._text.content = sentence("A cable can be cut at a feasible pose at rest. Drag the platform to one.")
@@ -165,12 +165,12 @@ class CutFeature(Feature):
             self._text.content = sentence("The simulation is still being compiled.")
             return
         cable, cable_mass = self._chosen, CABLE_MASS.get(self._mass.value, "none")
-        self._asked += 1
-        number, before = self._asked, Before(view.snapshot.pose, self._player.save())
+        self._requested += 1
+        number, before = self._requested, Before(view.snapshot.pose, self._player.save())
 
         def simulate() -> None:
             for simulation in simulate_cut(state, cable, cable_mass):
-                if self._asked != number:
+                if self._requested != number:
                     return
                 self._page.later(lambda part=simulation: self._play(number, part, cable, before))  # type: ignore[misc]
 
@@ -179,7 +179,7 @@ class CutFeature(Feature):
 
     def undo(self) -> None:
         """Restore the page as it was before the last cut."""
-        self._asked += 1  # the results of a simulation that is still running are ignored
+        self._requested += 1  # the results of a simulation that is still running are ignored
         if not self._before:
             return
         before = self._before.pop()
@@ -198,8 +198,8 @@ class CutFeature(Feature):
         self._text.content = refused(message)
 
     def _play(self, number: int, simulation: Simulation, cable: int, before: Before) -> None:
-        """Play a part of a simulation, which begins as those before."""
-        if number != self._asked:
+        """Play a part of a simulation, which contains those before."""
+        if number != self._requested:
             return
         if self._playing == number:
             if self._player.number != self._number:
@@ -218,7 +218,7 @@ class CutFeature(Feature):
         self._is_marked = True
 
     def _pick(self, value: Any, client: int) -> None:
-        """Mark the cable at a point of the picture; `value` is whatever a client has sent."""
+        """Mark the cable at a point of the picture; `value` is not checked yet."""
         at, camera, view = screen_point(value), camera_of(self._page.server, client), self._page.view
         if at is None or camera is None or view is None or self._page.state is None:
             return

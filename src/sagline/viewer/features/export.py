@@ -30,20 +30,20 @@ from sagline.viewer.tension_scale import TensionScale
 
 WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # px
 RATE = 30.0  # pictures a second
-LONGEST = 120.0  # s of film: more pictures than that fill a browser's memory
+LONGEST = 120.0  # s of film: more pictures fill the memory of a browser
 LINE_WIDTH = 1.4  # for those of a screen
-TOPIC: Final = "film"  # what the film is, once
-CLOCK: Final = "film clock"  # what its strip says, before each picture
+TOPIC: Final = "film"  # description of the film
+CLOCK: Final = "film clock"  # texts of its strip, before each picture
 
 
-_CABLE_RADIUS = 0.0012  # of the robot's size: real cables would not be seen
-_DEAD_RADIUS = 0.0006  # the same of what runs guided behind the pulleys
+_CABLE_RADIUS = 0.0012  # of the robot's size: real cables are too thin
+_DEAD_RADIUS = 0.0006  # of the robot's size, for dead cables
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
 def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: float = 1.0) -> bytes:
-    """Frame, pulleys, winches, platform and cables, in meters, y up as glTF wants it."""
-    import trimesh  # a fifth of the time in which the viewer starts
+    """Frame, pulleys, winches, platform and cables in meters, with y upward as in glTF."""
+    import trimesh  # imported only when needed: a fifth of the start time
     from trimesh.transformations import compose_matrix, quaternion_matrix
 
     robot = snapshot.robot
@@ -97,23 +97,23 @@ def filmed(
     extent: tuple[Array, Array],
     cancelled: Callable[[], bool],
 ) -> None:
-    """Have a client's page film what is played from its beginning to its end, from where its camera is.
+    """Have a client's page make a film of all that is played, from its camera; other clients are not affected.
 
     Args:
-        client: Who asked.
-        server: The server, whose scene is hidden from that client meanwhile; others see and drag what they did.
-        messages: Messages to its page.
-        played: The run, or simulation.
-        view: How it is drawn.
-        speed: Time of what is played a second of film.
-        name: Of the file, without its suffix.
-        extent: Lowest and highest corner of what there is to see [m].
-        cancelled: Whether nobody wants it any more.
+        client: The client.
+        server: The server; its scene is hidden from the client until the film is complete.
+        messages: Messages to the client's page.
+        played: Run, simulation or log.
+        view: View that is drawn, with other configurations.
+        speed: Ratio of the time of what is played to that of the film.
+        name: Name of the file, without suffix.
+        extent: Lowest and highest corner of all that is drawn [m].
+        cancelled: Function that tells if the film was cancelled.
 
     Raises:
         InvalidValueError: If the film would be too long.
-        RuntimeError: If the client goes, or gives no picture.
-        TimeoutError: If it gives none for too long.
+        RuntimeError: If the client disconnects, or sends no picture.
+        TimeoutError: If a picture does not arrive in time.
     """
     times = moments(played.duration, speed)
     strip = round(STRIP * TEXT)
@@ -123,19 +123,19 @@ def filmed(
         "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
     }  # fmt: skip
     shot = Shot.of(client.camera, *extent, WIDTH, HEIGHT - strip)
-    messages.send(CLOCK, None)  # pictures without a clock are none of the film's
+    messages.send(CLOCK, None)  # pictures without a clock are not part of the film
     messages.send(TOPIC, about)
     try:
         with offscreen_scene(client, server, shot, view, LINE_WIDTH, played) as scene:
             for time in times:
                 if cancelled():
                     return
-                sight = replace(view, snapshot=played.at(float(time)))
-                scene.show(sight)
-                messages.send(CLOCK, _clock(sight, float(time), speed))
+                frame = replace(view, snapshot=played.at(float(time)))
+                scene.show(frame)
+                messages.send(CLOCK, _clock(frame, float(time), speed))
                 scene.take("jpeg")
     finally:
-        messages.send(TOPIC, None)  # nothing more comes; a page that has all pictures records them nevertheless
+        messages.send(TOPIC, None)  # a page with all pictures completes the film
 
 
 def moments(duration: float, speed: float) -> Array:
@@ -154,18 +154,18 @@ def moments(duration: float, speed: float) -> Array:
 def _clock(view: View, time: float, speed: float) -> dict[str, Any]:
     """Text of the strip that changes from picture to picture."""
     digits = max(1, ceil(-log10(speed / RATE)))
-    said = headline(view.snapshot) if isinstance(view.snapshot, Snapshot) else view.snapshot.notice
-    return {"time": f"{time:.{digits}f} s", "said": "" if view.snapshot.feasible else said}
+    text = headline(view.snapshot) if isinstance(view.snapshot, Snapshot) else view.snapshot.notice
+    return {"time": f"{time:.{digits}f} s", "text": "" if view.snapshot.feasible else text}
 
 
 class Exporter:
-    """A client that exports, one thing at a time."""
+    """A client with its exports, one at a time."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
-        """Begin with nothing."""
+        """Begin without exports."""
         self.client = client
         self.messages = Messages(client.gui)
-        self.taking = threading.Lock()
+        self.busy = threading.Lock()
         self.cancelled = threading.Event()
 
 
@@ -173,7 +173,7 @@ Send = Callable[[Exporter], None]
 
 
 class ExportFeature(Feature):
-    """Buttons for a picture, the scene, and a film of the run; who asks waits in a thread of viser, others do not."""
+    """Buttons for a picture, the scene, and a film; an export waits in a thread of viser, other clients do not."""
 
     def __init__(self, page: Page) -> None:
         """Build the panel."""
@@ -191,13 +191,13 @@ class ExportFeature(Feature):
             self._film: Any = gui.add_button("Film", icon=viser.Icon.MOVIE, visible=False)
             buttons.append((self._film, self._send_film))
         for button, send in buttons:
-            button.on_click(partial(self._sent, send))
+            button.on_click(partial(self._export, send))
         channel.on(TOPIC, self._cancel)
-        server.on_client_disconnect(self._part)
+        server.on_client_disconnect(self._remove)
         self.put_on(page.player.played)
 
     def depends(self, view: View) -> Hashable:
-        """Nothing that is shown."""
+        """Nothing of the view."""
         return None
 
     def put_on(self, played: Played | None) -> None:
@@ -226,24 +226,24 @@ class ExportFeature(Feature):
             filmed(client, self._server, messages, played, view, speed, name, self._extent, cancelled)
 
     def _cancel(self, _: Any, client: int) -> None:
-        """A page does not want its film any more."""
+        """Cancel the film of a client."""
         if client in self._exporters:
             self._exporters[client].cancelled.set()
 
-    def _part(self, client: viser.ClientHandle) -> None:
+    def _remove(self, client: viser.ClientHandle) -> None:
         self._exporters.pop(client.client_id, None)
 
     def _name(self) -> str:
         view = self._page.view
         return "sagline" if view is None else file_stem(view.snapshot.robot.name)
 
-    def _sent(self, send: Send, event: viser.GuiEvent[Any]) -> None:
-        """Send something to the client that asked; one that has gone, or gives no picture, gets nothing."""
+    def _export(self, send: Send, event: viser.GuiEvent[Any]) -> None:
+        """Export for the client of an event; nothing if it has disconnected, or sends no picture."""
         client = event.client
         if client is None:
             return
         exporter = self._exporters.setdefault(client.client_id, Exporter(client))
-        if not exporter.taking.acquire(blocking=False):
+        if not exporter.busy.acquire(blocking=False):
             return  # pressed twice
         try:
             send(exporter)
@@ -251,7 +251,7 @@ class ExportFeature(Feature):
             if client.client_id in self._server.get_clients():
                 client.add_notification("Nothing exported", _why(error), with_close_button=True, auto_close_seconds=8.0)
         finally:
-            exporter.taking.release()
+            exporter.busy.release()
 
 
 def _why(error: Exception) -> str:

@@ -28,7 +28,7 @@ class ScreenReaderText(NamedTuple):
 
 
 def screen_reader_text(view: View) -> ScreenReaderText:
-    """Text of a view for screen readers."""
+    """Verdict, whole text and position of a view for screen readers."""
     snapshot = view.snapshot
     place = place_of(snapshot.pose)
     if isinstance(snapshot, InMotion):
@@ -45,7 +45,7 @@ def described(robot: Robot) -> str:
 
 
 def place_of(pose: Pose) -> str:
-    """Position and, where it is turned, angles of a platform, as one says them."""
+    """Position and, if not zero, angles of a platform in words."""
     x, y, z = (number(value, ".2f") for value in pose.position)
     angles = [number(value, ".0f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
     place = f"x {x}, y {y}, z {z} m"
@@ -66,16 +66,16 @@ def _tensions(robot: Robot, tension: Array) -> str:
     return f"tensions {low} to {high} {unit.name}"
 
 
-STEP: Final = 0.01  # of the robot's size: how far one key moves
-TURN: Final = np.radians(1.0)  # how far one key turns
-MOST: Final = 100.0  # steps at once: keys that were held while nobody listened
+STEP: Final = 0.01  # of the robot's size: translation by a key
+TURN: Final = np.radians(1.0)  # rotation by a key
+MOST: Final = 100.0  # steps at once, from keys held while messages were delayed
 
 
 class KeyboardFeature(Feature):
     """Control of the platform by keys, and text for screen readers."""
 
     def __init__(self, page: Page) -> None:
-        """Build nothing; say what the picture is of."""
+        """Send the description of the scene."""
         channel, robot = page.channel, page.robot
         self._channel, self._go, self._go_home = channel, page.go_near, page.go_home
         self._step = shapes.round_below(STEP * shapes.size_of(robot))
@@ -100,18 +100,18 @@ class KeyboardFeature(Feature):
         except SaglineError as error:
             self._channel.send("nudge-reply", str(error))
         else:
-            self._pose = pose  # more may come before this is shown
+            self._pose = pose  # the next key may arrive before this pose is shown
             self._channel.send("nudge-reply", None)
 
 
-def nudged(pose: Pose, way: Array, turn: Array) -> Pose:
-    """A pose moved along a way [m], and turned about its origin by a rotation vector in world axes [rad]."""
+def nudged(pose: Pose, displacement: Array, turn: Array) -> Pose:
+    """A pose displaced by a vector [m], and rotated about its origin by a rotation vector in world axes [rad]."""
     rotation = Rotation.from_rotvec(turn) * pose.rotation if turn.any() else pose.rotation
-    return Pose(pose.position + way, rotation)
+    return Pose(pose.position + displacement, rotation)
 
 
 def _steps(value: Any) -> Array | None:
-    """Six numbers of a page, of a size that keys bring; None if it sent anything else."""
+    """Six numbers within the range of keys; None for anything else."""
     if not isinstance(value, list) or len(value) != 6:
         return None
     if not all(isinstance(each, int | float) and abs(each) <= MOST for each in value):  # NaN neither

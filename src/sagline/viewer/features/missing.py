@@ -24,9 +24,9 @@ from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import Snapshot, method_name
 from sagline.viewer.tension_scale import ForceUnit, force_unit, number
 
-GO: Final = "go-there"  # topic of the button that puts the platform to the nearest pose
-NEGLIGIBLE: Final = 1e-9  # of a force at an arm of a meter: no moment
-OTHERWISE: Final = "AnalyticCenter"  # finds tensions wherever there are any
+GO: Final = "go-there"  # topic of the button that moves the platform to the nearest pose
+NEGLIGIBLE: Final = 1e-9  # of the force at an arm of one meter: smaller moments count as zero
+OTHERWISE: Final = "AnalyticCenter"  # has a solution at every feasible pose
 
 
 def explanation(
@@ -102,10 +102,10 @@ def _moment(missing: MissingWrench) -> str:
 
 FEASIBLE: Final = (28, 140, 92)  # the platform at the nearest feasible pose
 WIDTH, LINE_WIDTH = 5.0, 2.0  # px
-SMALL: Final = 0.8  # of the size of other names
+SMALL: Final = 0.8  # of the size of other labels
 LONG: Final = 0.2  # of the robot's size: length of the arrow
 _ARROW: Final = np.array([0.006, 0.014, 0.04])  # radii of shaft and head, length of the head; of the robot's size
-ALONG: Final = (0.32, 0.44, 0.56)  # of a cable from its anchor, where names stand: neighbors do not meet
+ALONG: Final = (0.32, 0.44, 0.56)  # of a cable from its anchor: positions of labels, different for neighbors
 
 Key = tuple[object, ...]
 
@@ -126,7 +126,7 @@ class MissingFeature(Feature):
 
     @property
     def waiting(self) -> bool:
-        """True if the nearest pose is still to come."""
+        """True while the nearest pose is searched."""
         return self._task.busy
 
     def follow(self, view: View) -> None:

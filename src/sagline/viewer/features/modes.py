@@ -28,7 +28,7 @@ Place = Callable[[Array], Array]
 
 WIDTH, HEIGHT = 340, 210  # px
 LEFT, RIGHT, TOP, BOTTOM = 36, 10, 28, 36  # px around the axes
-HIGHEST_RESPONSE, LOWEST_RESPONSE = 2e2, 1e-3  # over the static response: undamped peaks have no top, zeros no bottom
+HIGHEST_RESPONSE, LOWEST_RESPONSE = 2e2, 1e-3  # of the static response: limits for undamped peaks and zeros
 MARK = 12  # px, of a mode's mark
 
 
@@ -92,7 +92,7 @@ def _axes(words: str, across: Place, up: Place, decades: tuple[float, float], fi
     return "".join(marks)
 
 
-UP_TO = 20.0  # Hz, at first
+UP_TO = 20.0  # Hz, at the start
 HIGHEST = 200.0  # Hz
 FIELD = "Mode"
 TOPIC: Final = "mode"  # of the messages with the name of a mode that is clicked
@@ -146,7 +146,7 @@ class ModesFeature(Feature):
         self._due: float | None = None  # time at which the modes are to be computed [s]
         self._vibration: Vibration | None = None
         self._curves: dict[str, ResponseCurves] = {}  # of the vibration, by force
-        self._listed: tuple[object, ...] = ()  # what list and figure were written for
+        self._listed: tuple[object, ...] = ()  # key of the list and the figure
         self.swing: Swing | None = None
         gui = page.server.gui
         with page.panel.readings.add_tab("Modes"):
@@ -167,7 +167,7 @@ class ModesFeature(Feature):
 
     @property
     def waiting(self) -> bool:
-        """True if modes or a response are still to come."""
+        """True while modes or a response are computed."""
         return self._due is not None or self._task.busy
 
     def follow(self, view: View) -> None:
@@ -212,7 +212,7 @@ class ModesFeature(Feature):
         return self._force.value if self._force.value in MOTIONS else MOTIONS[0]
 
     def _toggle(self, name: Any) -> None:
-        """Have a mode that is clicked move, or stop it."""
+        """Select a clicked mode, or none if it was selected before."""
         self._mode.value = "" if str(name) == self._chosen else str(name)
 
     def _refuse(self, message: str) -> None:

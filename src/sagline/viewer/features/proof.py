@@ -78,13 +78,13 @@ def can_rotate(state: Equilibrium) -> bool:
 WIDTH, BORDER = 340.0, 24.0  # px
 HIGHEST: Final = 200.0  # px, of a view
 HEAD: Final = (7.0, 2.8)  # length and half the width of an arrow's head [px]
-SHORT: Final = 3.0  # px: an arrow that is shorter has no name
-LETTER: Final = (7.5, 11.0)  # px: how wide and high a letter of a name is at most
+SHORT: Final = 3.0  # px: shorter arrows have no name
+LETTER: Final = (7.5, 11.0)  # px: largest width and height of a letter
 BESIDE: Final = 3.0  # px, between an arrow and its name
-SHARES: Final = (0.5, 0.35, 0.65, 0.2, 0.8)  # of an arrow, where its name may stand; the middle first
+SHARES: Final = (0.5, 0.35, 0.65, 0.2, 0.8)  # of an arrow: positions of its name, in order of preference
 SIDES: Final = ((0, 2), (1, 2), (0, 1))  # axes to the right and up: from the front, from the side, from above
-FLAT: Final = 1e-3  # of the largest view: one this small shows nothing
-SHOWN: Final = 2  # of them, those in which most is seen
+FLAT: Final = 1e-3  # of the largest projection: smaller ones are not shown
+SHOWN: Final = 2  # projections, those with the largest areas
 
 
 class Projection(NamedTuple):
@@ -109,7 +109,7 @@ class Box(NamedTuple):
 
 
 def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> str:
-    """HTML: the polygon from two sides, its residual, and the forces and moments as numbers."""
+    """HTML of the force polygon in two projections, its residual, and the forces and moments as numbers."""
     forces = forces_on_platform(state, missing)
     corners = np.vstack((np.zeros(3), np.cumsum([each.force for each in forces], axis=0)))
     views = [Projection("xyz"[right] + "xyz"[up], corners[:, [right, up]]) for right, up in SIDES]
@@ -141,7 +141,7 @@ def _drawing(view: Projection, forces: tuple[PlatformForce, ...], scale: float) 
 
 
 def _arrow(force: PlatformForce, start: Array, end: Array, taken: list[Box]) -> str:
-    """An arrow with its name, beside those taken; the missing force is dashed."""
+    """An arrow with its name, which avoids the labels before; the missing force is dashed."""
     way = end - start
     length = float(np.hypot(*way))
     if length < 0.5:
@@ -165,7 +165,7 @@ def _arrow(force: PlatformForce, start: Array, end: Array, taken: list[Box]) -> 
 
 
 def _label_box(name: str, start: Array, way: Array, normal: Array, taken: list[Box]) -> Box:
-    """Box of the name of an arrow: the first place beside it that is free, or the one that overlaps least."""
+    """Box of the name of an arrow: the first free position beside it, or the one with the least overlap."""
     across, up = 0.5 * LETTER[0] * len(name), 0.5 * LETTER[1]
     (x, y), (along, down) = start.tolist(), way.tolist()
     right, below = ((BESIDE + abs(normal[0]) * across + abs(normal[1]) * up) * normal).tolist()
@@ -213,7 +213,7 @@ def _table(state: Equilibrium, forces: tuple[PlatformForce, ...]) -> str:
 
 
 def _decimals(largest: float) -> int:
-    """Number of decimals for a largest force, as far as the table is wide enough."""
+    """Number of decimals for a largest force, by the width of the table."""
     return 1 if largest >= 99.95 else 2 if largest >= 9.995 else 3
 
 
@@ -262,7 +262,7 @@ class ProofFeature(Feature):
         return (None, None) if missing is None else (missing.state, missing.wrench)
 
     def _draw(self, state: Equilibrium | None, missing: Array | None) -> None:
-        """Draw the forces as arrows from where they act."""
+        """Draw the forces as arrows at their points of application."""
         if state is None:
             self._nodes.hide("/forces")
             return

@@ -1,4 +1,4 @@
-"""Push: a force that somebody applies to the platform, and the response to it."""
+"""Push: a force that the user applies to the platform, and the response to it."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.shapes import THINNEST, ball, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
 
-COLOR: Final = (200, 60, 130)  # 3 : 1 on both backgrounds, none of those of platforms
+COLOR: Final = (200, 60, 130)  # contrast 3 : 1 on both backgrounds, not used for platforms
 GHOST_OPACITY, BALL_OPACITY = 0.5, 0.3
 _ARROW: Final = np.array([0.003, 0.009, 0.025])  # radii of shaft and head, length of the head; of the robot's size
-_BELOW: Final = 0.03  # of the robot's size: the reserve is written this much below the point
-FARTHEST: Final = 1e4  # m: a point of the platform farther from its frame is a slip
+_BELOW: Final = 0.03  # of the robot's size: distance of the label of the reserve below the point
+FARTHEST: Final = 1e4  # m: largest distance of a point of the platform from its frame
 HELP: Final = sentence("Ctrl-drag the platform, or type a force.")
 TOPIC: Final = "pull"  # of the messages of browser/hand.js
 FAR: Final = 0.25  # of the robot's size: a drag of this length applies the mean of the tension limits
-NEAR: Final = 12.0  # px: a pointer this near to the platform grabs it
+NEAR: Final = 12.0  # px: largest distance of a pointer that grabs the platform
 LARGE: Final = 0.06  # of the robot's size: longest semi-axis of the ellipsoid
 LONGEST: Final = 0.6  # of the robot's size: longest arrow of a force that is typed
 
@@ -87,14 +87,14 @@ def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
 
 
 class Hold(NamedTuple):
-    """A point of the platform that a client holds."""
+    """A point of the platform that a client drags."""
 
     client: int  # number of the client
     at: Array  # the point, platform frame [m], shape (3,)
 
 
 class PushFeature(Feature):
-    """A folder whose fields are the force, typed or dragged, and the response in the scene."""
+    """A folder with the fields of a force, typed or dragged, and the response in the scene."""
 
     def __init__(self, page: Page) -> None:
         """Build the folder."""
@@ -190,7 +190,7 @@ class PushFeature(Feature):
             self._at.value = tuple(float(x) for x in push.at)
 
     def _show_text(self, html: str) -> None:
-        """Write about the force; "" for how to apply one."""
+        """Write the response; "" for how to apply a force."""
         self._text.content = html or HELP
         self._release.visible = bool(html)
 
@@ -240,7 +240,7 @@ class PushFeature(Feature):
             self.release()
 
     def _on_drag(self, value: Any, client: int) -> None:
-        """Apply the force of a drag; `value` is whatever a client has sent."""
+        """Apply the force of a drag; `value` is not checked yet."""
         if not isinstance(value, dict):
             return
         phase, at = value.get("phase"), screen_point(value.get("at"))
@@ -285,7 +285,7 @@ def _drag(camera: Camera, at: tuple[float, float], start: Array) -> Array:
 
 
 def _ellipsoid(axes: Array) -> tuple[Array, tuple[float, float, float]]:
-    """Quaternion (scalar first) and scale of a unit ball for semi-axes (3, 3); a flat one is still seen."""
+    """Quaternion (scalar first) and scale of a unit ball for semi-axes (3, 3); with a least thickness."""
     lengths = np.linalg.norm(axes, axis=0)
     directions = axes / np.maximum(lengths, 1e-300)
     if np.linalg.det(directions) < 0.0:
@@ -295,11 +295,11 @@ def _ellipsoid(axes: Array) -> tuple[Array, tuple[float, float, float]]:
 
 
 def _numbers(value: Any, count: int, item: str, allowed: str) -> Array:
-    """Finite numbers of a field, which a client may have filled with anything."""
+    """Finite numbers of a field; its value is not checked by viser."""
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError, OverflowError):
         found = np.empty(0)
     if found.shape != (count,) or not np.isfinite(found).all():
-        raise InvalidValueError(f"push: {item}", "no such numbers", allowed, "Type another, or release the force.")
+        raise InvalidValueError(f"push: {item}", "not a number", allowed, "Type another, or release the force.")
     return found

@@ -53,15 +53,15 @@ _NOTHING: Final = sentence("Choose one or several of these.")
 
 
 class _SupersededError(SaglineError):
-    """Another workspace is asked for."""
+    """Another workspace is requested."""
 
 
 class _Result(NamedTuple):
     """A hull that was computed."""
 
     key: Hashable  # identifies the workspace
-    rough: bool  # whether it is the coarse one, which comes first
-    hull: Hull | None  # the hull; None where it cannot be computed
+    rough: bool  # whether it is the coarse hull, which is computed first
+    hull: Hull | None  # None where it cannot be computed
 
 
 def planes_of(robot: Robot) -> tuple[int, ...]:
@@ -184,7 +184,9 @@ class RegionFeature(Feature):
         key = (id(robot), pose.quaternion.tobytes(), type(model), loads, None if wrench is None else wrench.tobytes())
         if key != self._key or self._levels is None or self._region is None:
             quaternion = locked(np.array(pose.quaternion))
-            self._query = WorkspaceQuery(robot, quaternion, model, WrenchBox(*loads, center=wrench))  # keeps the id
+            self._query = WorkspaceQuery(
+                robot, quaternion, model, WrenchBox(*loads, center=wrench)
+            )  # keeps the robot, and so its id
             self._region, self._levels = region_of(robot, None, CELLS), self._query.levels()
             self._key = key
         if self._scale_key != key and self._scaled:
@@ -227,7 +229,7 @@ class RegionFeature(Feature):
 
         def progress(done: int, total: int) -> None:  # in the background thread
             self._progress = min(done / max(total, 1), 1.0)
-            if self._key != key and not rough:  # a rough one is shown all the same while a slider moves
+            if self._key != key and not rough:  # a rough hull is shown while a slider moves
                 raise _SupersededError
 
         def failed(message: str) -> None:
@@ -298,12 +300,12 @@ class RegionFeature(Feature):
         nodes.lines("/slice/boundary", picture.boundary, INFEASIBLE, BOUNDARY_WIDTH)
         nodes.lines("/slice/lines", picture.lines, LINE_COLOR, LINE_WIDTH)
         for k, mark in enumerate(picture.marks):
-            nodes.label(f"/slice/levels/{k}", mark.text, mark.place, "top-left", _SMALL)
+            nodes.label(f"/slice/levels/{k}", *mark, "top-left", _SMALL)
         nodes.keep_first("/slice/levels", len(picture.marks))
 
     def _follow_travel(self, levels: Levels, region: Region, robot: Robot, pose: Pose) -> None:
         if not self._travel_box.value:
-            self._nodes.remove("/ways")
+            self._nodes.remove("/travel")
             return
         which = free_directions(robot, region.flat)
         travel = free_travel(levels.details, pose.position, which, region.low, region.high)
@@ -313,14 +315,14 @@ class RegionFeature(Feature):
     def _draw_travel(self, travel: FreeTravel) -> None:
         """Draw an arrow in each direction, with its length where it ends at the boundary."""
         ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
-        self._nodes.arrows("/ways", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))
+        self._nodes.arrows("/travel", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))
         for k, which in enumerate(travel.which):
             text = f"{NAMES[which]} {travel.distance[k]:.2f} m" if travel.crossed[k] else ""
-            self._nodes.label(f"/ways/{NAMES[which]}", text, travel.ends[k], scale=_TEXT_SCALE)
+            self._nodes.label(f"/travel/{NAMES[which]}", text, travel.ends[k], scale=_TEXT_SCALE)
 
     def _clear(self) -> None:
         """Draw nothing, and forget the workspace."""
-        self._nodes.remove("/hull", "/wall", "/slice", "/ways")
+        self._nodes.remove("/hull", "/wall", "/slice", "/travel")
         self._nodes.hide("/platform/left")
         self._hull_key = self._key = self._result = self._slice_key = None
 

@@ -1,4 +1,4 @@
-"""Drawing of the feasible tensions, in which tensions are chosen by hand."""
+"""Feasible tensions: their drawing, and the choice of tensions by hand."""
 
 from __future__ import annotations
 
@@ -27,33 +27,33 @@ from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import METHODS, Snapshot, method_name
 from sagline.viewer.tension_scale import force_unit, number
 
-NEAR: Final = 10.0  # px: marks that are closer share one
+NEAR: Final = 10.0  # px: marks that are closer are joined
 
 
 class MethodMark(NamedTuple):
     """A tension distribution method with its result."""
 
-    name: str  # as it is chosen
-    letter: str  # that marks it
-    tension: Array  # its chord tensions [N], shape (m,); NaN where it has none
-    missing: str = ""  # why it has none; "" where it has
+    name: str
+    letter: str
+    tension: Array  # chord tensions [N], shape (m,); NaN without a solution
+    missing: str = ""  # reason why there is no solution
 
 
 class MethodMarks:
-    """The answers of all ways at a pose, kept for as long as nothing but the way changes.
+    """Results of all tension distribution methods at a pose, kept while only the chosen method changes.
 
-    A robot that is moved is given solvers of its own, which answer a dozen times as fast; it takes them longer to be
-    made than to answer once without, and so a robot whose mass follows a slider has none.
+    A robot that moves gets its own solvers, which are a dozen times as fast. Making them takes longer than a single
+    solution, so a robot whose mass follows a slider has none.
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin without results."""
         self._key: tuple[object, ...] = ()
         self._found: tuple[MethodMark, ...] = ()
         self._solvers: dict[str, InverseSolver] | None = None
 
     def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[MethodMark, ...]:
-        """The answers at the pose of a plan, at rest under its wrench."""
+        """Results at the pose of a plan, at rest under its wrench."""
         state = plan.state
         place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
         key = (id(state.robot), type(state.cables.model), further, verdicts, *place)
@@ -67,13 +67,13 @@ class MethodMarks:
                 self._solvers = None
             elif self._solvers is None and verdicts:
                 self._solvers = _solvers(plan, [name for name, _ in ways])
-            self._key, self._robot = key, state.robot  # and the id stays this robot's
+            self._key, self._robot = key, state.robot  # the robot is kept, so that its id is not used again
             self._found = tuple(_mark(plan, name, letter, (self._solvers or {}).get(name)) for name, letter in ways)
         return self._found
 
 
 def grouped(marks: tuple[MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[MethodMark]]]:
-    """Marks that have an answer, with those that would lie on each other together, each at its place [px]."""
+    """Marks with a result, in groups of those at the same position, with the position [px]."""
     groups: list[tuple[tuple[float, float], list[MethodMark]]] = []
     for mark in marks:
         if mark.missing:
@@ -88,11 +88,11 @@ def grouped(marks: tuple[MethodMark, ...], field: DotField) -> list[tuple[tuple[
 
 
 def _solvers(plan: Plan, names: list[str]) -> dict[str, InverseSolver]:
-    """A solver for each way that can be had for the robot of a plan."""
+    """Solvers of the methods that are applicable to the robot of a plan."""
     robot, model = plan.state.one_robot, plan.state.cables.model
     found = {}
     for name in names:
-        with suppress(InvalidValueError):  # `inverse` tells why, and what it does otherwise
+        with suppress(InvalidValueError):  # `inverse` gives the reason
             found[name] = InverseSolver(robot, model, METHODS[name].alone)
     return found
 
@@ -112,15 +112,15 @@ def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> M
     return MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
 
 
-MOST_REDUNDANT: Final = 2  # dimensions of a drawing
-SHARING: Final = "sharing"  # topic of a way of sharing that is chosen
+MOST_REDUNDANT: Final = 2  # redundant cables of a drawing
+SHARING: Final = "sharing"  # topic of a chosen tension distribution method
 
 
 def polygon_figure(
     snapshot: Snapshot, marks: tuple[MethodMark, ...] = (), field: DotField | None = None, back: str = ""
 ) -> str:
     """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
-    if remark := why_none(snapshot):
+    if remark := why_not_drawn(snapshot):
         return sentence(remark)
     drawn = field_of(snapshot) if field is None else field
     if drawn is None:
@@ -137,8 +137,8 @@ def polygon_later() -> str:
     return sentence(LATER.capitalize())
 
 
-def why_none(snapshot: Snapshot) -> str:
-    """Why the feasible tensions of a robot have no drawing; "" where they have."""
+def why_not_drawn(snapshot: Snapshot) -> str:
+    """Reason why the feasible tensions of a robot are not drawn; "" if they are."""
     redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
     if redundant > MOST_REDUNDANT:
         return f"{redundant} redundant cables: the feasible tensions cannot be drawn in a plane."
@@ -185,9 +185,9 @@ def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[MethodMark, ...],
 
 
 def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
-    """The chosen tensions, where there are any: what is dragged, with room for a finger."""
+    """The dot of the chosen tensions, with a target large enough for a finger; "" without tensions."""
     point = field.polygon.coordinates(snapshot.tension)
-    if not np.isfinite(point).all():  # no tensions were chosen where the way of sharing found none
+    if not np.isfinite(point).all():  # the method has no solution
         return ""
     x, y = field.place(point)
     dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5.5" class="dot"/>'
@@ -236,7 +236,7 @@ def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
 
 
 def _key(snapshot: Snapshot, marks: tuple[MethodMark, ...], back: str) -> str:
-    """The ways of sharing by their letters, to choose; and what is chosen by hand, and how to take it back."""
+    """The methods by their letters, as buttons; and the choice by hand, with a button to return to a method."""
     if not marks:
         return ""
     by_hand = snapshot.plan is not None and isinstance(snapshot.plan.tension, ByHand)
@@ -260,7 +260,7 @@ def _key(snapshot: Snapshot, marks: tuple[MethodMark, ...], back: str) -> str:
 
 
 def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
-    """The name of a side, outside of it; none for a side that is too short to name, or no limit."""
+    """Name of a side, outside of it; "" for a short side, or one that is not a limit."""
     side = field.sides[k]
     if side is None or np.hypot(end[0] - start[0], end[1] - start[1]) < 22.0:
         return ""
@@ -273,7 +273,7 @@ def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float,
 
 
 def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, float]) -> str:
-    """The name of an end of an interval, below it; of one that is none, an arrow head."""
+    """Name of an end of an interval, below it; an arrow head for an unbounded end."""
     side, (x, y) = field.sides[k], at
     if side is None:
         back = 8.0 if other[0] > x else -8.0
@@ -283,8 +283,8 @@ def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, f
 
 
 DOT: Final = "dot"  # topic of the dot: {"at": coordinates [N]}, or {"by": steps, in shares of the drawing}
-OVER: Final = 2e-3  # of the drawing: sides are aimed at from so far beyond
-FARTHEST: Final = 1.0  # share of the drawing that a step may be
+OVER: Final = 2e-3  # of the drawing: step beyond a side
+FARTHEST: Final = 1.0  # of the drawing: largest step
 
 
 class TensionsFeature(Feature):
@@ -294,21 +294,21 @@ class TensionsFeature(Feature):
         """Build nothing yet."""
         self._panel, self._ready = page.panel, page.ready
         self._marks = MethodMarks()
-        self._field: DotField | None = None  # where the dot can go
+        self._field: DotField | None = None  # in which the dot moves
         self._key: tuple[object, ...] = ()  # of the pose that the field is of
-        self._aim: Array | None = None  # coordinates that were chosen last, (r,)
+        self._aim: Array | None = None  # last chosen coordinates, (r,)
         page.channel.on(DOT, self._on_dot)
         page.channel.on(SHARING, self._on_method)
 
     def follow(self, view: View) -> None:
-        """Draw what there is to choose from."""
+        """Draw the feasible tensions."""
         snapshot = view.snapshot
         before, self._field = self._field, None
         if not isinstance(snapshot, Snapshot):
             self._panel.show_polygon(sentence(snapshot.why_no_choice))
         elif not self._ready(Computation.POLYGON):
             self._panel.show_polygon(polygon_later())
-        elif view.played is not None or snapshot.plan is None or why_none(snapshot):
+        elif view.played is not None or snapshot.plan is None or why_not_drawn(snapshot):
             self._panel.show_polygon(polygon_figure(snapshot))
         else:
             state = snapshot.plan.state
@@ -322,10 +322,10 @@ class TensionsFeature(Feature):
                 self._aim = self._field.polygon.coordinates(snapshot.tension)
             further, verdicts = self._ready(Computation.SHARING), self._ready(Computation.VERDICTS)
             marks = self._marks.at(snapshot.plan, further=further, verdicts=verdicts) if self._field else ()
-            self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.way))
+            self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.method_name))
 
     def _on_dot(self, value: Any, _: int) -> None:
-        """The dot has been dragged, or stepped; what is no such thing, or comes too late, is not heard."""
+        """Move the dot by a drag or a step; invalid and late messages are ignored."""
         field = self._field
         if field is None or not isinstance(value, dict):
             return
@@ -339,18 +339,18 @@ class TensionsFeature(Feature):
 
     @staticmethod
     def _beyond(field: DotField, away: Array) -> Array:
-        """A little of the way out of the field: with other pulls its sides are a little farther."""
+        """Small step outward: with other sag forces the sides are a little farther."""
         far = float(np.linalg.norm(away))
         return away * min(1.0, OVER * float(np.max(field.high - field.low)) / far) if far > 0.0 else away
 
     def _on_method(self, value: Any, _: int) -> None:
         """Choose a tension distribution method by its mark."""
         if self._field is not None and isinstance(value, str) and value in METHODS:
-            self._panel.choose_way(value)
+            self._panel.choose_method(value)
 
 
 def _numbers(value: Any, count: int) -> Array | None:
-    """So many finite numbers, or None for anything else."""
+    """A number of finite numbers; None for anything else."""
     if not isinstance(value, list) or len(value) < count:
         return None
     if not all(type(part) in (int, float) and abs(part) < 1e12 for part in value):

@@ -24,7 +24,7 @@ _COLORS: Final = linear(np.array([[int(color[i : i + 2], 16) for i in (1, 3, 5)]
 SPEEDS: Final = (0.25, 1.0, 4.0, 16.0)
 PERIOD: Final = 1.0 / 30.0  # s: least time between messages of the clock
 TURN: Final = 0.5  # s: least time between moves of the window
-NARROWEST: Final = 1e-6  # of the whole, that a window is wide
+NARROWEST: Final = 1e-6  # of the duration: least width of a window
 _MOST_STEPS: Final = 1_000_000
 
 
@@ -37,13 +37,13 @@ class TimelineFeature(Feature):
         self._channel, self._player = channel, player
         self._nodes, self._body = Nodes(page.server.scene), shapes.platform(page.robot)
         self._above = float(self._body.vertices[:, 2].max()) + NEAR * page.size
-        self._played: Played | None = None  # of which the track is
+        self._played: Played | None = None  # source of the track
         self._number = player.number
         self._track: Track | None = None
-        self._other: Track | None = None  # of what is beside
+        self._other: Track | None = None  # of the second run
         self._chart = 0  # which is shown
-        self._window: tuple[float, float] | None = None  # that is looked at [s]; None for the whole
-        self._sent: Any = None  # what the pages were sent
+        self._window: tuple[float, float] | None = None  # visible times [s]; None for all
+        self._sent: Any = None  # last state that was sent
         self._clock: Any = None
         self._sent_at = -PERIOD
         self._moved_at = -TURN
@@ -55,7 +55,7 @@ class TimelineFeature(Feature):
 
     @property
     def waiting(self) -> bool:
-        """True if the time of the clock is still to be sent."""
+        """True if the time of the clock has not been sent."""
         return bool(self._clock != self._now())
 
     def depends(self, view: View) -> Hashable:
@@ -93,11 +93,11 @@ class TimelineFeature(Feature):
             self._channel.send("clock", self._clock)
 
     def _restart(self) -> None:
-        """Take over something else that is played, or more of it."""
+        """Update the tracks for what is played, or a longer version of it."""
         played, beside = self._player.played, self._player.beside
         self._track = None if played is None else played.track()
         self._other = None if beside is None else self._other or beside.played.track()
-        if self._number != self._player.number:  # it is not only longer
+        if self._number != self._player.number:  # not only a longer version
             self._chart, self._window = 0, None
         self._played, self._number = played, self._player.number
 
