@@ -1,6 +1,6 @@
-// window.sagline: what the page says to the server beside viser's own words, and hears from it (channel.py).
+// window.sagline: messages between page and server beside those of viser (server.py).
 (() => {
-  const say = (lost) => {
+  const showBanner = (lost) => {
     let banner = document.getElementById("sagline-lost");
     if (!banner && lost) {
       banner = document.createElement("div");
@@ -13,13 +13,13 @@
   };
 
   const handlers = new Map(); // of topics
-  const told = new Map(); // the last value of each topic: who asks later hears it at once
-  const topics = new Map(); // by the uuid of the element that brings them
-  const unsent = new Map(); // by topic: the last of what is not told yet
+  const latest = new Map(); // last value of each topic, for handlers that are added later
+  const topics = new Map(); // by the uuid of the element that carries them
+  const unsent = new Map(); // by topic: last message that has not been sent
   let count = 0;
-  let worker, uuid; // the client speaks to its server through a worker; uuid of the field that says what we say
+  let worker, uuid; // worker that connects the client to its server; uuid of the field that carries our messages
 
-  let welcome = false; // whether the server hears us: it does not before it knows where our camera is
+  let welcome = false; // whether the server accepts messages: not before it knows our camera
 
   const post = (value) =>
     worker.postMessage({ type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
@@ -28,27 +28,27 @@
     unsent.forEach(post);
     unsent.clear();
   };
-  const tell = (topic, value) => {
-    told.set(topic, value);
+  const deliver = (topic, value) => {
+    latest.set(topic, value);
     for (const each of handlers.get(topic) ?? []) each(value);
   };
 
   window.sagline = {
-    // Tell the server something; what is told last before the connection stands is told then.
+    // Send a value to the server; before the connection is open, only the last value of a topic is kept.
     send(topic, value) {
-      const text = JSON.stringify({ topic, value, count: (count += 1) }); // the same twice is said twice
-      unsent.delete(topic); // topics go in the order in which they were told
+      const text = JSON.stringify({ topic, value, count: (count += 1) }); // equal values are sent again
+      unsent.delete(topic); // topics are sent in the order of their last values
       unsent.set(topic, text);
       flush();
     },
-    // Hear what the server tells about a topic, the last that it has told first.
+    // Handle the values of a topic, beginning with the last one that has arrived.
     on(topic, handler) {
       handlers.set(topic, [...(handlers.get(topic) ?? []), handler]);
-      if (told.has(topic)) handler(told.get(topic));
+      if (latest.has(topic)) handler(latest.get(topic));
     },
   };
 
-  const hear = (message) => {
+  const receive = (message) => {
     if (message.type === "GuiTextMessage" && message.props.label === "sagline") {
       uuid = message.uuid;
       flush();
@@ -62,7 +62,7 @@
   const content = (from, text) => {
     const topic = topics.get(from);
     const json = text.slice(`sagline:${topic}:`.length);
-    if (json) tell(topic, JSON.parse(json));
+    if (json) deliver(topic, JSON.parse(json));
   };
 
   window.sagline.on("welcome", () => {
@@ -79,15 +79,15 @@
         if (data?.type === "connected") {
           clearTimeout(waiting);
           waiting = 0;
-          say(false);
-          tell("connected", true);
+          showBanner(false);
+          deliver("connected", true);
         } else if (data?.type === "closed") {
-          uuid = undefined; // a server that comes back has another field
+          uuid = undefined; // a restarted server has another field
           welcome = false;
-          tell("connected", false);
-          waiting ||= setTimeout(() => say(true), 1500); // a reload or a short break needs no words
+          deliver("connected", false);
+          waiting ||= setTimeout(() => showBanner(true), 1500); // no banner for a reload or a short interruption
         } else if (data?.type === "message_batch") {
-          data.messages.forEach(hear);
+          data.messages.forEach(receive);
         }
       });
     }

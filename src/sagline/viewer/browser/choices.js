@@ -1,9 +1,9 @@
-// What is chosen in a list or a figure of ours: an element with data-send="topic" and data-value.
+// Clicks on elements of our lists and figures with data-send="topic" and data-value.
 (() => {
   const choiceAt = (element) => element?.closest?.("[data-send]")?.dataset;
   const choose = ({ send, value }) => window.sagline.send(send, value);
 
-  // Pressed and released on the same choice: a list that is written anew in between gives no click.
+  // Press and release on the same choice: a list that is replaced in between gives no click event.
   let pressed;
   document.addEventListener("pointerdown", (event) => {
     pressed = event.button === 0 ? choiceAt(event.target) : undefined;
@@ -17,7 +17,7 @@
     pressed = undefined;
   });
   document.addEventListener("click", (event) => {
-    const choice = event.detail === 0 && choiceAt(event.target); // by the keyboard: no pointer was there
+    const choice = event.detail === 0 && choiceAt(event.target); // by the keyboard, without a pointer
     if (choice) choose(choice);
   });
 })();

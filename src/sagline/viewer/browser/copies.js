@@ -1,18 +1,18 @@
-// What is copied: shown in a dialog, and put onto the clipboard where the browser lets us; else the text is selected.
+// Copies are shown in a dialog and written to the clipboard if the browser allows it; else the text is selected.
 (() => {
   const HEADS = { code: "Python code of this state", link: "Link to this state" };
 
   const copy = async (dialog) => {
     const area = dialog.querySelector("textarea");
-    const told = dialog.querySelector("[role=status]");
+    const status = dialog.querySelector("[role=status]");
     area.focus();
     area.select();
     try {
       await navigator.clipboard.writeText(area.value);
-      told.textContent = "Copied to the clipboard.";
+      status.textContent = "Copied to the clipboard.";
     } catch {
-      const done = document.execCommand("copy"); // where there is no clipboard: on a page that is not of this machine
-      told.textContent = done ? "Copied to the clipboard." : "The browser refuses: copy the selected text.";
+      const done = document.execCommand("copy"); // pages of other computers have no clipboard interface
+      status.textContent = done ? "Copied to the clipboard." : "The browser refuses: copy the selected text.";
     }
   };
   const make = (body, buttons) => {

@@ -1,4 +1,4 @@
-// Dialogs of ours: sagline.dialog(name, head) is an open one's body; made when it is asked for the first time.
+// Our dialogs: sagline.dialog(name, head, make) opens a dialog, which is made at its first use, and returns it.
 (() => {
   window.sagline.dialog = (name, head, make) => {
     let dialog = document.getElementById(`sagline-${name}`);

@@ -1,11 +1,11 @@
-// The dot in the drawing of the feasible tensions (dot_show.py): by mouse, finger and arrow keys.
+// The dot in the drawing of the feasible tensions (features/tensions.py), moved by mouse, finger and arrow keys.
 (() => {
   const STEP = 0.01; // of the drawing; ten times as far with the shift key
   const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
   const field = () => document.querySelector("svg[data-dot]");
   const handle = () => document.querySelector("svg[data-dot] .handle");
 
-  let waiting; // what is told with the next picture
+  let waiting; // message for the next frame
   const soon = (value) => {
     if (waiting === undefined) requestAnimationFrame(now);
     waiting = value;
@@ -15,8 +15,8 @@
     waiting = undefined;
   };
 
-  // Coordinates of the null space under a pointer. The drawing is written anew as the dot moves: what it was when the
-  // drag began is kept.
+  // Coordinates of the null space under a pointer. The drawing is replaced while the dot moves, so the one at the start
+  // of the drag is kept.
   let drag;
   const coordinates = (event) => {
     const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(drag.inverse);
@@ -32,7 +32,7 @@
       middle: svg.dataset.middle.split(" ").map(Number), inverse: svg.getScreenCTM().inverse(),
     };
     soon({ at: coordinates(event) });
-    event.preventDefault(); // no text is selected
+    event.preventDefault(); // do not select text
     handle()?.focus({ preventScroll: true });
   });
   document.addEventListener("pointermove", (event) => {
@@ -53,10 +53,10 @@
     const before = waiting?.by ?? [0, 0];
     soon({ by: way.map((part, axis) => before[axis] + far * part) });
     event.preventDefault();
-    event.stopImmediatePropagation(); // the camera has arrow keys too
+    event.stopImmediatePropagation(); // the camera also reacts to arrow keys
   }, true);
 
-  // Whoever has the dot keeps it when the drawing is written anew.
+  // The dot keeps the focus when the drawing is replaced.
   let kept = false;
   document.addEventListener("focusin", (event) => {
     kept = Boolean(event.target.closest?.("svg[data-dot] .handle"));

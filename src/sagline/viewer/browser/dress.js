@@ -1,4 +1,4 @@
-// Things of ours that viser's client has not drawn before: sagline.dress(work) works whenever the page has changed.
+// Our changes of the page of viser: sagline.dress(work) calls work whenever the page has changed.
 (() => {
   const works = [];
   let due = false;
@@ -16,14 +16,14 @@
   };
   new MutationObserver(soon).observe(document, { subtree: true, childList: true });
 
-  // Ask the server something that it answers under "topic-told", this page alone.
+  // Send a request that the server answers under "topic-reply", to this page alone.
   let count = 0;
   const page = Math.random().toString(36).slice(2);
   window.sagline.ask = (topic, text, answered) => {
     const name = `${page}-${(count += 1)}`;
     waiting.set(name, answered);
-    if (!heard.has(topic)) {
-      heard.add(topic);
+    if (!handled.has(topic)) {
+      handled.add(topic);
       window.sagline.on(`${topic}-reply`, ({ to, ...answer }) => {
         waiting.get(to)?.(answer);
         waiting.delete(to);
@@ -31,6 +31,6 @@
     }
     window.sagline.send(topic, [name, text]);
   };
-  const waiting = new Map(); // who wants to know, by the names of the questions
-  const heard = new Set(); // topics
+  const waiting = new Map(); // handlers of the answers, by the names of the requests
+  const handled = new Set(); // topics with a handler
 })();

@@ -1,7 +1,7 @@
-// A film that is made here (film.py): what is seen of it meanwhile, and a way out.
+// Recording of a film (features/export.py): its progress, and a button to cancel it.
 (() => {
   const { sagline } = window;
-  let film; // the one that is being made
+  let film; // the film that is being recorded
   let clock; // of the next picture
 
   const panel = (about) => {
@@ -50,7 +50,7 @@
     mine.panel.say("Recording: keep this page visible. Other users do not see it.");
     const maker = sagline.filming(about);
     sagline.keep(async (blob) => {
-      if (!clock) return; // it was to try things out
+      if (!clock) return; // a picture before the film
       try {
         mine.maker = await maker;
         await mine.maker.add({ blob, clock });

@@ -1,15 +1,15 @@
-// The hand on the scene: a click on it, and what is pulled with Ctrl (or Cmd) held (hand.py).
+// Clicks on the scene (features/cut.py), and drags of the platform with Ctrl or Cmd (features/push.py).
 (() => {
-  const SLIP = 4; // px: a click does not move farther
+  const SLIP = 4; // px: largest motion of a click
   const scene = (event) => event.target instanceof HTMLCanvasElement;
   const place = ({ clientX, clientY }, canvas) => {
     const box = canvas.getBoundingClientRect();
     return [(clientX - box.left) / box.width, (clientY - box.top) / box.height];
   };
-  const say = (phase, at, keep) => window.sagline.send("pull", { phase, at, keep });
+  const report = (phase, at, keep) => window.sagline.send("pull", { phase, at, keep });
 
-  let pull; // what is pulled: pointer, canvas, where it is
-  let press; // what may become a click
+  let pull; // drag with Ctrl: pointer, canvas, position
+  let press; // start of a possible click
   let drawn = 0;
 
   const swallow = (event) => {
@@ -20,7 +20,7 @@
     if (!pull) return;
     cancelAnimationFrame(drawn);
     drawn = 0;
-    say(phase, pull.at, keep);
+    report(phase, pull.at, keep);
     pull = undefined;
   };
 
@@ -31,10 +31,10 @@
       if (event.button !== 0 || !scene(event)) return;
       const canvas = event.target;
       if (event.ctrlKey || event.metaKey) {
-        swallow(event); // neither gizmo nor camera takes it
+        swallow(event); // not for gizmo and camera
         end("cancel", false);
         pull = { pointer: event.pointerId, canvas, at: place(event, canvas) };
-        say("start", pull.at, false);
+        report("start", pull.at, false);
       } else if (event.isPrimary) {
         press = { x: event.clientX, y: event.clientY };
       }
@@ -49,7 +49,7 @@
       pull.at = place(event, pull.canvas);
       drawn ||= requestAnimationFrame(() => {
         drawn = 0;
-        if (pull) say("move", pull.at, false);
+        if (pull) report("move", pull.at, false);
       });
     },
     true,

@@ -1,4 +1,4 @@
-// Keys: those that move the platform while the scene has the focus, "?" for a list of all, and who may listen to which.
+// Keys: they move the platform while the scene has the focus; "?" opens a list of all keys.
 (() => {
   const WAYS = {
     ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowUp: [1, 1], ArrowDown: [1, -1], PageUp: [2, 1], PageDown: [2, -1],
@@ -33,7 +33,7 @@
     steps = [0, 0, 0, 0, 0, 0];
   };
   const move = ([axis, sign], turn) => {
-    steps[turn ? [3, 5, 4][axis] : axis] += sign; // sideways keys turn about z, upright ones about x
+    steps[turn ? [3, 5, 4][axis] : axis] += sign; // horizontal keys turn about z, vertical ones about x
     if (!due) requestAnimationFrame(send);
     due = true;
     window.sagline.keyed();
@@ -66,10 +66,10 @@
       }
       body.append(table);
     });
-  // What other parts of the page listen to: the list tells of it.
+  // Add keys of other parts of the page to the list.
   window.sagline.key = (keys, words) => list.splice(-1, 0, [keys, words]);
 
-  // Registered before viser's client, whose camera listens on the document too.
+  // Registered before viser's client, whose camera also listens on the document.
   document.addEventListener("keydown", (event) => {
     if (event.target.matches?.("canvas[data-engine]") && onScene(event)) {
       event.preventDefault();
@@ -78,14 +78,14 @@
       event.preventDefault();
       help();
     } else if (TURNS_CAMERA.has(event.key) && event.target.closest?.("[role], button, summary, dialog")) {
-      event.stopImmediatePropagation(); // a slider or a tab has the key for itself
+      event.stopImmediatePropagation(); // the key is for a slider or a tab
     }
   });
   document.addEventListener("click", ({ target }) => {
     if (target.closest?.("[data-keys]")) help();
   });
-  window.sagline.on("scene", (told) => {
-    scene = told;
+  window.sagline.on("scene", (description) => {
+    scene = description;
   });
   window.sagline.on("nudge-reply", (refused) => {
     if (refused) window.sagline.say(refused);
@@ -94,11 +94,11 @@
     const canvas = document.querySelector("canvas[data-engine]");
     if (!canvas) return;
     if (!document.getElementById("sagline-scene-help")) {
-      const told = document.createElement("div");
-      told.id = "sagline-scene-help";
-      told.className = "sagline-unseen";
-      told.textContent = HELP;
-      document.body.append(told);
+      const help = document.createElement("div");
+      help.id = "sagline-scene-help";
+      help.className = "sagline-unseen";
+      help.textContent = HELP;
+      document.body.append(help);
     }
     const attributes = { tabindex: "0", role: "application", "aria-label": scene.what || "Robot",
       "aria-roledescription": "robot", "aria-describedby": "sagline-scene-now sagline-scene-help" };

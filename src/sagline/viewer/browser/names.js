@@ -1,4 +1,4 @@
-// Names, roles and keys for what viser's client leaves without: from the labels beside, from icons, from the figures.
+// Names, roles and keys for elements of viser that have none, from adjacent labels, icons and figures.
 (() => {
   const ICONS = {
     adjustments: "Settings of the page",
@@ -28,7 +28,7 @@
       const several = AXES[row.querySelectorAll(".mantine-NumberInput-input").length] ?? [];
       for (const [i, field] of unnamed.entries()) {
         set(field, "aria-label", several[i] ? `${label.textContent}, ${several[i]}` : label.textContent);
-        field.sagline = true; // ours: it follows its label
+        field.sagline = true; // a name of ours, which follows the label
       }
     }
     for (const field of document.querySelectorAll(FIELDS)) {
@@ -45,7 +45,7 @@
       button.sagline = true;
     }
   };
-  // What is clicked, made a button that is reached and pressed by keys.
+  // Make an element that reacts to clicks a button for the keyboard.
   const press = (element, expanded) => {
     set(element, "role", "button");
     set(element, "tabindex", "0");
@@ -67,13 +67,13 @@
     }
     for (const toggle of document.querySelectorAll('[role="button"]:not([tabindex]):not(button)')) press(toggle);
   };
-  // The tree of the scene, in the settings of the page: its icons are pressed by themselves.
+  // The tree of the scene, in the settings of the page: each icon is a button.
   const tree = () => {
     for (const row of document.querySelectorAll("[data-scene-node]")) {
       const name = row.dataset.sceneNode || "the scene";
       for (const svg of row.querySelectorAll("svg")) {
         const caret = svg.matches(".tabler-icon-caret-right, .tabler-icon-caret-down");
-        if (caret && svg.parentElement.style.opacity < 0.5) continue; // there is nothing below
+        if (caret && svg.parentElement.style.opacity < 0.5) continue; // a node without children
         if (!caret && svg.style.cursor !== "pointer") continue;
         const what = caret ? "Parts of" : svg.matches(".tabler-icon-pencil") ? "Edit" : "Show or hide";
         press(svg, caret ? svg.matches(".tabler-icon-caret-down") : undefined);
@@ -85,16 +85,16 @@
   const pictures = () => {
     for (const svg of document.querySelectorAll("svg:not([aria-hidden]):not([role])")) {
       if (svg.closest(".sagline")) set(svg, "role", "img");
-      else set(svg, "aria-hidden", "true"); // an icon beside its word
+      else set(svg, "aria-hidden", "true"); // an icon with a label
     }
     for (const svg of document.querySelectorAll(".sagline svg[role=img]:not([aria-label])")) {
       set(svg, "aria-label", svg.querySelector("title, text")?.textContent || "figure");
     }
     for (const canvas of document.querySelectorAll('canvas[style*="pointer-events: none"]')) {
-      set(canvas, "aria-hidden", "true"); // what is drawn over the scene while a rectangle is chosen
+      set(canvas, "aria-hidden", "true"); // overlay of the scene during a selection of a rectangle
     }
   };
-  // What is folded to no height is still laid out, and would be reached by keys.
+  // Folded content has zero height, but could still be reached by keys.
   const folded = () => {
     for (const box of document.querySelectorAll('[style*="grid-template-rows"]')) {
       const hidden = /grid-template-rows:\s*0fr/.test(box.getAttribute("style"));

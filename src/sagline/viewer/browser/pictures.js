@@ -1,10 +1,10 @@
-// Pictures that the server has this page take stay here: it hears a single pixel in place of each.
-// A picture for paper (still.py) is saved at once, with its dots an inch.
+// Pictures that the server requests stay on this page; the server receives a single pixel instead.
+// A picture for print (offscreen.py) is saved at once, with its dots per inch.
 (() => {
   const PIXEL =
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==";
   const pixel = () => Uint8Array.from(atob(PIXEL), (character) => character.charCodeAt(0));
-  let keeper; // given each picture, a blob; says when it is done with it
+  let keeper; // function of each picture, a blob; its promise ends when the picture is processed
 
   window.Worker = class extends window.Worker {
     postMessage(data, ...rest) {
@@ -13,20 +13,20 @@
       else super.postMessage(data, ...rest);
     }
     async keep(data) {
-      await keeper(new Blob([data.message.payload])); // the next one is asked for when this one has been dealt with
+      await keeper(new Blob([data.message.payload])); // the next picture is requested after this one is processed
       super.postMessage({ ...data, message: { ...data.message, payload: pixel() } });
     }
   };
-  // Have someone keep the pictures that are taken, or nobody.
-  window.sagline.keep = (anyone) => {
-    keeper = anyone;
+  // Set the function that keeps the pictures, or none.
+  window.sagline.keep = (handler) => {
+    keeper = handler;
   };
   window.sagline.save = (blob, name) => {
     const link = document.createElement("a");
     link.href = URL.createObjectURL(blob);
     link.download = name;
     link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 60_000); // a browser may ask where to, first
+    setTimeout(() => URL.revokeObjectURL(link.href), 60_000); // a browser may first ask for the folder
   };
 
   const crc = (bytes) => {
@@ -37,7 +37,7 @@
     }
     return ~sum >>> 0;
   };
-  // A PNG that says how large it is on paper: a chunk pHYs, dots a meter, behind its head.
+  // PNG with its size on paper: a chunk pHYs, dots per meter, after its header.
   const sized = async (png, dots) => {
     const chunk = new DataView(new ArrayBuffer(21));
     const each = Math.round(dots / 0.0254);

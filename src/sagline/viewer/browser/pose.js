@@ -1,4 +1,4 @@
-// The field of the pose: shows where the platform is, unless somebody types in it.
+// Field of the pose: it shows the pose of the platform, unless the user is typing in it.
 (() => {
   const ID = "sagline-pose";
   let present = "";
@@ -9,11 +9,11 @@
   let refusal = "";
   const show = () => {
     const input = field();
-    const told = document.getElementById("sagline-pose-reply");
-    if (told && told.textContent !== refusal) told.textContent = refusal;
+    const reply = document.getElementById("sagline-pose-reply");
+    if (reply && reply.textContent !== refusal) reply.textContent = refusal;
     if (input && !typing && input.value !== present) input.value = present;
   };
-  const say = (refused) => {
+  const showRefusal = (refused) => {
     refusal = refused;
     field()?.setAttribute("aria-invalid", String(Boolean(refused)));
     show();
@@ -21,18 +21,18 @@
   const go = (input) => {
     touched = false;
     window.sagline.ask("pose", input.value, ({ refused }) => {
-      say(refused ?? "");
-      if (!refused && !touched) typing = false; // what has been typed since then stays
+      showRefusal(refused ?? "");
+      if (!refused && !touched) typing = false; // keep text that was typed since then
       show();
     });
   };
   const stop = () => {
     typing = touched = false;
-    say("");
+    showRefusal("");
     show();
   };
 
-  window.sagline.refuse = say; // what else of the state cannot be had
+  window.sagline.refuse = showRefusal; // also for links and copies
   window.sagline.on("pose", (text) => {
     present = text;
     show();

@@ -1,13 +1,13 @@
-// How pictures become a film: each is encoded as it comes where the browser's encoder may be had, which is on a page of
-// this machine or over HTTPS; else all are kept, and shown to its recorder at their pace at the end.
+// Films from pictures. On pages of this computer or over HTTPS the browser has an encoder, which encodes each picture
+// as it arrives; else all pictures are kept and played to its recorder at the end.
 (() => {
   const { sagline } = window;
-  const BITS = 12e6; // a second: cables are thin
-  const AVC = "avc1.42E028"; // H.264 without pictures that depend on later ones, level 4: 1080p at 30 a second
-  const KEY = 30; // pictures between two that stand alone
+  const BITS = 12e6; // bits per second: cables are thin
+  const AVC = "avc1.42E028"; // H.264 without B-frames, level 4: 1080p at 30 pictures per second
+  const KEY = 30; // pictures between two key frames
   const KINDS = ["video/mp4;codecs=avc1.640028", "video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm", "video/mp4"];
-  const SLICE = 200; // ms of film that the recorder hands over at once
-  const REST = 500; // ms that the last picture stays, drawn again and again: a slow recorder leaves some out
+  const SLICE = 200; // ms of film in each part from the recorder
+  const REST = 500; // ms of repeated drawing of the last picture: a slow recorder skips some
 
   const painter = (about) => {
     const canvas = Object.assign(document.createElement("canvas"), { width: about.width, height: about.height });
@@ -62,11 +62,11 @@
     let stopped = false;
     const { canvas, paint } = painter(about);
 
-    // Show the pictures, each when its time has come; where the machine is too slow for all, some are left out.
+    // Show each picture at its time; a slow computer skips some.
     const show = async (recorder, at) => {
       let time = 0, last = performance.now(), before = -1;
       const pause = () => {
-        if (document.hidden) recorder.pause(); // nothing is drawn on a page that is not seen
+        if (document.hidden) recorder.pause(); // hidden pages draw nothing
         else recorder.resume();
         last = performance.now();
       };
@@ -85,7 +85,7 @@
       document.removeEventListener("visibilitychange", pause);
       for (const end = performance.now() + REST; performance.now() < end; await nextFrame()) await paint(pictures.at(-1));
     };
-    const heard = (recorder, event) =>
+    const fired = (recorder, event) =>
       new Promise((resolve, reject) => {
         recorder.addEventListener(event, resolve, { once: true });
         recorder.addEventListener("error", ({ error }) => reject(error), { once: true });
@@ -96,14 +96,14 @@
         pictures.push(picture);
       },
       async finish(at) {
-        await paint(pictures[0]); // else it begins black
+        await paint(pictures[0]); // else the film begins black
         const recorder = new MediaRecorder(canvas.captureStream(), { mimeType: kind, videoBitsPerSecond: BITS });
         const parts = [];
-        const first = heard(recorder, "dataavailable"), ended = heard(recorder, "stop");
+        const first = fired(recorder, "dataavailable"), ended = fired(recorder, "stop");
         recorder.addEventListener("dataavailable", ({ data }) => parts.push(data));
         recorder.start(SLICE);
-        await paint(pictures[0]); // what is drawn before it may not have seen
-        await first; // until it is awake, the film stands at its first picture
+        await paint(pictures[0]); // it may have missed the picture before
+        await first; // the film stays at its first picture until the recorder runs
         await show(recorder, at);
         recorder.stop();
         await ended;
@@ -115,7 +115,7 @@
     };
   };
 
-  // What makes a film of pictures { blob, clock } that are added: the better of two ways that this browser has.
+  // Recorder of a film of pictures { blob, clock }: the better of two that this browser has.
   sagline.filming = async (about) => {
     const { width, height, rate } = about;
     const config = { codec: AVC, width, height, bitrate: BITS, framerate: rate, avc: { format: "avc" } };

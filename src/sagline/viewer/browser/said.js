@@ -1,10 +1,10 @@
-// The verdict for who does not see it: said when it changes or rests, not as often as it is drawn.
+// Spoken verdict for screen readers: when it changes or has settled, not at every update.
 (() => {
   const SOON = 400; // ms after a change of the verdict itself
-  const RESTED = 1200; // ms that the numbers have to stay as they are
+  const RESTED = 1200; // ms without a change of the numbers
   const APART = 2500; // ms between two sentences
   let present, said, saidAt = 0, timer, urgent = false;
-  let keyed = false; // moved by a key: where to is said too
+  let keyed = false; // moved by a key: the position is spoken too
 
   const hidden = (id, role) => {
     let element = document.getElementById(id);

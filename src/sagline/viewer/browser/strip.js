@@ -1,4 +1,4 @@
-// What stands beneath a picture or a film (strip.py): title, remark, the colors of tensions, and a film's clock.
+// Strip below a picture or a film (offscreen.py): title, remark, colors of tensions, and the clock of a film.
 (() => {
   const INK = "#1f2328", QUIET = "#57606a", LINE = "#d0d5db", BAD = "#b42323";
   const FONT = "system-ui, sans-serif";
@@ -22,9 +22,9 @@
       const at = left + share * width;
       context.fillStyle = INK;
       context.fillRect(at - 0.04 * em, top + 2.05 * em, 0.08 * em, 0.25 * em);
-      const inside = measured(context, number, 0.8 * em); // the ends stay above their bar
+      const inside = measured(context, number, 0.8 * em); // numbers at the ends stay above the bar
       const middle = Math.min(Math.max(at, left + 0.5 * inside), left + width - 0.5 * inside);
-      if (middle - 0.5 * inside < taken) continue; // no room for its number
+      if (middle - 0.5 * inside < taken) continue; // no space for this number
       taken = middle + 0.5 * inside + 0.4 * em;
       write(context, number, middle, top + 3.15 * em, { size: 0.8 * em, align: "center" });
     }
@@ -34,7 +34,7 @@
     return context.measureText(text).width;
   };
 
-  // Draw a picture with its strip onto a canvas of the size asked for.
+  // Draw a picture with its strip onto a canvas of the requested size.
   window.sagline.compose = (context, about, picture, clock) => {
     const { width, height, strip, text: em, title, remark } = about;
     const room = height - strip, top = room;
@@ -42,7 +42,7 @@
     context.fillRect(0, 0, width, height);
     context.drawImage(picture, Math.round(0.5 * (width - picture.width)), Math.round(0.5 * (room - picture.height)));
     if (!strip) return;
-    context.fillStyle = "#ffffff"; // a picture larger than its room goes on beneath
+    context.fillStyle = "#ffffff"; // a larger picture would extend below
     context.fillRect(0, top, width, strip);
     context.fillStyle = LINE;
     context.fillRect(0, top, width, Math.max(1, Math.round(0.05 * em)));

@@ -1,7 +1,7 @@
-// The timeline across the bottom of the page (timeline_show.py): tracks with one clock, pointed at and scrubbed here.
+// The timeline at the bottom of the page (features/timeline.py): tracks with one clock, pointing and scrubbing.
 (() => {
   const { element, fixed, ticksOf, plotOf, send, on } = window.sagline;
-  const SETTLED = 1000; // ms: so long the page's own time holds until the server has it too
+  const SETTLED = 1000; // ms: the page's own time is kept until the server confirms it
   const ON_MARK = 8; // px
 
   let data; // what is played; undefined for nothing
@@ -9,8 +9,8 @@
   let plots = [];
   let strip, parts; // of the page
   let dragging = false;
-  let asked; // the time that the server was asked for last, until it is there
-  let spoken = 0; // when a reader of the screen heard of the time last
+  let requested; // last requested time, until the server confirms it
+  let spoken = 0; // last update of the text for screen readers [ms]
 
   const button = (name, attributes, act) => {
     const made = element("button", { type: "button", "aria-label": name, title: name, ...attributes });
@@ -69,9 +69,9 @@
     element("span", { class: "stroke", style: `border-color:${color};border-top-style:${dashed ? "dashed" : "solid"}` });
   const key = (name, color, dashed) => element("span", { class: "key" }, stroke(color, dashed), ` ${name}`);
 
-  const showTracks = (told) => {
+  const showTracks = (message) => {
     if (!strip) build();
-    data = told ?? undefined;
+    data = message ?? undefined;
     strip.hidden = !data;
     if (!data) return;
     plots = data.tracks.map((track) => plotOf(track, data.window, data.range, data.tracks.length > 1));
@@ -87,7 +87,7 @@
       ...groups.flatMap(([what, lines]) => [element("span", { class: "quiet", text: `${what} ` }), ...lines.map((line) => key(...line))]),
     );
     parts.whole.hidden = isWhole();
-    wanted = undefined;
+    nextWindow = undefined;
     label();
     showClock();
   };
@@ -132,19 +132,19 @@
   const inWords = (time) => {
     const lines = plots.map((plot) => {
       const { name, title, unit } = plot.track;
-      const values = plot.told(time).map((line) => `${line.name}: ${line.text}`);
+      const values = plot.valuesAt(time).map((line) => `${line.name}: ${line.text}`);
       return [`${name}, ${title} [${unit}] ${values.join(", ")}`, ...plot.why(time)].join("; ");
     });
     return [`${fixed(time, decimals())} s`, ...lines, ...happened(time).map(([, text]) => text)].join("; ");
   };
   const happened = (time) => plots.flatMap((plot) => plot.marksAt(time, (width() * ON_MARK) / (parts.slider.clientWidth || 1)));
 
-  // Another time, at once here and soon there: at most one message a picture.
+  // Move to another time: at once here, and on the server with at most one message per frame.
   let soon = 0;
   const scrub = (time) => {
-    const round = Number(time.toFixed(Math.min(Math.max(6 - Math.floor(Math.log10(data.duration || 1)), 0), 20))); // 1.2 s and not a bit less
+    const round = Number(time.toFixed(Math.min(Math.max(6 - Math.floor(Math.log10(data.duration || 1)), 0), 20))); // exactly 1.2 s
     const there = Math.min(Math.max(round, 0), data.duration);
-    asked = { time: there, when: performance.now() };
+    requested = { time: there, when: performance.now() };
     clock = { ...clock, time: there, playing: false, following: true };
     showClock();
     soon ||= requestAnimationFrame(() => {
@@ -153,28 +153,28 @@
     });
   };
 
-  // Another part of the time: the server finds finer columns for it.
-  let wanted; // window that it was asked for
+  // Show another part of the time, for which the server sends finer columns.
+  let nextWindow; // requested window
   let looking = 0;
   const look = (start, end) => {
     const wide = Math.min(Math.max(end - start, 2e-6 * data.duration), data.duration);
     const first = Math.min(Math.max(start, 0), data.duration - wide);
-    wanted = wide >= data.duration ? [0, data.duration] : [first, first + wide];
+    nextWindow = wide >= data.duration ? [0, data.duration] : [first, first + wide];
     looking ||= requestAnimationFrame(() => {
       looking = 0;
-      if (wanted) send("window", wanted);
+      if (nextWindow) send("window", nextWindow);
     });
   };
   const zoom = (times, about) => {
-    const [start, end] = wanted ?? data.window;
+    const [start, end] = nextWindow ?? data.window;
     look(about - (about - start) * times, about + (end - about) * times);
   };
   const pan = (by) => {
-    const [start, end] = wanted ?? data.window;
+    const [start, end] = nextWindow ?? data.window;
     look(start + by * (end - start), end + by * (end - start));
   };
 
-  // What is pointed at.
+  // Pointing.
   let pointed = null; // cable
   const timeAt = (event) => {
     const box = parts.slider.getBoundingClientRect();
@@ -203,7 +203,7 @@
   };
   const tell = (time, event, line) => {
     const rows = plots.map((plot) => {
-      const values = plot.told(time).map((each, k) =>
+      const values = plot.valuesAt(time).map((each, k) =>
         element("span", { class: k === line ? "value near" : "value" }, stroke(each.color, each.dashed), ` ${each.name}: `, element("b", { text: each.text })),
       );
       const why = plot.why(time).map((text) => element("div", { class: "bad", text }));
@@ -246,7 +246,7 @@
       dragging = true;
       const top = plotAt(event).root.getBoundingClientRect().top;
       const marks = event.clientY - top < 14 ? happened(timeAt(event)) : [];
-      scrub(marks.length ? marks[0][0] : timeAt(event)); // a mark is hit as it is, not about where it is
+      scrub(marks.length ? marks[0][0] : timeAt(event)); // the exact time of a mark
       point(event);
     });
     slider.addEventListener("pointermove", (event) => {
@@ -271,7 +271,7 @@
       const act = event.altKey || event.metaKey ? undefined : KEYS[event.key];
       if (!act) return;
       event.preventDefault();
-      event.stopPropagation(); // the camera listens too
+      event.stopPropagation(); // the camera also listens
       act(event);
     });
   };
@@ -285,11 +285,11 @@
   ]) window.sagline.key(keys, words);
 
   on("timeline", showTracks);
-  on("clock", (told) => {
-    const late = asked && told.time !== asked.time && performance.now() - asked.when < SETTLED;
+  on("clock", (state) => {
+    const late = requested && state.time !== requested.time && performance.now() - requested.when < SETTLED;
     if (dragging || late) return;
-    asked = undefined;
-    clock = told;
+    requested = undefined;
+    clock = state;
     showClock();
   });
 })();

@@ -1,13 +1,13 @@
-// window.sagline.plotOf: one track of the timeline as a drawing, and what it shows at a time.
+// window.sagline.plotOf: drawing of one track of the timeline, and its values at a time.
 (() => {
-  const WIDE = 1000; // of the drawing, whatever the screen makes of it
+  const WIDE = 1000; // of the drawing, in its own units
   const HIGH = 100;
-  const NEAR = 12; // px: a line nearer to the pointer than that is meant
+  const NEAR = 12; // px: largest distance of the pointer from a selected line
 
   const element = (tag, { text, ...attributes } = {}, ...children) => {
     const made = document.createElement(tag);
     for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
-    if (text !== undefined) made.textContent = text; // never HTML: a log says what it likes
+    if (text !== undefined) made.textContent = text; // never HTML: texts of a log are not checked
     made.append(...children);
     return made;
   };
@@ -85,7 +85,7 @@
       root,
       track,
       // What each line is at a time, in words; a column of many samples says from where to where.
-      told(time) {
+      valuesAt(time) {
         return valuesAt(time).map(([least, most], k) => {
           const [from, to] = [least, most].map((value) => (value === null ? "–" : fixed(value, track.decimals)));
           const [name, color, dashed] = track.lines[k];

@@ -110,7 +110,7 @@ def _swing_text(vibration: Vibration, swing: Swing | None, chosen: str) -> str:
 
 
 def _list_text(vibration: Vibration, modes: list[ListedMode], chosen: str) -> str:
-    head = "<tr><th>mode</th><th>Hz</th><th></th><th>platform</th><th>largest in</th><th>damping</th></tr>"
+    head = "<tr><th>mode</th><th>Hz</th><th></th><th>platform</th><th>location</th><th>damping</th></tr>"
     rows = "".join(_row(mode, chosen) for mode in sorted(modes, key=lambda mode: mode.frequency))
     table = block(f'<div class="modes"><table>{head}{rows}</table></div>')
     if vibration.status is not VibrationStatus.SOLVED:
