@@ -40,7 +40,7 @@ def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
         await_that(page, lambda: field.input_value().startswith(f"{wanted[0]:.4f}".rstrip("0")))
 
         page.get_by_role("button", name="Copy as code").press("Enter")
-        page.get_by_role("dialog", name="What is shown, in Python").wait_for()
+        page.get_by_role("dialog", name="Python code of this state").wait_for()
         names = executed(page.locator("dialog textarea").input_value())
         assert viewer.view is not None
         np.testing.assert_array_equal(names["tension"], viewer.view.snapshot.tension)
@@ -51,7 +51,7 @@ def test_a_pose_is_typed_and_taken_elsewhere(browser: Browser) -> None:
 
         page.get_by_role("tab", name="Modes").press("Enter")
         page.get_by_role("button", name="Copy link").press("Enter")
-        page.get_by_role("dialog", name="A link to what is shown").wait_for()
+        page.get_by_role("dialog", name="Link to this state").wait_for()
         link = page.locator("dialog textarea").input_value()
         assert "&tab=Modes" in link
         page.get_by_role("dialog").get_by_role("button", name="Close").press("Enter")
