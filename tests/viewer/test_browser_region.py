@@ -29,7 +29,7 @@ def browser() -> Iterator[Browser]:
 
 def in_full(show: RegionFeature) -> bool:
     """Whether the region that is drawn is that of what is shown, and not a rough one."""
-    return show._result is not None and not show._result.rough and show._result.key == show._key
+    return show._result is not None and not show._result[1] and show._result[0] == show._key
 
 
 def slide(page: Page, label: str, way: float) -> None:

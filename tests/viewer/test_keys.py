@@ -109,14 +109,14 @@ def test_the_verdict_is_a_sentence() -> None:
     pose = sl.Pose.from_euler([0.1, -0.0, 2.6], np.radians(10.0), 0.0, 0.0)
     tension = sl.inverse(ROBOT, pose, tension=sl.MinimumNorm()).chord_tension
     found = said(pose)
-    assert found.head == "Feasible"
-    assert found.text.startswith(found.head)
-    assert re.findall(r"[\d.]+|N$", found.text) == [f"{tension.min():.0f}", f"{tension.max():.0f}", "N"]
-    place, _, turn = found.place.partition(" m, ")
+    assert found["head"] == "Feasible"
+    assert found["text"].startswith(found["head"])
+    assert re.findall(r"[\d.]+|N$", found["text"]) == [f"{tension.min():.0f}", f"{tension.max():.0f}", "N"]
+    place, _, turn = found["place"].partition(" m, ")
     assert place == "x 0.10, y 0.00, z 2.60"
     assert re.findall(r"\d+|\b[xyz]\b", turn) == ["10", "0", "0", "z", "y", "x"]
     beyond = said(sl.Pose([7.4, 5.0, 2.6], np.eye(3)))
-    assert beyond.head == "Not feasible"
-    assert beyond.text.startswith(beyond.head)
-    assert "cables 0, " in beyond.text
+    assert beyond["head"] == "Not feasible"
+    assert beyond["text"].startswith(beyond["head"])
+    assert "cables 0, " in beyond["text"]
     assert place_of(sl.Pose([-0.001, 0.0, 1.0], np.eye(3))) == "x 0.00, y 0.00, z 1.00 m"

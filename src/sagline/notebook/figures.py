@@ -183,7 +183,7 @@ def _inline(figure: Figure, description: str) -> str:
     if sum(len(line.get_xdata()) for line in lines if line.get_marker() not in ("None", None)) > MOST_MARKS:
         for line in lines:
             line.set_rasterized(True)
-    drawing = themed(svg_text(figure, DOTS), description)
+    drawing = _themed(svg_text(figure, DOTS), description)
     if len(drawing.encode()) <= LARGEST:
         return drawing
     written = BytesIO()
@@ -198,7 +198,7 @@ def _ink(gray: re.Match[str]) -> str:
     return f"{gray[1]}: currentColor; {gray[1]}-opacity: {1.0 - int(gray[2], 16) / 255.0:.2f}"
 
 
-def themed(svg: str, description: str) -> str:
+def _themed(svg: str, description: str) -> str:
     """A drawing in the colors of the page: what is black has the color of its text, what is gray has less of it.
 
     Names inside are made its own, so that many drawings stand on one page.

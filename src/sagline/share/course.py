@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 MOST_RATE: Final = 100.0  # samples a second; of twice as many and more a page keeps some: screens show 60
 
 
-class SampleVerdict(NamedTuple):
+class _SampleVerdict(NamedTuple):
     """Verdict on a sample."""
 
     good: bool | None  # whether all is well; None where there is nothing to judge
@@ -48,7 +48,7 @@ class SharedMotion:
     chord_tension: Array  # with which cables are drawn [N], shape (N, m); NaN draws a straight line
     length: Array  # unstrained, off the drum [m], shape (N, m)
     verdict: NDArray[np.intp]  # which of the verdicts, shape (N,)
-    verdicts: tuple[SampleVerdict, ...]  # all that are said
+    verdicts: tuple[_SampleVerdict, ...]  # all that are said
     notes: tuple[str, ...] = ()  # what is to be known of the page
 
     def pose_at(self, index: int) -> Pose | None:
@@ -76,11 +76,11 @@ def of_plan(plan: Plan) -> SharedMotion:
     """A plan of N poses in a row, one second each where they have no times."""
     count = len(plan.state.pose)
     time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
-    verdicts = [SampleVerdict(True, "Feasible")]
+    verdicts = [_SampleVerdict(True, "Feasible")]
     which = np.zeros(count, dtype=np.intp)
     for gap in plan.gaps:
         which[gap.first : gap.last + 1] = len(verdicts)
-        verdicts.append(SampleVerdict(False, _why(gap)))
+        verdicts.append(_SampleVerdict(False, _why(gap)))
     notes = ["Poses without times: one a second."] * (plan.path is None)
     if not isinstance(plan.state.cables.model, Catenary):
         name = type(plan.state.cables.model).__name__.lower()
@@ -108,12 +108,12 @@ def of_simulation(simulation: Simulation) -> SharedMotion:
     """A simulation; cables with mass are drawn as massless ones of their lengths hang."""
     robot, time = simulation.robot, simulation.time
     broken = np.zeros_like(simulation.tensions, dtype=bool)
-    said = [SampleVerdict(None, "Simulated")]
+    said = [_SampleVerdict(None, "Simulated")]
     which = np.zeros(len(time), dtype=np.intp)
     for event in simulation.events:
         of = "" if event.cable is None else f" of cable {event.cable}"
         which[time >= event.time] = len(said)
-        said.append(SampleVerdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
+        said.append(_SampleVerdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
         if event.kind == "break" and event.cable is not None:
             broken[time >= event.time, event.cable] = True
     tension = np.where(broken, np.nan, simulation.tensions)
@@ -151,7 +151,7 @@ def of_session(session: PlayedLog) -> SharedMotion:
     quaternion = np.where(wanted, session.planned_quaternion, session.quaternion[row])
     codes, which = np.unique(session.state, return_inverse=True)
     states = [State(int(code)) for code in codes]
-    verdicts = tuple(SampleVerdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
+    verdicts = tuple(_SampleVerdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
     unknown = ~np.isfinite(position).all(axis=1)
     if unknown.any():  # nothing was known before, or ever
         somewhere = session.pose_at(int(np.argmax(unknown)))

@@ -28,7 +28,7 @@ class BlockServers(ABC):
         try:
             for i, block in enumerate(blocks):
                 self._memory[i][FROM_PLC][:] = block
-                number = check_free(host, port + i if port else 0)
+                number = _check_free(host, port + i if port else 0)
                 self.addresses += (f"{number}:{self._listen(i, number, port + i if port else 0)}",)
         except BaseException:
             self.close()
@@ -66,7 +66,7 @@ class BlockServers(ABC):
         """Exclusive access to a block."""
 
 
-def check_free(host: str, port: int) -> str:
+def _check_free(host: str, port: int) -> str:
     """IPv4 address of a host at which a port is free; python-snap7 shares ports, so two twins would share clients."""
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -13,7 +13,7 @@ from sagline.core.arguments import brief
 from sagline.core.errors import InvalidValueError, nearest
 
 
-class FaultKind(NamedTuple):
+class _FaultKind(NamedTuple):
     """One kind of fault."""
 
     item: str  # kind of part ("cell")
@@ -33,29 +33,29 @@ KINDS: Final = MappingProxyType(
     {
         f"{kind.item} {kind.words}".strip(): kind
         for kind in (
-            FaultKind("cell", "sticks", "repeats its last reading"),
-            FaultKind("cell", "reads #", "reads this value, whatever the tension is", "N"),
-            FaultKind("cell", "saturates", "reads its full scale"),
-            FaultKind("cell", "is wrong by #", "reads this much more", "N"),
-            FaultKind("cable", "breaks", "has neither tension nor weight any more", for_good=True),
-            FaultKind("encoder", "jumps by #", "counts this much more cable than there is", "mm", 1e-3, True),
-            FaultKind("servo", "is limited to #", "gives no more force at the cable", "N", 1.0, True),
-            FaultKind("servo", "trips", "has no power until the operator resets the machine", for_good=True),
-            FaultKind("load", "grows by #", "is added at the center of mass; removed if less than 0", "kg"),
-            FaultKind("emergency stop", "", "is pressed until the operator resets the machine", for_good=True),
-            FaultKind("group", "is silent", "its blocks do not arrive"),
-            FaultKind("group", "repeats", "its last block arrives again and again"),
-            FaultKind("group", "doubles", "each of its blocks arrives twice"),
-            FaultKind("group", "swaps", "of two blocks the later one arrives first"),
-            FaultKind("group", "goes back", "older and older blocks arrive"),
-            FaultKind("group", "is torn", "the counters at the two ends of its blocks differ"),
-            FaultKind("group", "is foreign", "its blocks are of another program"),
-            FaultKind("group", "stops", "its PLC stops: its block stays unchanged, its drives have no power"),
-            FaultKind("group", "is taken", "another controller has its grant"),
-            FaultKind("commands", "stop", "none arrives at any PLC"),
-            FaultKind("commands", "repeat", "the last one arrives again and again"),
-            FaultKind("commands", "are torn", "the counters at the two ends of their blocks differ"),
-            FaultKind("commands", "are foreign", "they come from another owner"),
+            _FaultKind("cell", "sticks", "repeats its last reading"),
+            _FaultKind("cell", "reads #", "reads this value, whatever the tension is", "N"),
+            _FaultKind("cell", "saturates", "reads its full scale"),
+            _FaultKind("cell", "is wrong by #", "reads this much more", "N"),
+            _FaultKind("cable", "breaks", "has neither tension nor weight any more", for_good=True),
+            _FaultKind("encoder", "jumps by #", "counts this much more cable than there is", "mm", 1e-3, True),
+            _FaultKind("servo", "is limited to #", "gives no more force at the cable", "N", 1.0, True),
+            _FaultKind("servo", "trips", "has no power until the operator resets the machine", for_good=True),
+            _FaultKind("load", "grows by #", "is added at the center of mass; removed if less than 0", "kg"),
+            _FaultKind("emergency stop", "", "is pressed until the operator resets the machine", for_good=True),
+            _FaultKind("group", "is silent", "its blocks do not arrive"),
+            _FaultKind("group", "repeats", "its last block arrives again and again"),
+            _FaultKind("group", "doubles", "each of its blocks arrives twice"),
+            _FaultKind("group", "swaps", "of two blocks the later one arrives first"),
+            _FaultKind("group", "goes back", "older and older blocks arrive"),
+            _FaultKind("group", "is torn", "the counters at the two ends of its blocks differ"),
+            _FaultKind("group", "is foreign", "its blocks are of another program"),
+            _FaultKind("group", "stops", "its PLC stops: its block stays unchanged, its drives have no power"),
+            _FaultKind("group", "is taken", "another controller has its grant"),
+            _FaultKind("commands", "stop", "none arrives at any PLC"),
+            _FaultKind("commands", "repeat", "the last one arrives again and again"),
+            _FaultKind("commands", "are torn", "the counters at the two ends of their blocks differ"),
+            _FaultKind("commands", "are foreign", "they come from another owner"),
         )
     }
 )

@@ -141,7 +141,7 @@ class Report(NamedTuple):
 HISTORY: Final = 100  # earlier blocks that the fault "goes back" can send
 
 
-class Driven(Protocol):
+class _Driven(Protocol):
     """Interface of a machine that a link needs."""
 
     @property
@@ -166,7 +166,7 @@ class Driven(Protocol):
 class MachineLink:
     """`Link` to a machine in the same process, without delays and threads of its own."""
 
-    def __init__(self, machine: Driven, network: Network, moves: bool) -> None:
+    def __init__(self, machine: _Driven, network: Network, moves: bool) -> None:
         """Begin without data of any group; use `Machine.link`."""
         self._machine, self._network, self._moves = machine, network, moves
         self._groups = machine.groups

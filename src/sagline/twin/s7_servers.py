@@ -16,7 +16,7 @@ from sagline.plc.s7_link import PDU
 from sagline.twin.block_servers import LOOPBACK, BlockServers
 
 
-class S71200(Server):
+class _S71200(Server):
     """Server that grants no larger PDU than an S7-1200, and can close its connections."""
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class S7Servers(BlockServers):
 
     def __init__(self, blocks: Sequence[bytes], host: str = LOOPBACK, port: int = 0) -> None:
         """Start the servers; arguments of `BlockServers`."""
-        self._servers: list[S71200] = []
+        self._servers: list[_S71200] = []
         super().__init__(blocks, host, port)
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ class S7Servers(BlockServers):
         server.unlock_area(SrvArea.DB, block.number)
 
     def _listen(self, group: int, host: str, port: int) -> int:
-        server = S71200()
+        server = _S71200()
         for kind, content in self._memory[group].items():
             server.register_area(SrvArea.DB, kind.number, content)
         server.start_to(host, port)

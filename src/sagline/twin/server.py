@@ -166,7 +166,7 @@ def _block_servers(blocks: list[bytes], host: str, port: int, modbus: bool) -> B
 SWITCHING_ON: Final = 60.0  # s, at most; kernels may have to be read from the disk
 
 
-class RemoteMachine(NamedTuple):
+class _RemoteMachine(NamedTuple):
     """Machine in another process."""
 
     addresses: tuple[str, ...]  # "host:port" of each group's PLC
@@ -178,7 +178,7 @@ class RemoteMachine(NamedTuple):
 
 
 @contextmanager
-def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[RemoteMachine]:
+def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int = 0) -> Iterator[_RemoteMachine]:
     """Context of a machine in another process, in real time; it is killed at the end."""
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
@@ -187,7 +187,7 @@ def machine_in_process(robot: Robot, nominal: Robot, start: Pose, *, seed: int =
     process.start()
     there.close()
     try:
-        yield RemoteMachine(_receive_addresses(here), place)
+        yield _RemoteMachine(_receive_addresses(here), place)
     finally:
         process.kill()
         process.join()

@@ -25,7 +25,7 @@ from sagline.robot.robot import Robot
 from sagline.twin.plc_program import LEFT, PlcLimits
 
 
-class EncoderScale:
+class _EncoderScale:
     """Conversion between lengths and encoder counts, (m,): by the turns of known drums, else by one radius each.
 
     Attributes:
@@ -82,31 +82,31 @@ class Start(NamedTuple):
     """Machine before it is switched on."""
 
     state: Equilibrium  # of the true robot
-    nominal: EncoderScale  # scale of the encoders in the PLCs
-    true: EncoderScale  # true scale
+    nominal: _EncoderScale  # scale of the encoders in the PLCs
+    true: _EncoderScale  # true scale
 
 
 def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> Start:
     """True equilibrium at the start, and encoder scales there."""
-    pose = start_pose(nominal, start)
+    pose = _start_pose(nominal, start)
     plan = inverse(nominal, pose)
     planned = _feasible_lengths(plan.unstrained_length, nominal, "start")
     counts = np.zeros(nominal.cable_count)
-    scale = EncoderScale(nominal, planned, counts)
+    scale = _EncoderScale(nominal, planned, counts)
     if (winch := nominal.winches) is not None and winch.length_zero is not None:
         stretch = 1.0 + winch.winding_tension / nominal.cables.axial_stiffness
         counts = np.rint(winch.count_zero - scale.counts(winch.length_zero / stretch))
-        scale = EncoderScale(nominal, planned, counts)
+        scale = _EncoderScale(nominal, planned, counts)
     if surveyed:
         state = inverse(true, pose).state
         _feasible_lengths(state.unstrained_length, true, "start")
     else:
         routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # on pulleys and dead cable, not counted
         state = _rest_at(true, planned + routed + _zero_errors(true, nominal), pose)
-    return Start(state, scale, EncoderScale(true, state.unstrained_length, counts))
+    return Start(state, scale, _EncoderScale(true, state.unstrained_length, counts))
 
 
-def start_pose(robot: Robot, start: Any) -> Pose:
+def _start_pose(robot: Robot, start: Any) -> Pose:
     """Pose at which encoders are set; by default the middle of the robot's test_box, without rotation."""
     pose = optional(start, Pose, "start")
     if pose is not None:
@@ -120,7 +120,7 @@ def start_pose(robot: Robot, start: Any) -> Pose:
     return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
 
 
-def limits_of(robot: Robot, scale: EncoderScale) -> PlcLimits:
+def limits_of(robot: Robot, scale: _EncoderScale) -> PlcLimits:
     """Limits of a robot's winches in the PLCs, each one list over all winches."""
     winch, anchors = robot.winches, robot.frame_anchors
     assert winch is not None
@@ -190,5 +190,5 @@ def _routed_length(robot: Robot, pose: Pose) -> Array:
 
 def plc_limits(robot: Robot) -> PlcLimits:
     """Limits of a robot's winches in the PLCs, each one list over all winches."""
-    planned = _feasible_lengths(inverse(robot, start_pose(robot, None)).unstrained_length, robot, "test_box")
-    return limits_of(robot, EncoderScale(robot, planned, np.zeros(robot.cable_count)))
+    planned = _feasible_lengths(inverse(robot, _start_pose(robot, None)).unstrained_length, robot, "test_box")
+    return limits_of(robot, _EncoderScale(robot, planned, np.zeros(robot.cable_count)))

@@ -31,7 +31,7 @@ NEAR: Final = 1e-4  # of a tension: distance to a limit that counts as at the li
 _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
 
-class AtLimit(NamedTuple):
+class _AtLimit(NamedTuple):
     """A cable at a limit."""
 
     cable: int  # its number
@@ -49,7 +49,7 @@ class MissingWrench:
 
     wrench: Array  # about the center of mass, world axes [N, N m], shape (6,)
     state: Equilibrium  # with this wrench, the blocking cables at their limits
-    limits: tuple[AtLimit, ...]  # the cables at limits
+    limits: tuple[_AtLimit, ...]  # the cables at limits
 
     @property
     def force(self) -> Array:
@@ -99,14 +99,14 @@ def _step(plan: Plan) -> Array:
     return rest
 
 
-def _limits(plan: Plan, held: Plan) -> tuple[AtLimit, ...]:
+def _limits(plan: Plan, held: Plan) -> tuple[_AtLimit, ...]:
     """Cables at limits: the blocking ones of the plan where a force suffices, else those with the smallest wrench."""
     robot, tension = plan.state.one_robot, held.state.limited_tension
     to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
     which = plan.blocking
     if not np.isfinite(plan.shortfall):
         which = np.minimum(to_lower, to_upper) <= NEAR * tension
-    return tuple(AtLimit(int(k), bool(to_lower[k] <= to_upper[k])) for k in np.flatnonzero(which))
+    return tuple(_AtLimit(int(k), bool(to_lower[k] <= to_upper[k])) for k in np.flatnonzero(which))
 
 
 NODES: Final = 15  # of the first grid, along each axis

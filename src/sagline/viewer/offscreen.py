@@ -95,7 +95,7 @@ def _turn(camera: viser.CameraHandle) -> Rotation:
     return Rotation.from_quat(np.array(camera.wxyz, dtype=np.float64).reshape(4), scalar_first=True)
 
 
-class OffscreenScene:
+class _OffscreenScene:
     """A scene of one client, for pictures."""
 
     def __init__(
@@ -151,10 +151,10 @@ def offscreen_scene(
     view: View,
     line_width: float,
     played: Played | None = None,
-) -> Iterator[OffscreenScene]:
+) -> Iterator[_OffscreenScene]:
     """Context of an off-screen scene."""
     try:
-        yield OffscreenScene(client, server, shot, view, played, line_width)
+        yield _OffscreenScene(client, server, shot, view, played, line_width)
     finally:
         client.scene.reset()
 
@@ -164,7 +164,7 @@ LINE: Final = 0.3  # pt on paper for a pixel on a screen: about one for a cable
 TOPIC: Final = "picture"
 
 
-class Paper(NamedTuple):
+class _Paper(NamedTuple):
     """A size of print."""
 
     width: float  # [in]
@@ -178,9 +178,9 @@ class Paper(NamedTuple):
 
 # widths of IEEE columns; 600 dots per inch for line drawings
 PAPERS: Final = {
-    "Column, 89 mm at 600 dpi": Paper(3.5, 600),
-    "Page, 182 mm at 300 dpi": Paper(7.16, 300),
-    "Page, 182 mm at 600 dpi": Paper(7.16, 600),
+    "Column, 89 mm at 600 dpi": _Paper(3.5, 600),
+    "Page, 182 mm at 300 dpi": _Paper(7.16, 300),
+    "Page, 182 mm at 600 dpi": _Paper(7.16, 600),
 }
 
 
@@ -189,7 +189,7 @@ def save_picture(
     server: viser.ViserServer,
     messages: Messages,
     view: View,
-    paper: Paper,
+    paper: _Paper,
     name: str,
     extent: tuple[Array, Array],
     *,

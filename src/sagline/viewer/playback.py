@@ -39,7 +39,7 @@ CABLES: Final = {
 NO_CHOICE: Final = "In motion, tensions are not chosen: they follow from the lengths and from the pose."
 
 
-def event_text(event: Occurrence, unit: ForceUnit) -> str:
+def _event_text(event: Occurrence, unit: ForceUnit) -> str:
     """Description of an event."""
     what = event.kind if event.cable is None else f"{event.kind} of cable {event.cable}"
     before, after = unit.bare(event.tension_before), unit.written(event.tension_after)
@@ -178,7 +178,7 @@ class PlayedSimulation:
             ("Speed", n(np.linalg.norm(simulation.twist[k, :3]), ".3g", "m/s")),
             ("Tensions", f"{unit.bare(np.nanmin(tension))} to {unit.written(np.nanmax(tension))}"),
             ("Energy error", n(energy.error[k], ".2g", "J", size=size)),
-            *(("Event", event_text(event, unit)) for event in past),
+            *(("Event", _event_text(event, unit)) for event in past),
         ]
         heads = ("cable", f"at the winch<br>[{unit.name}]", "length<br>[m]")
         columns = [unit.bare(each) for each in tension], [number(each, ".4f") for each in length]
@@ -224,7 +224,7 @@ class PlayedSimulation:
         )
         began = float(simulation.time[0])
         marks = tuple(
-            TimelineMark(event.time - began, event_text(event, unit), bad=event.kind in FAILURES)
+            TimelineMark(event.time - began, _event_text(event, unit), bad=event.kind in FAILURES)
             for event in simulation.events
         )
         spans = limit_violations(robot, self.time, tension_rows, unit)

@@ -164,7 +164,7 @@ def frame(robot: Robot) -> Solid:
     edges = [(a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1]
     thick = _BEAM * size_of(robot)
     dash = _DASH * size_of(robot) if is_frame_assumed(robot) else np.inf
-    return merged([beam for a, b in edges for beam in _beams(corners[a], corners[b], thick, dash)])
+    return _merged([beam for a, b in edges for beam in _beams(corners[a], corners[b], thick, dash)])
 
 
 def is_frame_assumed(robot: Robot) -> bool:
@@ -193,7 +193,7 @@ def winches(robot: Robot) -> Solid:
     known = None if robot.winches is None else robot.winches.drum_radius
     if known is not None:
         parts += [rod(ends, thick) for ends, thick in zip(drum_axes(robot), known, strict=True)]
-    return merged(parts) if parts else Solid(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
+    return _merged(parts) if parts else Solid(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
 
 
 def wheel() -> Solid:
@@ -203,7 +203,7 @@ def wheel() -> Solid:
     rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
     spokes = [rod(np.array([inner, outer]), _SPOKE) for inner, outer in _spokes()]
     corners = [Solid(ring, np.arange(len(ring)).reshape(-1, 3)) for ring in (rim, hub)]
-    lying = merged([*corners, *spokes])
+    lying = _merged([*corners, *spokes])
     x, y, z = lying.vertices.T
     return Solid(np.stack((1.0 + x, -z, y), axis=1), lying.faces)
 
@@ -281,7 +281,7 @@ def tube(points: Array, radius: float, sides: int = 6) -> Solid:
     return Solid(rings.reshape(-1, 3), np.concatenate((quads[:, [0, 1, 2]], quads[:, [0, 2, 3]])))
 
 
-def merged(parts: list[Solid]) -> Solid:
+def _merged(parts: list[Solid]) -> Solid:
     """Several solids as one."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts[:-1])])
     faces = [part.faces + start for part, start in zip(parts, starts, strict=True)]

@@ -53,7 +53,7 @@ class MarginScale:
 
     def key(self, unit: ForceUnit) -> str:
         """HTML of the key of colors."""
-        edges = [bare(edge, unit) for edge in self.edges]
+        edges = [_bare(edge, unit) for edge in self.edges]
         between = [f"{low} to {high}" for low, high in pairwise(edges)]
         names = [f"below {edges[0]}", *between, f"above {edges[-1]}"]
         marks = "".join(
@@ -63,7 +63,7 @@ class MarginScale:
         return block(f"<b>Margin [{unit.name}]</b> &nbsp;{marks}")
 
 
-def bare(edge: float, unit: ForceUnit) -> str:
+def _bare(edge: float, unit: ForceUnit) -> str:
     """A margin between bands [N], without its unit."""
     return f"{edge / unit.newtons:g}".replace("-", "−")
 
@@ -108,7 +108,7 @@ def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> lis
         if len(free):
             way = 2.0 * np.pi * (0.1 + k / len(lines))
             along = free[:, list(cut.plane.axes)] @ np.array([np.cos(way), np.sin(way)])
-            marks.append((f"{bare(edge, unit)} {unit.name}", free[along.argmax()]))
+            marks.append((f"{_bare(edge, unit)} {unit.name}", free[along.argmax()]))
     return marks
 
 

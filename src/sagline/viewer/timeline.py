@@ -170,7 +170,7 @@ _NEAR: Final = 0.6  # of the values' spread: a limit within this distance is dra
 _BORDER: Final = 0.05  # of the spread, above and below
 
 
-class Columns(NamedTuple):
+class _Columns(NamedTuple):
     """Samples, or groups of them."""
 
     time: Array  # start of each [s], shape (C,)
@@ -178,12 +178,12 @@ class Columns(NamedTuple):
     high: Array  # largest value
 
 
-def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> Columns:
-    """Columns of equal numbers of samples (N,) with values (N, k), at most `most`."""
+def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> _Columns:
+    """_Columns of equal numbers of samples (N,) with values (N, k), at most `most`."""
     if time.size <= most:
-        return Columns(time, values, values)
+        return _Columns(time, values, values)
     starts = (np.arange(most) * time.size) // most
-    return Columns(time[starts], _extremes(np.fmin, values, starts), _extremes(np.fmax, values, starts))
+    return _Columns(time[starts], _extremes(np.fmin, values, starts), _extremes(np.fmax, values, starts))
 
 
 def timeline_message(
@@ -207,7 +207,7 @@ def timeline_message(
     }
 
 
-def _columns(track: Track, chart: Chart, start: float, end: float) -> Columns:
+def _columns(track: Track, chart: Chart, start: float, end: float) -> _Columns:
     rows = track.within(start, end)
     return columns(track.time[rows], chart.values(rows))
 
@@ -219,7 +219,7 @@ def _matching(track: Track, first: Chart, chart: int) -> Chart:
 
 
 def _track_message(
-    name: str, track: Track, chart: Chart, part: Columns, near: Sequence[ChartLimit], *, first: bool
+    name: str, track: Track, chart: Chart, part: _Columns, near: Sequence[ChartLimit], *, first: bool
 ) -> dict[str, Any]:
     digits = chart.decimals + 1
     far = [f"{limit.name} {limit.value:g} {chart.unit}" for limit in chart.limits if limit not in near]
@@ -249,7 +249,7 @@ def _most_important(track: Track) -> list[Any]:
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)
 
 
-def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, float, list[ChartLimit]]:
+def _range(parts: Sequence[_Columns], charts: Sequence[Chart]) -> tuple[float, float, list[ChartLimit]]:
     """Lowest and highest value of the axis, and the limits that lie on it."""
     ends = [_extent(part) for part in parts]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
@@ -262,7 +262,7 @@ def _range(parts: Sequence[Columns], charts: Sequence[Chart]) -> tuple[float, fl
     return low - _BORDER * spread, high + _BORDER * spread, near
 
 
-def _extent(part: Columns) -> tuple[float, float]:
+def _extent(part: _Columns) -> tuple[float, float]:
     low, high = part.low[np.isfinite(part.low)], part.high[np.isfinite(part.high)]
     return (float(low.min()), float(high.max())) if low.size and high.size else (np.inf, -np.inf)
 

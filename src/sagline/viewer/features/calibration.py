@@ -59,7 +59,7 @@ def bands(found: Calibration) -> Indices:
     return np.asarray((found.chi_squared_of_pose > limits).sum(axis=0)).astype(np.int64)
 
 
-def key_text(counts: Indices) -> str:
+def _key_text(counts: Indices) -> str:
     """HTML of the key of colors, with the number of poses of each."""
     key = color_key((color, f"{name}: {count}") for color, name, count in zip(COLORS, NAMES, counts, strict=True))
     return block(f"<b>Chi squared of the poses</b><br>{key}")
@@ -92,13 +92,13 @@ def parameters_text(found: Calibration) -> str:
     return block(f"<table>{head}{rows}</table>{remark}")
 
 
-def ellipsoids_text(factor: float, *, relative: bool) -> str:
+def _ellipsoids_text(factor: float, *, relative: bool) -> str:
     """HTML of the meaning of the ellipsoids."""
     but = ", without the common motion of all anchors" if relative else ""
     return sentence(f"Ellipsoids: one standard error{but}, enlarged {factor:g} times; lines: change of the position.")
 
 
-def outliers_text(found: Calibration, chosen: int | None) -> str:
+def _outliers_text(found: Calibration, chosen: int | None) -> str:
     """HTML of the outliers, each to be clicked."""
     if not found.outliers:
         return sentence("No outliers.")
@@ -188,7 +188,7 @@ class CalibrationFeature(Feature):
             self._ellipsoids_html = gui.add_html("")
             hint = "Click one to move the platform there."
             self._poses_wanted: Any = gui.add_checkbox("Poses of the log", True, hint=hint)
-            gui.add_html(key_text(np.bincount(self._bands, minlength=len(COLORS)).astype(np.int64)))
+            gui.add_html(_key_text(np.bincount(self._bands, minlength=len(COLORS)).astype(np.int64)))
             self._field: Any = gui.add_text(FIELD, "", hint="Number of a row; empty for none.")
             self._outliers_html = gui.add_html("")
             self._pose_html = gui.add_html("")
@@ -256,7 +256,7 @@ class CalibrationFeature(Feature):
             self._draw_ellipsoids(
                 parent, self._anchors(which, relative=relative), self._displacement(which, relative=relative), factor
             )
-        self._ellipsoids_html.content = ellipsoids_text(factor, relative=relative)
+        self._ellipsoids_html.content = _ellipsoids_text(factor, relative=relative)
 
     def _checked_factor(self) -> float:
         """The scale of the errors."""
@@ -312,7 +312,7 @@ class CalibrationFeature(Feature):
         found = self._found
         there = np.flatnonzero(found.rows == int(typed)) if typed.isdecimal() else np.empty(0)
         k = int(there[0]) if len(there) else None
-        self._outliers_html.content = outliers_text(found, None if k is None else int(found.rows[k]))
+        self._outliers_html.content = _outliers_text(found, None if k is None else int(found.rows[k]))
         self._pose_html.content = self._why_no_row(typed) if k is None else pose_residuals(found, k)
         self._nodes.remove("/chosen")
         if k is not None:

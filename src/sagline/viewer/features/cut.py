@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import viser
@@ -52,33 +52,25 @@ def simulate_cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Si
         yield run.until(part)
 
 
-class Peak(NamedTuple):
-    """The highest tension after a cut."""
-
-    cable: int  # number of the cable
-    tension: float  # at the frame end [N]
-    time: float  # after the cut, to a sample [s]
-    limit: float  # highest allowed tension [N]; infinite for none
-
-
-def peak_of(simulation: Simulation, cut: int) -> Peak:
-    """The highest tension of the other cables at any step."""
+def peak_of(simulation: Simulation, cut: int) -> tuple[int, float, float]:
+    """Cable, tension at its frame end [N] and time after the cut [s] of the highest tension of the other cables."""
     highest = simulation.tensions.max(axis=0) if simulation.largest_tension is None else simulation.largest_tension
     others = np.where(np.arange(len(highest)) == cut, -np.inf, highest)
     cable = int(np.argmax(others))
     time = float(simulation.time[np.argmax(simulation.tensions[:, cable])] - simulation.time[0])
-    return Peak(cable, float(highest[cable]), time, float(simulation.robot.tension_max[cable]))
+    return cable, float(highest[cable]), time
 
 
-def outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
+def _outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
     """HTML: largest displacement of the platform and highest tension after a cut; `whole` if it is complete."""
-    unit, peak = force_unit(simulation.robot), peak_of(simulation, cut)
+    unit, (cable, tension, time) = force_unit(simulation.robot), peak_of(simulation, cut)
+    limit = float(simulation.robot.tension_max[cable])  # infinite for none
     away = np.linalg.norm(simulation.pose.position - simulation.pose.position[0], axis=1)
     far = int(np.argmax(away))
-    times = f", {peak.tension / peak.limit:.2f} times its limit" if np.isfinite(peak.limit) else ""
+    times = f", {tension / limit:.2f} times its limit" if np.isfinite(limit) else ""
     rows = [
         ("Largest displacement", f"{n(away[far], '.3g', 'm')} at {simulation.time[far] - simulation.time[0]:.2f} s"),
-        ("Highest tension", f"{unit.written(peak.tension)} in cable {peak.cable} at {peak.time:.2f} s{times}"),
+        ("Highest tension", f"{unit.written(tension)} in cable {cable} at {time:.2f} s{times}"),
     ]
     slack = sorted({event.cable for event in simulation.events if event.kind == "slack" and event.cable is not None})
     if slack:
@@ -86,14 +78,7 @@ def outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
     rows.append(("Damping", f"loss time {n(simulation.damping.loss_time, '.2g', 's')} of the cables, assumed"))
     if not whole:
         rows.append(("Simulated", f"{simulation.time[-1] - simulation.time[0]:.2f} s so far"))
-    return box("bad" if peak.tension > peak.limit else "quiet", f"Cable {cut} is cut", definitions(rows))
-
-
-class Before(NamedTuple):
-    """The page before a cut."""
-
-    pose: Pose  # of the platform
-    kept: PlayerState
+    return box("bad" if tension > limit else "quiet", f"Cable {cut} is cut", definitions(rows))
 
 
 class CutFeature(Feature):
@@ -106,7 +91,7 @@ class CutFeature(Feature):
         self._is_marked = False  # whether a cable is marked in the scene
         self._requested = self._playing = 0  # numbers of the last requested cut, and of the played one
         self._number = 0  # of the player, for the played cut
-        self._before: list[Before] = []  # states before each of the successive cuts
+        self._before: list[tuple[Pose, PlayerState]] = []  # states before each of the successive cuts
         gui = page.server.gui
         with gui.add_folder("Cut a cable", expand_by_default=False):
             self._cable: Any = gui.add_dropdown("Cable to cut", tuple(map(str, range(page.robot.cable_count))))
@@ -166,7 +151,7 @@ class CutFeature(Feature):
             return
         cable, cable_mass = self._chosen, CABLE_MASS.get(self._mass.value, "none")
         self._requested += 1
-        number, before = self._requested, Before(view.snapshot.pose, self._player.save())
+        number, before = self._requested, (view.snapshot.pose, self._player.save())
 
         def simulate() -> None:
             for simulation in simulate_cut(state, cable, cable_mass):
@@ -182,10 +167,10 @@ class CutFeature(Feature):
         self._requested += 1  # the results of a simulation that is still running are ignored
         if not self._before:
             return
-        before = self._before.pop()
-        self._player.restore(before.kept)
-        if not before.kept.following:
-            self._page.go(before.pose)
+        pose, state = self._before.pop()
+        self._player.restore(state)
+        if not state.following:
+            self._page.go(pose)
         self._undo.visible = bool(self._before)
         self._text.content = HELP
 
@@ -197,7 +182,7 @@ class CutFeature(Feature):
     def _refuse(self, message: str) -> None:
         self._text.content = refused(message)
 
-    def _play(self, number: int, simulation: Simulation, cable: int, before: Before) -> None:
+    def _play(self, number: int, simulation: Simulation, cable: int, before: tuple[Pose, PlayerState]) -> None:
         """Play a part of a simulation, which contains those before."""
         if number != self._requested:
             return
@@ -212,7 +197,7 @@ class CutFeature(Feature):
             self._number = self._player.number
             self._undo.visible = True
         whole = float(simulation.time[-1] - simulation.time[0]) >= DURATION - simulation.step
-        self._text.content = outcome_text(simulation, cable, whole=whole)
+        self._text.content = _outcome_text(simulation, cable, whole=whole)
 
     def _mark(self) -> None:
         self._is_marked = True

@@ -86,7 +86,7 @@ def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], pla
     scene.add_geometry(mesh, node_name=name, geom_name=name, transform=place)
 
 
-def filmed(
+def _filmed(
     client: viser.ClientHandle,
     server: viser.ViserServer,
     messages: Messages,
@@ -158,7 +158,7 @@ def _clock(view: View, time: float, speed: float) -> dict[str, Any]:
     return {"time": f"{time:.{digits}f} s", "text": "" if view.snapshot.feasible else text}
 
 
-class Exporter:
+class _Exporter:
     """A client with its exports, one at a time."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
@@ -169,7 +169,7 @@ class Exporter:
         self.cancelled = threading.Event()
 
 
-Send = Callable[[Exporter], None]
+Send = Callable[[_Exporter], None]
 
 
 class ExportFeature(Feature):
@@ -179,7 +179,7 @@ class ExportFeature(Feature):
         """Build the panel."""
         server, channel = page.server, page.channel
         self._page, self._server, self._extent = page, server, page.extent
-        self._exporters: dict[int, Exporter] = {}
+        self._exporters: dict[int, _Exporter] = {}
         gui = server.gui
         with gui.add_folder("Export", expand_by_default=False):
             self._paper = gui.add_dropdown("Picture for", tuple(PAPERS))
@@ -205,25 +205,25 @@ class ExportFeature(Feature):
         self._film.visible = played is not None
         self._film.label = f"Film of the {None if played is None else played.name}"
 
-    def _send_picture(self, exporter: Exporter) -> None:
+    def _send_picture(self, exporter: _Exporter) -> None:
         view, paper = self._page.view, PAPERS.get(self._paper.value)
         if view is not None and paper is not None:
             messages, strip = exporter.messages, bool(self._strip.value)
             save_picture(exporter.client, self._server, messages, view, paper, self._name(), self._extent, strip=strip)
 
-    def _send_scene(self, exporter: Exporter) -> None:
+    def _send_scene(self, exporter: _Exporter) -> None:
         view = self._page.view
         if view is not None:
             glb = scene_as_glb(view.snapshot, view.scale, view.settings.sag_scale)
             exporter.client.send_file_download(f"{self._name()}.glb", glb, save_immediately=True)
 
-    def _send_film(self, exporter: Exporter) -> None:
+    def _send_film(self, exporter: _Exporter) -> None:
         view, played, speed = self._page.view, self._page.player.played, self._page.player.speed
         if played is not None and view is not None:
             exporter.cancelled.clear()
             client, name = exporter.client, f"{self._name()}-{played.name}"
             messages, cancelled = exporter.messages, exporter.cancelled.is_set
-            filmed(client, self._server, messages, played, view, speed, name, self._extent, cancelled)
+            _filmed(client, self._server, messages, played, view, speed, name, self._extent, cancelled)
 
     def _cancel(self, _: Any, client: int) -> None:
         """Cancel the film of a client."""
@@ -242,7 +242,7 @@ class ExportFeature(Feature):
         client = event.client
         if client is None:
             return
-        exporter = self._exporters.setdefault(client.client_id, Exporter(client))
+        exporter = self._exporters.setdefault(client.client_id, _Exporter(client))
         if not exporter.busy.acquire(blocking=False):
             return  # pressed twice
         try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,27 +19,19 @@ from sagline.viewer.readout import headline
 from sagline.viewer.tension_scale import force_unit, number
 
 
-class ScreenReaderText(NamedTuple):
-    """Parts of a text for screen readers."""
-
-    head: str  # the verdict in a word or two: when it changes, it is said soon
-    text: str  # all of it
-    place: str  # where the platform is
-
-
-def screen_reader_text(view: View) -> ScreenReaderText:
+def screen_reader_text(view: View) -> dict[str, str]:
     """Verdict, whole text and position of a view for screen readers."""
     snapshot = view.snapshot
     place = place_of(snapshot.pose)
     if isinstance(snapshot, InMotion):
         head = snapshot.notice or f"As in the {'recording' if view.played is None else view.played.name}"
-        return ScreenReaderText(head, _with(head, _tensions(snapshot.robot, snapshot.tension)), place)
+        return {"head": head, "text": _with(head, _tensions(snapshot.robot, snapshot.tension)), "place": place}
     head = headline(snapshot)
     text = _tensions(snapshot.robot, snapshot.tension) if snapshot.feasible else snapshot.reason
-    return ScreenReaderText(head, _with(head, text), place)
+    return {"head": head, "text": _with(head, text), "place": place}
 
 
-def described(robot: Robot) -> str:
+def _description(robot: Robot) -> str:
     """Description of the robot."""
     return f"{robot.name}: a platform of {number(robot.mass, '.4g')} kg on {robot.cable_count} cables"
 
@@ -80,14 +72,16 @@ class KeyboardFeature(Feature):
         self._channel, self._go, self._go_home = channel, page.go_near, page.go_home
         self._step = shapes.round_below(STEP * shapes.size_of(robot))
         self._pose: Pose | None = None
-        channel.send("scene", {"what": described(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)})
+        channel.send(
+            "scene", {"what": _description(robot), "step": self._step, "turn": round(float(np.degrees(TURN)), 3)}
+        )
         channel.on("nudge", self._on_nudge)
         channel.on("home", lambda *_: self._go_home())
 
     def follow(self, view: View) -> None:
         """Send the verdict."""
         self._pose = view.snapshot.pose
-        self._channel.send("spoken", screen_reader_text(view)._asdict())
+        self._channel.send("spoken", screen_reader_text(view))
 
     def _on_nudge(self, value: Any, _: int) -> None:
         """Move by steps along x, y, z, and turn by steps about z, y, x."""

@@ -38,7 +38,7 @@ def explanation(
         place = ", ".join(number(x, ".3f") for x in nearest.pose.position)
         button = f"<button {chosen_by(GO, '')}>Go there</button>"
         level = ", the platform level" if nearest.turned else ""
-        rows.append(("Nearest feasible", f"{distance_of(nearest)} away at {place} m{level}. {button}"))
+        rows.append(("Nearest feasible", f"{_distance_of(nearest)} away at {place} m{level}. {button}"))
     elif searching:
         rows.append(("Nearest feasible", "searching …"))
     elif snapshot.status not in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED):
@@ -46,7 +46,7 @@ def explanation(
     return block(definitions(rows, "missing"))
 
 
-def distance_of(nearest: NearestFeasible) -> str:
+def _distance_of(nearest: NearestFeasible) -> str:
     """Distance to the nearest feasible pose."""
     return n(nearest.distance, ".3g", "m")
 
@@ -177,7 +177,7 @@ class MissingFeature(Feature):
             nodes.hide("/nearest", "/nearest_way")
             return
         nodes.body("/nearest", self._body, FEASIBLE, 0.5, nearest.pose)
-        text = f"feasible here, {distance_of(nearest)} away"
+        text = f"feasible here, {_distance_of(nearest)} away"
         nodes.label("/nearest/name", text, (0.0, 0.0, 0.0), "top-center", SMALL)
         ends = np.stack((snapshot.pose.position, nearest.pose.position))[None]
         nodes.lines("/nearest_way", shapes.segments(shapes.straight(ends), dashed=True), FEASIBLE, LINE_WIDTH)

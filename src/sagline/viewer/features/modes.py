@@ -32,7 +32,7 @@ HIGHEST_RESPONSE, LOWEST_RESPONSE = 2e2, 1e-3  # of the static response: limits 
 MARK = 12  # px, of a mode's mark
 
 
-def response_figure(curves: ResponseCurves, modes: list[ListedMode], words: str, chosen: str) -> str:
+def _response_figure(curves: ResponseCurves, modes: list[ListedMode], words: str, chosen: str) -> str:
     """HTML: both curves on logarithmic axes, a mark for every mode with cable mass, which can be clicked."""
     low = max(min(curves.with_mass.min(), curves.massless.min()), LOWEST_RESPONSE * curves.static)
     high = min(max(curves.with_mass.max(), curves.massless.max()), HIGHEST_RESPONSE * curves.static)
@@ -274,7 +274,7 @@ class ModesFeature(Feature):
         axis = self._axis
         motion, unit = ("rotation", "N m") if axis.startswith("about") else ("motion along", "N")
         with_mass = [mode for mode in modes if mode.kind != MASSLESS]
-        return response_figure(curves, with_mass, f"{motion} {axis} for 1 {unit} [{curves.unit}]", name)
+        return _response_figure(curves, with_mass, f"{motion} {axis} for 1 {unit} [{curves.unit}]", name)
 
     def _stop_swing(self) -> None:
         if self.swing is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -25,7 +25,7 @@ MISSING_COLOR: Color = (220, 56, 48)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PlatformForce:
+class _PlatformForce:
     """A force on the platform."""
 
     name: str  # number of its cable, or "weight", "load" or "missing"
@@ -44,7 +44,7 @@ def cable_forces(state: Equilibrium) -> Array:
     return np.column_stack((level * cables.horizontal_tension[:, None], -cables.vertical_force))
 
 
-def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tuple[PlatformForce, ...]:
+def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tuple[_PlatformForce, ...]:
     """All forces on a platform: of its cables in order of azimuth, then weight, load and missing force."""
     robot, pose = state.one_robot, state.pose
     center = pose.transform(robot.center_of_mass)
@@ -52,17 +52,17 @@ def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tupl
     pulls = cable_forces(state)
     order = np.argsort(np.arctan2(pulls[:, 1], pulls[:, 0]), kind="stable").tolist()
     moments = np.cross(ends - center, pulls)
-    forces = [PlatformForce(str(k), cable_color(k), pulls[k], moments[k], ends[k]) for k in order]
+    forces = [_PlatformForce(str(k), cable_color(k), pulls[k], moments[k], ends[k]) for k in order]
     weight = np.array([0.0, 0.0, -robot.mass * robot.gravity])
-    forces.append(PlatformForce(WEIGHT, WEIGHT_COLOR, weight, np.zeros(3), center))
+    forces.append(_PlatformForce(WEIGHT, WEIGHT_COLOR, weight, np.zeros(3), center))
     lacking = np.zeros(6) if missing is None else missing
     for name, color, wrench in ((LOAD, LOAD_COLOR, state.wrench - lacking), (MISSING, MISSING_COLOR, lacking)):
         if np.linalg.norm(wrench) > 0.0:
-            forces.append(PlatformForce(name, color, wrench[:3], wrench[3:], center))
+            forces.append(_PlatformForce(name, color, wrench[:3], wrench[3:], center))
     return tuple(forces)
 
 
-def residual(state: Equilibrium, forces: tuple[PlatformForce, ...]) -> tuple[float, float]:
+def residual(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> tuple[float, float]:
     """Residual of the force balance along the free motions: force [N] and moment [N m]."""
     whole = np.concatenate((sum(each.force for each in forces), sum(each.moment for each in forces)))
     freedom = state.one_robot.freedom
@@ -70,7 +70,7 @@ def residual(state: Equilibrium, forces: tuple[PlatformForce, ...]) -> tuple[flo
     return float(np.linalg.norm(rest[:3])), float(np.linalg.norm(rest[3:]))
 
 
-def can_rotate(state: Equilibrium) -> bool:
+def _can_rotate(state: Equilibrium) -> bool:
     """True if the platform can rotate, so that moments balance too."""
     return bool(np.abs(state.one_robot.freedom[:, 3:]).max() > 0.0)
 
@@ -87,51 +87,40 @@ FLAT: Final = 1e-3  # of the largest projection: smaller ones are not shown
 SHOWN: Final = 2  # projections, those with the largest areas
 
 
-class Projection(NamedTuple):
-    """Projection of the polygon onto two axes."""
-
-    names: str  # names of the axes to the right and up
-    points: Array  # corners [N], shape (k + 1, 2): where each force begins and ends
+Label = tuple[float, float, float, float]  # middle, to the right and down, and half the width and height of a name [px]
 
 
-class Box(NamedTuple):
-    """Box of a label."""
-
-    x: float  # its middle [px]
-    y: float  # its middle, down [px]
-    across: float  # half its width [px]
-    up: float  # half its height [px]
-
-    def overlap(self, other: Box) -> float:
-        """Area of the intersection [px^2]."""
-        wide = self.across + other.across - abs(self.x - other.x)
-        return max(wide, 0.0) * max(self.up + other.up - abs(self.y - other.y), 0.0)
+def _overlap(one: Label, other: Label) -> float:
+    """Area of the intersection of two labels [px^2]."""
+    wide = one[2] + other[2] - abs(one[0] - other[0])
+    return max(wide, 0.0) * max(one[3] + other[3] - abs(one[1] - other[1]), 0.0)
 
 
 def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> str:
     """HTML of the force polygon in two projections, its residual, and the forces and moments as numbers."""
     forces = forces_on_platform(state, missing)
     corners = np.vstack((np.zeros(3), np.cumsum([each.force for each in forces], axis=0)))
-    views = [Projection("xyz"[right] + "xyz"[up], corners[:, [right, up]]) for right, up in SIDES]
-    areas = [float(np.prod(np.ptp(view.points, axis=0))) for view in views]
+    views = [("xyz"[right] + "xyz"[up], corners[:, [right, up]]) for right, up in SIDES]
+    areas = [float(np.prod(np.ptp(points, axis=0))) for _, points in views]
     shown = np.sort(np.argsort(areas)[::-1][:SHOWN])
     views = [views[k] for k in shown if areas[k] > FLAT * max(areas)] or views[:1]  # a planar robot has one
-    extents = np.array([np.ptp(view.points, axis=0) for view in views])
+    extents = np.array([np.ptp(points, axis=0) for _, points in views])
     scale = float(min((WIDTH - 2.0 * BORDER) / max(extents[:, 0].max(), 1e-12), HIGHEST / extents[:, 1].max()))
-    drawn = "".join(_drawing(view, forces, scale) for view in views)
+    drawn = "".join(_projection(*view, forces, scale) for view in views)
     return block(drawn) + sentence(_residual_text(state, forces, missing)) + block(_table(state, forces))
 
 
-def _drawing(view: Projection, forces: tuple[PlatformForce, ...], scale: float) -> str:
-    low, high = view.points.min(axis=0), view.points.max(axis=0)
+def _projection(axes: str, points: Array, forces: tuple[_PlatformForce, ...], scale: float) -> str:
+    """SVG of the polygon with corners (k + 1, 2) [N], between which the forces act, on two axes."""
+    low, high = points.min(axis=0), points.max(axis=0)
     height = scale * float(high[1] - low[1]) + 2.0 * BORDER
     left = 0.5 * (WIDTH - scale * float(high[0] - low[0]))
     places = np.column_stack(
-        (left + scale * (view.points[:, 0] - low[0]), height - BORDER - scale * (view.points[:, 1] - low[1]))
+        (left + scale * (points[:, 0] - low[0]), height - BORDER - scale * (points[:, 1] - low[1]))
     )
-    taken: list[Box] = []
-    arrows = "".join(_arrow(force, places[k], places[k + 1], taken) for k, force in enumerate(forces))
-    right, up = view.names[0], view.names[1]
+    labels: list[Label] = []
+    arrows = "".join(_arrow(force, places[k], places[k + 1], labels) for k, force in enumerate(forces))
+    right, up = axes[0], axes[1]
     return (
         f'<svg viewBox="0 0 {WIDTH:.0f} {height:.0f}" role="img" class="forces" '
         f'aria-label="forces on the platform head to tail, {right} to the right, {up} up">{arrows}'
@@ -140,7 +129,7 @@ def _drawing(view: Projection, forces: tuple[PlatformForce, ...], scale: float) 
     )
 
 
-def _arrow(force: PlatformForce, start: Array, end: Array, taken: list[Box]) -> str:
+def _arrow(force: _PlatformForce, start: Array, end: Array, labels: list[Label]) -> str:
     """An arrow with its name, which avoids the labels before; the missing force is dashed."""
     way = end - start
     length = float(np.hypot(*way))
@@ -154,9 +143,9 @@ def _arrow(force: PlatformForce, start: Array, end: Array, taken: list[Box]) -> 
     kind = ' class="gap"' if force.name == MISSING else ""
     name = ""
     if length >= SHORT:
-        box = _label_box(force.name, start, way, normal, taken)
-        taken.append(box)
-        name = f'<text x="{box.x:.1f}" y="{box.y + 4.0:.1f}" text-anchor="middle">{force.name}</text>'
+        x, y, *_ = label = _label(force.name, start, way, normal, labels)
+        labels.append(label)
+        name = f'<text x="{x:.1f}" y="{y + 4.0:.1f}" text-anchor="middle">{force.name}</text>'
     corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in (end, *wings))
     return (
         f'<g style="color:{css_color(force.color)}"><line x1="{start[0]:.1f}" y1="{start[1]:.1f}" '
@@ -164,26 +153,26 @@ def _arrow(force: PlatformForce, start: Array, end: Array, taken: list[Box]) -> 
     )
 
 
-def _label_box(name: str, start: Array, way: Array, normal: Array, taken: list[Box]) -> Box:
-    """Box of the name of an arrow: the first free position beside it, or the one with the least overlap."""
+def _label(name: str, start: Array, way: Array, normal: Array, labels: list[Label]) -> Label:
+    """Label of an arrow: the first free position beside it, or the one with the least overlap."""
     across, up = 0.5 * LETTER[0] * len(name), 0.5 * LETTER[1]
     (x, y), (along, down) = start.tolist(), way.tolist()
     right, below = ((BESIDE + abs(normal[0]) * across + abs(normal[1]) * up) * normal).tolist()
-    found = []
+    found: list[Label] = []
     for share in SHARES:
         for side in (1.0, -1.0):
             place = min(max(x + share * along + side * right, across), WIDTH - across)
-            found.append(Box(place, y + share * down + side * below, across, up))
-            if not any(map(found[-1].overlap, taken)):
+            found.append((place, y + share * down + side * below, across, up))
+            if not any(_overlap(found[-1], label) for label in labels):
                 return found[-1]
-    return min(found, key=lambda box: sum(map(box.overlap, taken)))
+    return min(found, key=lambda one: sum(_overlap(one, label) for label in labels))
 
 
-def _residual_text(state: Equilibrium, forces: tuple[PlatformForce, ...], missing: Array | None) -> str:
+def _residual_text(state: Equilibrium, forces: tuple[_PlatformForce, ...], missing: Array | None) -> str:
     """Sentence on the residual."""
     force, moment = residual(state, forces)
     left = n(force, ".2g", "N")
-    if can_rotate(state):
+    if _can_rotate(state):
         left += f" and {n(moment, '.2g', 'N m')} about the center of mass"
     if missing is None:
         return f"The forces of the cables, weight and load sum to zero up to {left}."
@@ -193,8 +182,8 @@ def _residual_text(state: Equilibrium, forces: tuple[PlatformForce, ...], missin
     return f"The gap is the missing force, {gap}. With it, and cables at their limits, the sum is zero up to {left}."
 
 
-def _table(state: Equilibrium, forces: tuple[PlatformForce, ...]) -> str:
-    unit, turning = force_unit(state.one_robot), can_rotate(state)
+def _table(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> str:
+    unit, turning = force_unit(state.one_robot), _can_rotate(state)
     decimals = _decimals(max(float(np.abs(each.force).max()) for each in forces) / unit.newtons)
     head = "".join(f"<th>F<sub>{axis}</sub></th>" for axis in "xyz")
     head += "".join(f"<th>M<sub>{axis}</sub></th>" for axis in "xyz") if turning else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 import viser
@@ -86,13 +86,6 @@ def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
     return f"{least}, {middle} and {most}{drawn}"
 
 
-class Hold(NamedTuple):
-    """A point of the platform that a client drags."""
-
-    client: int  # number of the client
-    at: Array  # the point, platform frame [m], shape (3,)
-
-
 class PushFeature(Feature):
     """A folder with the fields of a force, typed or dragged, and the response in the scene."""
 
@@ -102,7 +95,7 @@ class PushFeature(Feature):
         self.body, self._ball = shapes.platform(page.robot), ball()
         scale = page.scale
         self._stiffness = float(np.sqrt(scale.low * scale.high)) / (FAR * self._size)  # N/m of a drag
-        self._hold: Hold | None = None
+        self._hold: tuple[int, Array] | None = None  # client and point that it drags, platform frame [m]
         self.response: PushResponse | None = None
         self._unit = force_unit(page.robot)
         self._build_folder(page)
@@ -236,7 +229,7 @@ class PushFeature(Feature):
 
     def _leave(self, client: int) -> None:
         """Release the force of a client that has disconnected."""
-        if self._hold is not None and self._hold.client == client:
+        if self._hold is not None and self._hold[0] == client:
             self.release()
 
     def _on_drag(self, value: Any, client: int) -> None:
@@ -249,18 +242,18 @@ class PushFeature(Feature):
             return
         if phase == "start":
             self._grab(camera, at, client)
-        elif self._hold is None or self._hold.client != client:
+        elif self._hold is None or self._hold[0] != client:
             return
         elif phase in ("move", "end") and state is not None:
-            drag = _drag(camera, at, state.pose.transform(self._hold.at))
-            self._type(Push(self._stiffness * drag, self._hold.at))
+            drag = _drag(camera, at, state.pose.transform(self._hold[1]))
+            self._type(Push(self._stiffness * drag, self._hold[1]))
         if phase == "cancel" or (phase == "end" and not (self._keep.value or value.get("keep") is True)):
             self.release()
         elif phase == "end":
             self._hold = None
 
     def _grab(self, camera: Camera, at: tuple[float, float], client: int) -> None:
-        """Hold the point of the platform that is seen at a point of the picture, if there is one."""
+        """_Hold the point of the platform that is seen at a point of the picture, if there is one."""
         state: Equilibrium | None = self._page.state
         if state is None:
             return
@@ -268,14 +261,14 @@ class PushFeature(Feature):
         start, direction = back @ (camera.place - state.pose.position), back @ camera.ray(at)
         distance = ray_distance(self.body, start, direction)
         if distance is not None:
-            self._hold = Hold(client, start + distance * direction)
+            self._hold = client, start + distance * direction
             return
         points = self.body.vertices[self.body.faces].mean(axis=1)  # a thin platform is easily missed
         places, depth = camera.project(state.pose.transform(points))
         away = np.linalg.norm(places - np.asarray(at) * camera.pixels, axis=1)
         away[~(depth > 0.0)] = np.inf  # behind the camera
         if away.min() <= NEAR:
-            self._hold = Hold(client, points[away.argmin()])
+            self._hold = client, points[away.argmin()]
 
 
 def _drag(camera: Camera, at: tuple[float, float], start: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
@@ -52,16 +52,11 @@ PLANES: Final = {"level": 2, "upright, along x": 1, "upright, along y": 0}  # na
 _NOTHING: Final = sentence("Choose one or several of these.")
 
 
+_Result = tuple[Hashable, bool, Hull | None]
+
+
 class _SupersededError(SaglineError):
     """Another workspace is requested."""
-
-
-class _Result(NamedTuple):
-    """A hull that was computed."""
-
-    key: Hashable  # identifies the workspace
-    rough: bool  # whether it is the coarse hull, which is computed first
-    hull: Hull | None  # None where it cannot be computed
 
 
 def planes_of(robot: Robot) -> tuple[int, ...]:
@@ -84,6 +79,7 @@ class RegionFeature(Feature):
         self._place = np.zeros(3)  # of the platform [m]
         self._scale = MarginScale(1.0)
         self._scale_key: Hashable = None  # of the workspace that the scale is for
+        # key of the workspace, whether the hull is the coarse one, and the hull; None where it cannot be computed
         self._result: _Result | None = None
         self._hull_key: Hashable = None  # of the hull that is drawn
         self._slice_key: Hashable = None  # of the slice that is drawn
@@ -205,21 +201,20 @@ class RegionFeature(Feature):
             self._hull_key = self._result = None
             return
         result = self._result
-        if (result is None or result.key != self._key or result.rough) and not self._task.busy:
-            self._compute(rough=result is None or result.key != self._key)
+        if (result is None or result[0] != self._key or result[1]) and not self._task.busy:
+            self._compute(rough=result is None or result[0] != self._key)
         if result is None:
             return
-        if result.hull is None:
+        known, rough, hull = result
+        if hull is None:
             self._show_hull([])
             return
         opened = bool(self._slice_box.value)
-        key = (result.key, result.rough, self._by_cable, opened)
+        key = (known, rough, self._by_cable, opened)
         if key != self._hull_key:
             self._hull_key = key
-            self._show_hull(
-                result.hull.by_cable if self._by_cable else result.hull.by_margin(self._scale), opened=opened
-            )
-            self._hull_html.content = block(result.hull.text)
+            self._show_hull(hull.by_cable if self._by_cable else hull.by_margin(self._scale), opened=opened)
+            self._hull_html.content = block(hull.text)
 
     def _compute(self, *, rough: bool) -> None:
         """Have the hull of the workspace that is shown computed in the background."""
@@ -236,11 +231,11 @@ class RegionFeature(Feature):
             if not message:  # superseded
                 self._receive(self._result)
             elif self._key == key:
-                self._receive(_Result(key, rough=False, hull=None))
+                self._receive((key, False, None))
                 self._refuse(message)
 
         self._task.start(
-            lambda: region_hull(query, rough, progress), lambda hull: self._receive(_Result(key, rough, hull)), failed
+            lambda: region_hull(query, rough, progress), lambda hull: self._receive((key, rough, hull)), failed
         )
 
     def _receive(self, result: _Result | None) -> None:
@@ -257,8 +252,8 @@ class RegionFeature(Feature):
         if self._region_box.value and self._levels is not None:
             here = self._levels.details(self._place[None])
             text = margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
-            if self._result is not None and self._result.hull is not None:
-                patches = near_patches(self._result.hull, self._place, REACH * self._size)
+            if self._result is not None and (hull := self._result[2]) is not None:
+                patches = near_patches(hull, self._place, REACH * self._size)
             self._margin_html.content = block(f"<b>Here</b> {text}")
         with self._server.atomic():
             draw_patches(self._nodes, "/wall", patches)

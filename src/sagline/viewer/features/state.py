@@ -55,7 +55,7 @@ MASS, SHARING, HAND = "platform-load", "tensions", "by-hand"  # names of two con
 SHOWN: Final = "print(tension)  # [N], cable by cable"
 
 
-def pose_text(pose: Pose) -> str:
+def _pose_text(pose: Pose) -> str:
     """A pose as the field takes it, to a tenth of a millimeter and a hundredth of a degree; no angles where level."""
     place = [_short(value, ".4f") for value in pose.position]
     angles = [_short(value, ".2f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
@@ -84,7 +84,7 @@ class StateFeature(Feature):
     def follow(self, view: View) -> None:
         """Send the pose."""
         self._view, self._time = view, self._page.player.clock.time
-        self._channel.send("pose", pose_text(view.snapshot.pose))
+        self._channel.send("pose", _pose_text(view.snapshot.pose))
 
     def tick(self) -> None:
         """Answer the requests for texts, when the changes before them are shown."""

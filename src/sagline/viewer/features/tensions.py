@@ -30,7 +30,7 @@ from sagline.viewer.tension_scale import force_unit, number
 NEAR: Final = 10.0  # px: marks that are closer are joined
 
 
-class MethodMark(NamedTuple):
+class _MethodMark(NamedTuple):
     """A tension distribution method with its result."""
 
     name: str
@@ -49,10 +49,10 @@ class MethodMarks:
     def __init__(self) -> None:
         """Begin without results."""
         self._key: tuple[object, ...] = ()
-        self._found: tuple[MethodMark, ...] = ()
+        self._found: tuple[_MethodMark, ...] = ()
         self._solvers: dict[str, InverseSolver] | None = None
 
-    def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[MethodMark, ...]:
+    def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[_MethodMark, ...]:
         """Results at the pose of a plan, at rest under its wrench."""
         state = plan.state
         place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
@@ -72,9 +72,9 @@ class MethodMarks:
         return self._found
 
 
-def grouped(marks: tuple[MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[MethodMark]]]:
+def grouped(marks: tuple[_MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[_MethodMark]]]:
     """Marks with a result, in groups of those at the same position, with the position [px]."""
-    groups: list[tuple[tuple[float, float], list[MethodMark]]] = []
+    groups: list[tuple[tuple[float, float], list[_MethodMark]]] = []
     for mark in marks:
         if mark.missing:
             continue
@@ -97,7 +97,7 @@ def _solvers(plan: Plan, names: list[str]) -> dict[str, InverseSolver]:
     return found
 
 
-def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> MethodMark:
+def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> _MethodMark:
     state = plan.state
     robot, pose = state.one_robot, state.pose
     if solver is not None:
@@ -107,9 +107,9 @@ def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> M
         try:
             found = inverse(robot, pose, state.cables.model, METHODS[name], state.wrench)
         except InvalidValueError as error:
-            return MethodMark(name, letter, np.full(robot.cable_count, np.nan), str(error))
+            return _MethodMark(name, letter, np.full(robot.cable_count, np.nan), str(error))
         tension, status = found.chord_tension, PoseStatus(int(found.status))
-    return MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
+    return _MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
 
 
 MOST_REDUNDANT: Final = 2  # redundant cables of a drawing
@@ -117,10 +117,10 @@ SHARING: Final = "sharing"  # topic of a chosen tension distribution method
 
 
 def polygon_figure(
-    snapshot: Snapshot, marks: tuple[MethodMark, ...] = (), field: DotField | None = None, back: str = ""
+    snapshot: Snapshot, marks: tuple[_MethodMark, ...] = (), field: DotField | None = None, back: str = ""
 ) -> str:
     """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
-    if remark := why_not_drawn(snapshot):
+    if remark := _why_not_drawn(snapshot):
         return sentence(remark)
     drawn = field_of(snapshot) if field is None else field
     if drawn is None:
@@ -132,12 +132,12 @@ def polygon_figure(
     )
 
 
-def polygon_later() -> str:
+def _polygon_later() -> str:
     """HTML: the polygon is not compiled yet."""
     return sentence(LATER.capitalize())
 
 
-def why_not_drawn(snapshot: Snapshot) -> str:
+def _why_not_drawn(snapshot: Snapshot) -> str:
     """Reason why the feasible tensions of a robot are not drawn; "" if they are."""
     redundant = snapshot.robot.cable_count - snapshot.robot.degrees_of_freedom
     if redundant > MOST_REDUNDANT:
@@ -167,7 +167,7 @@ def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
         return None
 
 
-def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[MethodMark, ...], *, movable: bool) -> str:
+def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[_MethodMark, ...], *, movable: bool) -> str:
     corners, places = field.corners, [field.place(corner) for corner in field.corners]
     outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
     if field.redundant == 2:
@@ -205,7 +205,7 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     )
 
 
-def _marks(field: DotField, marks: tuple[MethodMark, ...]) -> str:
+def _marks(field: DotField, marks: tuple[_MethodMark, ...]) -> str:
     """A mark for each tension distribution method, with its letter; those in one place share it."""
     parts = []
     for (x, y), group in grouped(marks, field):
@@ -235,7 +235,7 @@ def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
     return f"{how} Sides: limits of the cables. Width {unit.written(width)}, height {unit.written(height)}."
 
 
-def _key(snapshot: Snapshot, marks: tuple[MethodMark, ...], back: str) -> str:
+def _key(snapshot: Snapshot, marks: tuple[_MethodMark, ...], back: str) -> str:
     """The methods by their letters, as buttons; and the choice by hand, with a button to return to a method."""
     if not marks:
         return ""
@@ -307,8 +307,8 @@ class TensionsFeature(Feature):
         if not isinstance(snapshot, Snapshot):
             self._panel.show_polygon(sentence(snapshot.why_no_choice))
         elif not self._ready(Computation.POLYGON):
-            self._panel.show_polygon(polygon_later())
-        elif view.played is not None or snapshot.plan is None or why_not_drawn(snapshot):
+            self._panel.show_polygon(_polygon_later())
+        elif view.played is not None or snapshot.plan is None or _why_not_drawn(snapshot):
             self._panel.show_polygon(polygon_figure(snapshot))
         else:
             state = snapshot.plan.state
