@@ -56,7 +56,7 @@ def test_nonsense_is_no_camera(wrong: dict[str, object]) -> None:
 
 @pytest.mark.parametrize("name", ["falcon-7", "cogiro", "fast"])
 def test_a_ray_meets_the_platform_where_each_triangle_by_itself_is(name: str) -> None:
-    body = shapes.platform(sl.load_robot(name))
+    body = shapes.platform_solid(sl.load_robot(name))
     size = float(np.abs(body.vertices).max())
     random = np.random.default_rng(4)
     hits = 0

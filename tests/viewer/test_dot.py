@@ -16,7 +16,7 @@ import sagline as sl
 from sagline.viewer.by_hand import BY_HAND, ByHand, DotField
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.state import code_of
-from sagline.viewer.features.tensions import MethodMarks, field_of, grouped, polygon_figure
+from sagline.viewer.features.tensions import MethodMarks, dot_field_of, grouped, polygon_figure
 from sagline.viewer.page import Page, Source, home_pose
 from sagline.viewer.snapshot import METHODS, Settings, Snapshot, snapshot_at
 from tests.effort import best_rate
@@ -77,7 +77,7 @@ def nearest_by_program(polygon: sl.TensionPolygon, low: Any, high: Any, at: np.n
 @pytest.mark.parametrize("name", ["cogiro", "falcon-7", "ipanema-1"])
 def test_dot_stays_at_the_nearest_point_of_the_field(name: str) -> None:
     robot, generator = sl.load_robot(name), np.random.default_rng(3)
-    field = field_of(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
+    field = dot_field_of(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None))
     assert field is not None
     polygon = field.polygon
     for _ in range(10):
@@ -93,7 +93,7 @@ def test_dot_stays_at_the_nearest_point_of_the_field(name: str) -> None:
 def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
     robot = sl.load_robot("ipanema-1").replace(tension_max=np.inf)
     snapshot = snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None)
-    field = field_of(snapshot)
+    field = dot_field_of(snapshot)
     assert field is not None
     assert None in field.sides
     assert np.ptp(field.corners, axis=0).max() < 5e3  # not the 1e5 N that stand in for infinity
@@ -104,7 +104,7 @@ def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
         if side is not None:
             assert at_limit[side.cable]
     one = sl.load_robot("falcon-7").replace(tension_max=np.inf)
-    line = field_of(snapshot_at(one, home_pose(one), Settings(mass=one.mass), None))
+    line = dot_field_of(snapshot_at(one, home_pose(one), Settings(mass=one.mass), None))
     assert line is not None
     assert np.isfinite(line.corners).all()
 
@@ -113,7 +113,7 @@ def test_a_field_without_an_end_is_drawn_as_far_as_what_is_known() -> None:
 def test_chosen_tensions_balance_with_heavy_cables_and_keep_their_limits(page: Shown) -> None:
     generator = np.random.default_rng(4)
     with Client(page.port) as client:
-        field = field_of(seen(page))
+        field = dot_field_of(seen(page))
         assert field is not None
         pulls = []
         for _ in range(12):
@@ -130,7 +130,7 @@ def test_chosen_tensions_balance_with_heavy_cables_and_keep_their_limits(page: S
             assert moment < 1e-7 * scale
             assert np.all(snapshot.tension >= HEAVY.tension_min - 1e-9 * scale)
             assert np.all(snapshot.tension <= HEAVY.tension_max + 1e-9 * scale)
-            drawn = field_of(snapshot)
+            drawn = dot_field_of(snapshot)
             assert drawn is not None
             assert drawn.polygon.coordinates(snapshot.tension) == pytest.approx(drawn.nearest(at), abs=1e-2 * scale)
             pulls.append(plan.state.pull)
@@ -151,7 +151,7 @@ def test_code_of_what_is_chosen_by_hand_gives_its_tensions(page: Shown) -> None:
 
 def test_steps_add_up_and_stop_at_the_sides() -> None:
     with contextmanager(shown)(lambda server: Page(server, FEATURES, HEAVY)) as page, Client(page.port) as client:
-        field = field_of(seen(page))  # as large as the first at a pose are the steps there
+        field = dot_field_of(seen(page))  # as large as the first at a pose are the steps there
         assert field is not None
         start = moved(page, client, {"at": [0.0, 0.0]})
         for _ in range(5):
@@ -176,7 +176,7 @@ def test_a_drag_keeps_the_tensions_nearest_to_those_chosen(page: Shown) -> None:
             snapshot = seen(page)
             assert snapshot.plan is not None
             assert snapshot.plan.feasible
-            field = field_of(snapshot)
+            field = dot_field_of(snapshot)
             assert field is not None
             wanted = field.polygon.basis @ chosen
             expected = nearest_by_program(field.polygon, HEAVY.tension_min, HEAVY.tension_max, wanted)
@@ -223,7 +223,7 @@ def test_marks_are_where_their_ways_are() -> None:
     robot = sl.load_robot("article-suspended")
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
-    field, found = field_of(snapshot), MethodMarks()
+    field, found = dot_field_of(snapshot), MethodMarks()
     assert field is not None
     assert snapshot.plan is not None
     marks = found.at(snapshot.plan, further=True)
@@ -290,16 +290,16 @@ def test_what_a_way_misses_is_told() -> None:
     marks = MethodMarks().at(snapshot.plan, further=True)
     missing = {mark.name: mark.missing for mark in marks if mark.missing}
     assert "ClosedForm" in missing
-    html = polygon_figure(snapshot, marks, field_of(snapshot))
+    html = polygon_figure(snapshot, marks, dot_field_of(snapshot))
     assert re.search(r"ClosedForm: none", html)
 
 
 def test_a_field_keeps_its_place_while_the_dot_moves() -> None:
     settings = Settings(mass=HEAVY.mass)
-    first = field_of(snapshot_at(HEAVY, home_pose(HEAVY), settings, None))
+    first = dot_field_of(snapshot_at(HEAVY, home_pose(HEAVY), settings, None))
     assert isinstance(first, DotField)
     hand = ByHand(target=first.tension(first.corners[0]))
-    second = field_of(snapshot_at(HEAVY, home_pose(HEAVY), Settings(mass=HEAVY.mass, tension=hand), None), first)
+    second = dot_field_of(snapshot_at(HEAVY, home_pose(HEAVY), Settings(mass=HEAVY.mass, tension=hand), None), first)
     assert second is not None
     assert second.scale == first.scale
     np.testing.assert_array_equal(second.middle, first.middle)

@@ -215,7 +215,7 @@ def test_every_natural_frequency_among_the_readings_is_pressed_to_see_its_mode(n
     seen = snapshot_at(robot, home_pose(robot), Settings(robot.mass), None)
     assert seen.plan is not None
     frequency = sl.modes(seen.plan.state).frequency
-    text = readout.numbers(seen, TensionScale.of(robot), np.append(frequency, [0.0, np.nan]))
+    text = readout.numbers_html(seen, TensionScale.of(robot), np.append(frequency, [0.0, np.nan]))
     pressed = re.findall(r'<button class="shake" data-send="mode" data-value="([^"]*)"[^>]*>([^<]*)</button>', text)
     found = vibration(seen.plan.state, up_to=1.0)
     assert len(pressed) == len(frequency) == 6

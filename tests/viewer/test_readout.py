@@ -27,7 +27,7 @@ def test_table_holds_the_numbers_of_every_cable() -> None:
     snapshot = snapshot_at(ROBOT, sl.Pose([1.0, 0.5, 2.0], np.eye(3)), Settings(mass=50.0), None)
     plan = sl.inverse(ROBOT, sl.Pose([1.0, 0.5, 2.0], np.eye(3)))
     frequency = sl.modes(plan.state).frequency
-    html = readout.numbers(snapshot, SCALE, frequency)
+    html = readout.numbers_html(snapshot, SCALE, frequency)
     rows = cells(html)
     assert [row[0].split()[-1] for row in rows] == [str(i) for i in range(8)]
     told = np.array([[float(cell) for cell in row[1:]] for row in rows])
@@ -84,19 +84,19 @@ def test_other_answers_than_a_proof_are_not_called_infeasible() -> None:
 
 def test_no_number_has_a_false_sign_or_runs_out_of_its_column() -> None:
     turned = sl.Pose.from_euler([-1e-5, 0.0, 1.0], -1e-5, -1e-7, 0.0)
-    text = readout.numbers(snapshot_at(ROBOT, turned, Settings(mass=50.0), None), SCALE, None)
+    text = readout.numbers_html(snapshot_at(ROBOT, turned, Settings(mass=50.0), None), SCALE, None)
     assert "-0.0" not in text
     assert "0.000, 0.000, 1.000 m" in text
     for name in sl.robot_names():
         robot = sl.load_robot(name)
-        shown = readout.numbers(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None), SCALE, None)
+        shown = readout.numbers_html(snapshot_at(robot, home_pose(robot), Settings(mass=robot.mass), None), SCALE, None)
         assert max(len(cell) for row in cells(shown) for cell in row) <= 8
         assert "e+" not in shown
 
 
 def test_infeasible_pose_shows_dashes_and_the_reason() -> None:
     snapshot = snapshot_at(ROBOT, sl.Pose([7.2, 3.0, 1.5], np.eye(3)), Settings(mass=50.0), None)
-    assert all(cell == "–" for row in cells(readout.numbers(snapshot, SCALE, None)) for cell in row[1:])
+    assert all(cell == "–" for row in cells(readout.numbers_html(snapshot, SCALE, None)) for cell in row[1:])
     assert "Not feasible" in readout.verdict(snapshot)
     assert snapshot.reason in readout.verdict(snapshot)
 
@@ -130,7 +130,7 @@ def test_until_the_first_numbers_the_page_says_what_it_waits_for() -> None:
 def test_robots_with_pulleys_show_wraps_and_all_cable_off_the_drum() -> None:
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=[0.0] + [0.2] * 7, dead_cable=4.0, dead_rise=1.0))
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))
-    html = readout.numbers(snapshot_at(robot, pose, Settings(mass=50.0), None), SCALE, None)
+    html = readout.numbers_html(snapshot_at(robot, pose, Settings(mass=50.0), None), SCALE, None)
     plan = sl.inverse(robot, pose)
     assert plan.wrap_angle is not None
     told = cells(html)
@@ -140,9 +140,9 @@ def test_robots_with_pulleys_show_wraps_and_all_cable_off_the_drum() -> None:
     plain_spaces = html.replace("\N{NO-BREAK SPACE}", " ")
     assert "radius 0 m to 0.2 m, " in plain_spaces
     assert "dead cable 4 m, drawn" in plain_spaces
-    assert "not known" not in readout.numbers(
+    assert "not known" not in readout.numbers_html(
         snapshot_at(robot.replace(winches=sl.Winch(pulley_radius=0.2)), pose, Settings(mass=50.0), None), SCALE, None
     )
-    plain = readout.numbers(snapshot_at(ROBOT, pose, Settings(mass=50.0), None), SCALE, None)
+    plain = readout.numbers_html(snapshot_at(ROBOT, pose, Settings(mass=50.0), None), SCALE, None)
     assert "wrap" not in plain
     assert "Pulleys" not in plain

@@ -85,6 +85,6 @@ def test_dead_cable_is_dashed_where_its_way_is_not_known(server: PageServer) -> 
         points = np.asarray(node(server, name).points)
         assert np.linalg.norm(points[:, 1] - points[:, 0], axis=1).sum() == pytest.approx(runs, rel=1e-5)
     low, high = stage.extent(home_pose(robot))
-    drums = shapes.winches(robot).vertices
+    drums = shapes.winch_solid(robot).vertices
     assert np.all(drums > low)
     assert np.all(drums <= high)

@@ -5,16 +5,16 @@ import pytest
 
 import sagline as sl
 from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_history, model_name, snapshot_at
-from sagline.viewer.tension_scale import ForceUnit, number
+from sagline.viewer.tension_scale import ForceUnit, number_text
 
 
 @pytest.mark.parametrize("value", [-0.04, -1e-300, -0.0, 0.0, 0.049])
 def test_what_rounds_to_zero_has_no_sign(value: float) -> None:
-    assert number(value, ".1f") == "0.0"
+    assert number_text(value, ".1f") == "0.0"
 
 
 def test_no_number_is_a_dash() -> None:
-    assert number(np.nan, ".1f") == number(np.inf, ".3f") == "–"
+    assert number_text(np.nan, ".1f") == number_text(np.inf, ".3f") == "–"
 
 
 def test_forces_of_a_robot_keep_one_unit() -> None:

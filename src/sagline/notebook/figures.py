@@ -1,4 +1,4 @@
-"""The small figures of notebooks, each drawn in a second or less however large the result is."""
+"""Small figures of notebooks, each drawn in a second or less for results of any size."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array, Flags, Indices
 
 STYLE: Final = replace(PLAIN, name="notebook", width=6.0, height=0.8, direct=True)
-MOST_SAMPLES: Final = 300  # of a course
+MOST_SAMPLES: Final = 300  # of a line
 MOST_CABLES: Final = 16
 LEVELS: Final = 4  # slices of a workspace that are drawn
 
 LARGEST: Final = 200_000  # bytes of a figure
-MOST_MARKS: Final = 1500  # points, that are drawn as such; more are one picture within the figure
-DOTS: Final = 110  # dots an inch of that
+MOST_MARKS: Final = 1500  # points drawn as vectors; more are one picture in the figure
+DOTS: Final = 110  # per inch, of that picture
 FONT: Final = "'DejaVu Sans', Verdana, sans-serif"
 _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|<defs>\s*<style.*?</style>\s*</defs>", flags=re.DOTALL)
 _gray = re.compile(r"\b(fill|stroke): #([0-9a-f]{2})\2\2(?![0-9a-f])")
@@ -61,15 +61,15 @@ _family = re.compile(r"font-family: 'DejaVu Sans'(?:, 'DejaVu Sans')?;? ?")
 
 
 def drawing_of(thing: object, description: str) -> str:
-    """The figure in the notebook's style and colors as HTML; nothing if there is none."""
+    """The figure in the style and colors of the notebook as HTML; "" if there is none."""
     with Using(STYLE):
         figure = figure_of(thing)
-        return "" if figure is None else _inline(figure, description)
+        return "" if figure is None else _html(figure, description)
 
 
 @singledispatch
 def figure_of(thing: object) -> Figure | None:
-    """A small figure of something; None of what has none."""
+    """A small figure of an object; None for an object without one."""
     return None
 
 
@@ -85,7 +85,7 @@ def _(plan: Plan) -> Figure | None:
     state = plan.state
     if not state.pose.shape:
         return _whole(draw_at_rest(state.one_robot, state.pose, plan))
-    return _courses(*abscissa(plan), plan.chord_tension, TENSIONS["chord_tension"][0], ~plan.feasible)
+    return _time_lines(*abscissa(plan), plan.chord_tension, TENSIONS["chord_tension"][0], ~plan.feasible)
 
 
 @figure_of.register
@@ -94,12 +94,12 @@ def _(proof: Confirmation) -> Figure | None:
     if not plan.state.pose.shape:
         return None
     error = 1e3 * proof.position_error
-    return _courses(*abscissa(plan), error, "position error [mm]", ~proof.held, ("$x$", "$y$", "$z$"))
+    return _time_lines(*abscissa(plan), error, "position error [mm]", ~proof.held, ("$x$", "$y$", "$z$"))
 
 
 @figure_of.register
 def _(run: Simulation) -> Figure | None:
-    return _courses(run.time, TIME, run.tensions, "tension at the frame [N]", np.zeros(run.time.size, dtype=bool))
+    return _time_lines(run.time, TIME, run.tensions, "tension at the frame [N]", np.zeros(run.time.size, dtype=bool))
 
 
 @figure_of.register
@@ -115,7 +115,7 @@ def _(path: Path) -> Figure | None:
 
 @figure_of.register
 def _(space: Workspace) -> Figure | None:
-    """The boundary at some heights, seen from above; of a flat workspace in its own plane."""
+    """Boundary at some heights, from above; of a flat workspace in its own plane."""
     sides = [k for k, axis in enumerate(space.axes) if axis.size > 1]
     if space.volume <= 0.0 or len(sides) < 2:
         return None
@@ -140,17 +140,17 @@ def _(found: Calibration) -> Figure | None:
     return calibration(found, "residuals")
 
 
-def _courses(
+def _time_lines(
     clock: Array, axis: str, values: Array, label: str, gaps: Flags, names: tuple[str, ...] | None = None
 ) -> Figure:
-    """Lines over time, with as many samples as are seen."""
+    """Lines over time, with as many samples as are visible."""
     figure = sheet(3.2)
     ax = figure.add_subplot()
     chosen = _chosen(values)
-    for i, course in enumerate(values[chosen].T[:MOST_CABLES]):
+    for i, line in enumerate(values[chosen].T[:MOST_CABLES]):
         look = {"color": COLORS[i], "label": names[i]} if names else {**cable_look(i), "label": f"cable {i}"}
-        draw_series(ax, clock[chosen], course, **look, linewidth=1.2)
-    shade_spans(ax, clock, true_runs(gaps)[:MOST_SAMPLES], "no answer")
+        draw_series(ax, clock[chosen], line, **look, linewidth=1.2)
+    shade_spans(ax, clock, true_runs(gaps)[:MOST_SAMPLES], "not feasible")
     format_axes(ax, axis, label)
     if axis == "pose":
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -177,8 +177,8 @@ def _whole(ax: object) -> Figure | None:
     return figure if isinstance(figure, Figure) else None
 
 
-def _inline(figure: Figure, description: str) -> str:
-    """The figure as a drawing, or as a picture if that is smaller; nothing if both are too large."""
+def _html(figure: Figure, description: str) -> str:
+    """The figure as SVG, or as PNG if that is smaller; "" if both are too large."""
     lines = [line for ax in figure.findobj(lambda each: hasattr(each, "get_lines")) for line in ax.get_lines()]  # type: ignore[attr-defined]
     if sum(len(line.get_xdata()) for line in lines if line.get_marker() not in ("None", None)) > MOST_MARKS:
         for line in lines:
@@ -199,9 +199,9 @@ def _ink(gray: re.Match[str]) -> str:
 
 
 def _themed(svg: str, description: str) -> str:
-    """A drawing in the colors of the page: what is black has the color of its text, what is gray has less of it.
+    """A drawing in the colors of the page: black becomes the color of its text, gray the same with less opacity.
 
-    Names inside are made its own, so that many drawings stand on one page.
+    Its inner names become unique, so that several drawings can be on one page.
     """
     svg = _family.sub("", _remarks.sub("", svg)).strip()
     svg = _gray.sub(_ink, svg)

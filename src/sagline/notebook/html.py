@@ -1,4 +1,4 @@
-"""A piece of a notebook's page: the verdict and a figure, in the notebook's own colors, light or dark."""
+"""HTML representation in notebooks: the verdict and a figure, in the light or dark colors of the notebook."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def html_of(thing: object) -> str | None:
 
 
 def _figure_of(thing: object, description: str) -> str:
-    """The figure; nothing if there is none, or it cannot be drawn."""
-    with suppress(Exception):  # the summary is there without it; Matplotlib may be missing
+    """The figure; "" if there is none, or it cannot be drawn."""
+    with suppress(Exception):  # the summary is shown without it; Matplotlib may be missing
         from sagline.notebook.figures import drawing_of
 
         return drawing_of(thing, description)

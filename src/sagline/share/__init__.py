@@ -1,1 +1,1 @@
-"""A robot, or a run of it, as one page that needs nothing else: no server, no network, nothing to install."""
+"""A robot or a run as one HTML page, without server, network and installation."""

@@ -1,4 +1,4 @@
-"""Samples that a page plays: poses, tensions and lengths over time, with a verdict for each."""
+"""Samples that a shared page plays: poses, tensions and lengths over time, with a verdict for each."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ from sagline.statics.tables import chord_geometry
 if TYPE_CHECKING:
     from sagline.viewer.session import PlayedLog
 
-MOST_RATE: Final = 100.0  # samples a second; of twice as many and more a page keeps some: screens show 60
+MOST_RATE: Final = 100.0  # samples per second; a page keeps a part of twice as many or more, as screens show 60
 
 
 class _SampleVerdict(NamedTuple):
     """Verdict on a sample."""
 
-    good: bool | None  # whether all is well; None where there is nothing to judge
-    words: str  # the sentence
+    good: bool | None  # None without a judgment
+    words: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,17 +39,17 @@ class SharedMotion:
     """N samples of a robot in motion."""
 
     robot: Robot
-    kind: str  # what it is, in a word
+    kind: str  # "run", "simulation" or "log"
     time: Array  # from 0 on [s], shape (N,)
     position: Array  # of the platform's origin [m], shape (N, 3); NaN where it is not known
     quaternion: Array  # its rotation, scalar last, shape (N, 4)
-    tension: Array  # what is told and colored [N], shape (N, m)
-    quantity: str  # which tension that is
-    chord_tension: Array  # with which cables are drawn [N], shape (N, m); NaN draws a straight line
+    tension: Array  # for numbers and colors [N], shape (N, m)
+    quantity: str  # place of that tension, in words
+    chord_tension: Array  # of the drawn catenaries [N], shape (N, m); NaN for a straight line
     length: Array  # unstrained, off the drum [m], shape (N, m)
-    verdict: NDArray[np.intp]  # which of the verdicts, shape (N,)
-    verdicts: tuple[_SampleVerdict, ...]  # all that are said
-    notes: tuple[str, ...] = ()  # what is to be known of the page
+    verdict: NDArray[np.intp]  # indices of `verdicts`, shape (N,)
+    verdicts: tuple[_SampleVerdict, ...]
+    notes: tuple[str, ...] = ()
 
     def pose_at(self, index: int) -> Pose | None:
         """Pose of the platform at a sample; None if it is not known."""
@@ -58,7 +58,7 @@ class SharedMotion:
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
 
     def thinned(self) -> SharedMotion:
-        """Every so many samples, and the last, where there are more than a screen shows; the notes say so."""
+        """A regular selection with the last sample, where there are more than a screen shows, and a note about it."""
         count, duration = len(self.time), float(self.time[-1])
         every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
         if every <= 1:
@@ -73,7 +73,7 @@ class SharedMotion:
 
 
 def of_plan(plan: Plan) -> SharedMotion:
-    """A plan of N poses in a row, one second each where they have no times."""
+    """A plan of N poses, one second each without times."""
     count = len(plan.state.pose)
     time = np.arange(count, dtype=np.float64) if plan.path is None else plan.path.time
     verdicts = [_SampleVerdict(True, "Feasible")]
@@ -105,15 +105,15 @@ def _why(gap: Gap) -> str:
 
 
 def of_simulation(simulation: Simulation) -> SharedMotion:
-    """A simulation; cables with mass are drawn as massless ones of their lengths hang."""
+    """A simulation; cables with mass are drawn as massless catenaries of the same lengths."""
     robot, time = simulation.robot, simulation.time
     broken = np.zeros_like(simulation.tensions, dtype=bool)
-    said = [_SampleVerdict(None, "Simulated")]
+    verdicts = [_SampleVerdict(None, "Simulated")]
     which = np.zeros(len(time), dtype=np.intp)
     for event in simulation.events:
         of = "" if event.cable is None else f" of cable {event.cable}"
-        which[time >= event.time] = len(said)
-        said.append(_SampleVerdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
+        which[time >= event.time] = len(verdicts)
+        verdicts.append(_SampleVerdict(None, f"{event.kind.capitalize()}{of} at {event.time - time[0]:.3f} s"))
         if event.kind == "break" and event.cable is not None:
             broken[time >= event.time, event.cable] = True
     tension = np.where(broken, np.nan, simulation.tensions)
@@ -122,14 +122,14 @@ def of_simulation(simulation: Simulation) -> SharedMotion:
     pose = simulation.pose
     return SharedMotion(
         robot, "simulation", time - time[0], pose.position, pose.quaternion, tension, "at the frame end", drawn,
-        simulation.length, which, tuple(said), notes,
+        simulation.length, which, tuple(verdicts), notes,
     )  # fmt: skip
 
 
 def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
-    """Chord tensions of massless cables of these lengths off the drum, (N, m); NaN where a length is none.
+    """Chord tensions of massless cables of these lengths off the drum, (N, m); NaN for NaN or too short lengths.
 
-    Over a pulley they leave along the chord.
+    Cables leave their pulleys along the chord.
     """
     found = chord_geometry(robot, pose)
     chord, sine, cosine = (np.asarray(found[:, row]) for row in (geometry.CHORD, geometry.SINE, geometry.COSINE))
@@ -142,18 +142,18 @@ def chord_tension(robot: Robot, pose: Pose, length: Array) -> Array:
 
 
 def of_session(session: PlayedLog) -> SharedMotion:
-    """A controller's log: the platform where it was to be, beside a plan where it was estimated to be."""
+    """A log of the controller: planned poses of the platform, or estimated ones without a plan."""
     from sagline.viewer.session import WRONG
 
-    wanted = np.isfinite(session.planned).all(axis=1, keepdims=True)
+    planned = np.isfinite(session.planned).all(axis=1, keepdims=True)
     row = np.maximum(session.shown, 0)
-    position = np.where(wanted, session.planned, session.position[row])
-    quaternion = np.where(wanted, session.planned_quaternion, session.quaternion[row])
+    position = np.where(planned, session.planned, session.position[row])
+    quaternion = np.where(planned, session.planned_quaternion, session.quaternion[row])
     codes, which = np.unique(session.state, return_inverse=True)
     states = [State(int(code)) for code in codes]
     verdicts = tuple(_SampleVerdict(False if state in WRONG else None, f"Controller: {state.name}") for state in states)
     unknown = ~np.isfinite(position).all(axis=1)
-    if unknown.any():  # nothing was known before, or ever
+    if unknown.any():  # no earlier pose is known
         somewhere = session.pose_at(int(np.argmax(unknown)))
         position[unknown], quaternion[unknown] = somewhere.position, somewhere.quaternion
     drawn = chord_tension(session.robot, Pose.from_quaternion(position, quaternion), session.length)

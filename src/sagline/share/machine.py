@@ -1,4 +1,4 @@
-"""A robot as a page needs it: its data, its solids and a drawing for pages without JavaScript."""
+"""Data and solids of a robot for a shared page, and a drawing for pages without JavaScript."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from sagline.share.packing import PackedColumn, encode_columns
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
-DIGITS: Final = 12  # of the numbers a page calculates with
-FINEST: Final = 1e-5  # of the robot's size, to which its solids are drawn
+DIGITS: Final = 12  # of the numbers in a page
+FINEST: Final = 1e-5  # of the robot's size: resolution of its solids
 WIDE: Final = 640.0  # px
 EDGE: Final = 12.0  # px around it
 _RIGHT: Final = np.array([0.9, 0.436, 0.0])
@@ -28,7 +28,7 @@ _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2,
 
 
 def model_data(robot: Robot) -> dict[str, Any]:
-    """Data of the model of docs/model.md, for page/robot.js; None stands for no upper limit."""
+    """Data of the model of docs/model.md, for page/robot.js; None for no upper limit."""
     radius, entry = pulleys_of(robot)
     winches = robot.winches
     nothing = np.zeros(robot.cable_count)
@@ -50,30 +50,30 @@ def model_data(robot: Robot) -> dict[str, Any]:
     }
     return {
         "mass": robot.mass,
-        "center_of_mass": numbers(robot.center_of_mass),
+        "center_of_mass": json_numbers(robot.center_of_mass),
         "gravity": robot.gravity,
-        "freedom": numbers(robot.freedom),
+        "freedom": json_numbers(robot.freedom),
         "limits_of": robot.tension_limits_of,
-        "cables": [{name: numbers(column[i]) for name, column in whole.items()} for i in range(robot.cable_count)],
+        "cables": [{name: json_numbers(column[i]) for name, column in whole.items()} for i in range(robot.cable_count)],
     }
 
 
 def solids_data(robot: Robot) -> dict[str, Any]:
     """Solids of frame, winches and platform, for page/scene.js."""
     low, high = bounds(robot)
-    body, size = shapes.platform(robot), shapes.size_of(robot)
-    drawn = {"frame": shapes.frame(robot), "winches": shapes.winches(robot), "platform": body}
+    body, size = shapes.platform_solid(robot), shapes.size_of(robot)
+    drawn = {"frame": shapes.frame_solid(robot), "winches": shapes.winch_solid(robot), "platform": body}
     meshes = {name: _triangles(each, size) for name, each in drawn.items() if len(each.faces)}
     least, most = body.vertices.min(axis=0), body.vertices.max(axis=0)
     middle, grip = 0.5 * (least + most), 0.5 * float(np.linalg.norm(most - least))
-    there = np.vstack((low, high, home_pose(robot).transform(body.vertices)))  # a platform may stand out of its frame
-    seen = [numbers(there.min(axis=0)), numbers(there.max(axis=0))]
-    box = {"low": numbers(low), "high": numbers(high), "seen": seen}
-    return {**box, "middle": numbers(middle), "grip": numbers(grip), **meshes}
+    there = np.vstack((low, high, home_pose(robot).transform(body.vertices)))  # a platform may extend beyond its frame
+    seen = [json_numbers(there.min(axis=0)), json_numbers(there.max(axis=0))]
+    box = {"low": json_numbers(low), "high": json_numbers(high), "seen": seen}
+    return {**box, "middle": json_numbers(middle), "grip": json_numbers(grip), **meshes}
 
 
 def colors(robot: Robot) -> dict[str, Any]:
-    """The colors of tensions, with the numbers beside them."""
+    """Colors of tensions with their numbers."""
     scale, unit = TensionScale.of(robot), ForceUnit.up_to(float(_highest(robot)))
     shares = np.linspace(0.0, 1.0, 24)
     steps = scale.low * (scale.high / scale.low) ** shares
@@ -89,10 +89,10 @@ def colors(robot: Robot) -> dict[str, Any]:
     }
 
 
-def numbers(values: Any) -> Any:
-    """Numbers for JSON, as short as they say the same; None for infinite ones."""
+def json_numbers(values: Any) -> Any:
+    """Numbers for JSON, rounded to `DIGITS`; None for infinite ones."""
     if np.ndim(values):
-        return [numbers(each) for each in values]
+        return [json_numbers(each) for each in values]
     value = float(values)
     short = float(f"{value:.{DIGITS}g}")
     return (int(short) if short == int(short) and abs(short) < 1e15 else short) if isfinite(value) else None
@@ -104,12 +104,12 @@ def _highest(robot: Robot) -> float:
 
 
 def _triangles(solid: shapes.Solid, size: float) -> tuple[dict[str, object], str]:
-    """The corners of all triangles, one after the other, packed."""
+    """Corners of all triangles, encoded."""
     return encode_columns([PackedColumn("corners", solid.vertices[solid.faces].reshape(-1, 3), FINEST * size)])
 
 
 def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
-    """The cables of a robot as they hang at chord tensions, between frame and platform, as SVG."""
+    """SVG of frame, platform and the catenaries of chord tensions."""
     ends = shapes.chords(robot, pose)
     run = ends[:, 1] - ends[:, 0]
     known = np.isfinite(tension) & (np.linalg.norm(run, axis=1) > 0.0)
@@ -119,7 +119,7 @@ def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
         courses = shapes.catenaries(ends, cables, 1.0)
     low, high = bounds(robot)
     frame = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, -1).T
-    body = shapes.platform(robot)
+    body = shapes.platform_solid(robot)
     box = np.array(np.meshgrid(*zip(body.vertices.min(axis=0), body.vertices.max(axis=0), strict=True), indexing="ij"))
     platform = pose.transform(box.reshape(3, -1).T)
     groups = [_seen(each) for each in (frame, platform, *courses)]
@@ -138,7 +138,7 @@ def robot_drawing(robot: Robot, pose: Pose, tension: Array) -> str:
 
 
 def _seen(points: Array) -> Array:
-    """Right and down, shape (..., 2)."""
+    """Projection to the right and down, shape (..., 2)."""
     return np.stack((points @ _RIGHT, -(points @ _UP)), axis=-1)
 
 

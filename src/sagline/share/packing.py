@@ -1,4 +1,4 @@
-"""States as a page carries them: whole numbers, their differences in time, deflated; page/states.js reads them."""
+"""Encoding of samples in a page, for page/states.js: whole numbers, differences in time, deflate."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from sagline.core.arrays import Array
 
 Codes = NDArray[np.int64]
 
-_ORDERS: Final = (0, 1, 2, 3)  # of differences: the one of which least is left is kept
+_ORDERS: Final = (0, 1, 2, 3)  # of differences: the one with the smallest values is used
 _LEVEL: Final = 9
 
 
 class PackedColumn(NamedTuple):
-    """Something that a page knows over time."""
+    """A quantity over time in a page."""
 
-    name: str  # as the page knows it
+    name: str
     values: Array  # shape (N,) or (N, k); NaN where there is none
-    step: float  # of the numbers that are kept, in the values' unit; relative ones as share of the value
+    step: float  # resolution, in the unit of the values, or relative to the value
     scale: Literal["linear", "relative"] = "linear"  # "linear", or "relative" of values above zero
 
 
 def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object], str]:
-    """Encode channels for a page."""
+    """Description of columns, and their encoded values."""
     described, planes = [], []
     for channel in channels:
         values = channel.values.reshape(len(channel.values), -1)
@@ -44,7 +44,7 @@ def encode_columns(channels: Sequence[PackedColumn]) -> tuple[dict[str, object],
 
 
 def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
-    """The nearest whole numbers of steps; and the one that stands for nothing, None where it is not needed."""
+    """The nearest whole numbers of steps, and the code of a missing value; None if there are no missing values."""
     known = np.isfinite(values)
     if channel.scale == "relative":
         known &= values > 0.0
@@ -59,7 +59,7 @@ def _codes(channel: PackedColumn, values: Array) -> tuple[Codes, int | None]:
 
 
 def _least(column: Codes) -> tuple[int, int, Codes]:
-    """The order of differences of which least is left, how many bytes each takes, and they with the sign below."""
+    """Order of the smallest differences, their size in bytes, and the differences with the sign in the lowest bit."""
     found = []
     for order in _ORDERS:
         rest = column
@@ -71,5 +71,5 @@ def _least(column: Codes) -> tuple[int, int, Codes]:
 
 
 def _planes(codes: Codes, count: int) -> bytes:
-    """The lowest bytes of all, then the next."""
+    """The lowest bytes of all codes, then the next ones."""
     return b"".join((codes >> (8 * plane) & 255).astype(np.uint8).tobytes() for plane in range(count))

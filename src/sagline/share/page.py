@@ -1,4 +1,4 @@
-"""A robot or a run as one HTML page: styles, scripts and numbers are inside, and nothing is fetched."""
+"""A robot or a run as one HTML page that contains its styles, scripts and numbers."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from sagline.kinematics.inverse import inverse
 from sagline.robot.reach import bounds, home_pose
 from sagline.robot.robot import Robot
 from sagline.share.course import SharedMotion
-from sagline.share.machine import colors, model_data, numbers, robot_drawing, solids_data
+from sagline.share.machine import colors, json_numbers, model_data, robot_drawing, solids_data
 from sagline.share.packing import PackedColumn, encode_columns
-from sagline.viewer.tension_scale import number
+from sagline.viewer.tension_scale import number_text
 
 SCRIPTS: Final = (  # in the order in which they need each other
     "catenary.js", "sharing.js", "robot.js", "states.js", "theme.js",
     "renderer.js", "camera.js", "scene.js", "panel.js",
     "pointers.js", "player.js", "share.js",
 )  # fmt: skip
-MADE: Final = '<meta name="generator" content="sagline'  # by which a page of ours is known
-POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # steps: m, -, m, share of it, s
+MADE: Final = '<meta name="generator" content="sagline'  # mark of our pages
+POSITION, TURN, LENGTH, TENSION, TIME = 1e-5, 1e-6, 1e-5, 1e-4, 1e-6  # resolutions: m, -, m, relative, s
 SPEEDS: Final = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 RING: Final = '<div class="ring" data-part="ring" aria-hidden="true"></div>'
 HOME: Final = '<button type="button" class="home" data-part="home">Home</button>'
@@ -35,10 +35,10 @@ AROUND: Final = "Drag, or press the arrow keys, to look around; pinch, scroll or
 
 
 def robot_page(robot: Robot) -> str:
-    """A robot whose platform is dragged; the page finds the tensions itself."""
+    """Page of a robot whose platform can be dragged; its scripts compute the tensions."""
     at = home_pose(robot)
     plan = inverse(robot, at)
-    facts = {**_facts(robot), "home": {"position": numbers(at.position)}}
+    facts = {**_facts(robot), "home": {"position": json_numbers(at.position)}}
     return _filled(
         title=robot.name,
         about=_about(robot),
@@ -59,7 +59,7 @@ def robot_page(robot: Robot) -> str:
 
 
 def course_page(course: SharedMotion, title: str) -> str:
-    """A run that plays."""
+    """Page that plays a run."""
     robot, kept = course.robot, course.thinned()
     first = kept.pose_at(0)
     header, text = encode_columns(
@@ -125,9 +125,9 @@ def _about(robot: Robot) -> str:
 
 
 def _sliders(robot: Robot) -> str:
-    """One for each way that the platform is free to go along, and for a turn about the vertical."""
+    """Sliders of the free translations, and of the rotation about the vertical."""
     (low, high), at, freedom = bounds(robot), home_pose(robot).position, robot.freedom
-    free = np.linalg.norm(freedom.T @ freedom, axis=1) > 1.0 - 1e-9  # the whole axis, and not a part of it
+    free = np.linalg.norm(freedom.T @ freedom, axis=1) > 1.0 - 1e-9  # axes of free motion only, no combinations
     found = [
         _slider(f"<i>{name}</i>", axis, min(low[axis], at[axis]), max(high[axis], at[axis]), 1e-3)
         for axis, name in enumerate("xyz")
@@ -161,7 +161,7 @@ def _clock() -> str:
 def _table(robot: Robot, tension: Array, length: Array) -> str:
     """Table of the cables at the start, for pages without JavaScript."""
     rows = "".join(
-        f"<tr><td>{i}</td><td>{number(tension[i], ',.1f')}</td><td>{number(length[i], '.4f')}</td></tr>"
+        f"<tr><td>{i}</td><td>{number_text(tension[i], ',.1f')}</td><td>{number_text(length[i], '.4f')}</td></tr>"
         for i in range(robot.cable_count)
     )
     head = "".join(f'<th scope="col">{name}</th>' for name in ("cable", "tension [N]", "length [m]"))
@@ -169,7 +169,7 @@ def _table(robot: Robot, tension: Array, length: Array) -> str:
 
 
 def _precision() -> str:
-    """Largest rounding of the values that a page keeps, in words."""
+    """Largest rounding errors of the values in a page, in words."""
     return (
         f"Kept to {0.5e6 * POSITION:g} µm of positions and lengths, {0.5e6 * TURN:g} µrad of rotations, "
         f"{50.0 * TENSION:g} % of tensions. The catenaries are computed in this page."

@@ -39,7 +39,7 @@ KINDS: Final = MappingProxyType(
             _FaultKind("cell", "is wrong by #", "reads this much more", "N"),
             _FaultKind("cable", "breaks", "has neither tension nor weight any more", for_good=True),
             _FaultKind("encoder", "jumps by #", "counts this much more cable than there is", "mm", 1e-3, True),
-            _FaultKind("servo", "is limited to #", "gives no more force at the cable", "N", 1.0, True),
+            _FaultKind("servo", "is limited to #", "limits its force at the cable to this value", "N", 1.0, True),
             _FaultKind("servo", "trips", "has no power until the operator resets the machine", for_good=True),
             _FaultKind("load", "grows by #", "is added at the center of mass; removed if less than 0", "kg"),
             _FaultKind("emergency stop", "", "is pressed until the operator resets the machine", for_good=True),

@@ -32,7 +32,7 @@ from sagline.twin.link import (
     Report,
 )
 from sagline.twin.plc_program import Order, PlcLimits, Program
-from sagline.twin.start import check_step, initial_state, limits_of
+from sagline.twin.start import check_step, initial_state, winch_limits
 
 LOSSES: Final = Damping(loss_time=1e-3, air_damping=0.2)  # assumed; 2 N s/m of air damping on the prototype
 MOST_SEED: Final = 2**63 - 1
@@ -87,8 +87,8 @@ class Machine:
             nominal: The planned robot, with whose data the PLCs count and limit; None for the true one. The difference
                 of the two `length_zero` is the zero error of an encoder; without both of them there is none.
             start: Pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
-                platform is where the nominal lengths at this pose put it; the lengths that pulleys and dead cable of
-                the true robot add are not counted.
+                platform is where the nominal lengths at this pose put it; the lengths on pulleys and the dead
+                lengths that the true robot adds are not counted.
             surveyed: Whether the true platform was at this pose when the encoders were set.
             seed: Seed of noise, clocks and the network.
             period: Period of controller and PLCs [s], a whole multiple of the step.
@@ -124,7 +124,7 @@ class Machine:
         self._hardware = Hardware(robot, begin, losses, size, self.period, noise)
         check_step(robot, begin.state, size, self.period)
         self._parts = [slice(winches[0], winches[-1] + 1) for winches in self.groups]
-        self._programs = self._make_programs(limits_of(self.nominal, begin.nominal))
+        self._programs = self._make_programs(winch_limits(self.nominal, begin.nominal))
         self._clocks = np.random.default_rng((noise, 2)).uniform(0.0, 1e3, len(self.groups))
         self._group_rows = np.zeros((5, len(self.groups)), dtype=np.int64)
         self._whole = np.zeros((3, robot.cable_count), dtype=np.int64)

@@ -101,7 +101,7 @@ def initial_state(true: Robot, nominal: Robot, start: Any, surveyed: bool) -> St
         state = inverse(true, pose).state
         _feasible_lengths(state.unstrained_length, true, "start")
     else:
-        routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # on pulleys and dead cable, not counted
+        routed = _routed_length(true, pose) - _routed_length(nominal, pose)  # on pulleys, and dead lengths: not counted
         state = _rest_at(true, planned + routed + _zero_errors(true, nominal), pose)
     return Start(state, scale, _EncoderScale(true, state.unstrained_length, counts))
 
@@ -120,7 +120,7 @@ def _start_pose(robot: Robot, start: Any) -> Pose:
     return Pose.from_euler(0.5 * (robot.test_box.low + robot.test_box.high), 0.0, 0.0, 0.0)
 
 
-def limits_of(robot: Robot, scale: _EncoderScale) -> PlcLimits:
+def winch_limits(robot: Robot, scale: _EncoderScale) -> PlcLimits:
     """Limits of a robot's winches in the PLCs, each one list over all winches."""
     winch, anchors = robot.winches, robot.frame_anchors
     assert winch is not None
@@ -181,7 +181,7 @@ def _zero_errors(true: Robot, nominal: Robot) -> Array:
 
 
 def _routed_length(robot: Robot, pose: Pose) -> Array:
-    """Length on pulleys and dead cable [m], (m,)."""
+    """Length on pulleys and dead length [m], (m,)."""
     if robot.winches is None or not robot.winches.anything_behind:
         return np.zeros(robot.cable_count)
     whole, bare = (inverse(some, pose).unstrained_length for some in (robot, robot.replace(winches=None)))
@@ -191,4 +191,4 @@ def _routed_length(robot: Robot, pose: Pose) -> Array:
 def plc_limits(robot: Robot) -> PlcLimits:
     """Limits of a robot's winches in the PLCs, each one list over all winches."""
     planned = _feasible_lengths(inverse(robot, _start_pose(robot, None)).unstrained_length, robot, "test_box")
-    return limits_of(robot, _EncoderScale(robot, planned, np.zeros(robot.cable_count)))
+    return winch_limits(robot, _EncoderScale(robot, planned, np.zeros(robot.cable_count)))

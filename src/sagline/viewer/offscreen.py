@@ -25,7 +25,7 @@ _STOPS = 16  # of the bar's colors
 
 
 def strip_of(view: View, *remarks: str) -> dict[str, Any]:
-    """Texts and colors of the strip of a view, as JSON."""
+    """Texts and colors below a picture of a view, as JSON."""
     settings, scale = view.settings, view.scale
     unit = force_unit(view.snapshot.robot)
     drawn = [(settings.sag_scale, "sag"), (settings.error_scale, "errors")]

@@ -67,7 +67,7 @@ class Page:
     Attributes:
         server: A running server with nothing on it.
         robot: The robot; that of what is played, if anything is.
-        ready: Function that tells if a reading can be shown without waiting; call `refresh` when one has become ready.
+        ready: Function that returns whether a computation is compiled; call `refresh` when one has become ready.
         channel: Messages to and from browsers.
         panel: Controls and readings; a feature adds a tab to `panel.readings`.
         scene: The robot in the scene.
@@ -293,6 +293,6 @@ class Page:
             return snapshot.verdict, snapshot.numbers(self.scale)
         verdict, held = readout.verdict(snapshot, capacity=self.ready(Computation.MARGIN)), snapshot.feasible
         if not self.ready(Computation.FREQUENCIES):
-            return verdict, readout.numbers(snapshot, self.scale, None, frequencies_later=held)
+            return verdict, readout.numbers_html(snapshot, self.scale, None, frequencies_later=held)
         frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and held else None
-        return verdict, readout.numbers(snapshot, self.scale, frequencies)
+        return verdict, readout.numbers_html(snapshot, self.scale, frequencies)

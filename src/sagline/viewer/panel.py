@@ -84,7 +84,7 @@ class ControlPanel:
         for handle in (self._mass, self._density, self._stiffness, self._model, self._method):
             handle.visible = shown
         self._of_run.visible = not shown
-        self._of_run.content = readout.block(f'<div class="quiet">{reason}</div>')
+        self._of_run.content = readout.html_block(f'<div class="quiet">{reason}</div>')
         self._forgetting.visible = shown and depends_on_history(self._tension())
 
     def read_out(self, verdict: str, numbers: str) -> None:

@@ -17,18 +17,18 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.player import InMotion
-from sagline.viewer.readout import box, definitions
+from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, WANTED
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import ForceUnit, force_unit, number
+from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
 from sagline.viewer.timeline import (
     Chart,
     TimelineMark,
     Track,
     cable_names,
+    chart_limits,
     infeasible_spans,
     limit_violations,
-    tension_limits,
 )
 
 CABLES: Final = {
@@ -106,7 +106,7 @@ class PlayedPlan:
         """Charts of the limited tensions and the lengths, and spans of infeasible poses."""
         plan, robot, unit = self.plan, self.robot, force_unit(self.robot)
         name = "Chord tension" if robot.tension_limits_of == "chord" else "Tension at the winch"
-        limits = tension_limits(robot, unit.newtons, at=robot.tension_limits_of)
+        limits = chart_limits(robot, unit.newtons, at=robot.tension_limits_of)
         cables = cable_names(robot)
         tension = Chart(
             name, unit.name, unit.decimals, cables, lambda rows: plan.state.limited_tension[rows] / unit.newtons, limits
@@ -181,8 +181,8 @@ class PlayedSimulation:
             *(("Event", _event_text(event, unit)) for event in past),
         ]
         heads = ("cable", f"at the winch<br>[{unit.name}]", "length<br>[m]")
-        columns = [unit.bare(each) for each in tension], [number(each, ".4f") for each in length]
-        verdict = box("quiet", "Simulated", definitions(rows))
+        columns = [unit.bare(each) for each in tension], [number_text(each, ".4f") for each in length]
+        verdict = verdict_box("quiet", "Simulated", definitions(rows))
         nodes = None if simulation.nodes is None else np.asarray(simulation.nodes[k])
         return InMotion(
             self.robot, pose, k, tension, length, verdict, heads, columns, NO_CHOICE, nodes=nodes, broken=broken
@@ -207,7 +207,7 @@ class PlayedSimulation:
     def track(self) -> Track:
         """Charts of the tensions at the frame ends and the displacement, and the events."""
         simulation, robot, unit = self.simulation, self.robot, force_unit(self.robot)
-        limits = tension_limits(robot, unit.newtons, at="frame_end")
+        limits = chart_limits(robot, unit.newtons, at="frame_end")
         tension_rows = self._tensions()
         cables = cable_names(robot)
         tension = Chart(

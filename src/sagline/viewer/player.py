@@ -15,7 +15,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import touching_angle
 from sagline.viewer import shapes
-from sagline.viewer.readout import block, cable_table, pose_line
+from sagline.viewer.readout import cable_table_html, html_block, pose_line
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 from sagline.viewer.timeline import Track
@@ -43,7 +43,7 @@ class InMotion:
 
     def numbers(self, scale: TensionScale) -> str:
         """HTML of the pose, and of the table of the cables."""
-        return block(pose_line(self.pose) + cable_table(self.heads, self.columns, scale.colors(self.tension)))
+        return html_block(pose_line(self.pose) + cable_table_html(self.heads, self.columns, scale.colors(self.tension)))
 
     def courses(self, sag_scale: float) -> Array:
         """Points of the cables from frame anchor to platform end (m, P, 3); a broken cable stays at its anchor."""

@@ -19,14 +19,14 @@ from sagline.tension.margin import capacity_margin
 from sagline.viewer.server import chosen_by
 from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number
+from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number_text
 
 LATER = "compiling …"
 EXACT: Final = 1e-9  # m: smaller distances are rounding
 _ALONE = 1e-9  # of a robot's highest tension: distance to a limit that counts as at the limit
 
 
-def block(content: str) -> str:
+def html_block(content: str) -> str:
     """HTML with the font and the colors of page.css."""
     return f'<div class="sagline">{content}</div>'
 
@@ -39,8 +39,8 @@ def sentence(text: str) -> str:
 def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
     """Feasible or not, in one colored box; where not, why."""
     if snapshot.feasible:
-        return box("good", "Feasible", _summary(snapshot, capacity=capacity))
-    return box("bad", headline(snapshot), escape(snapshot.reason))
+        return verdict_box("good", "Feasible", _summary(snapshot, capacity=capacity))
+    return verdict_box("bad", headline(snapshot), escape(snapshot.reason))
 
 
 def headline(snapshot: Snapshot) -> str:
@@ -54,15 +54,15 @@ def headline(snapshot: Snapshot) -> str:
 
 def refused(message: str) -> str:
     """Box of a setting that is refused."""
-    return box("bad", "Not possible", escape(message))
+    return verdict_box("bad", "Not possible", escape(message))
 
 
 def waiting(what: str = "The first run on a machine compiles the numerical core; later ones start at once.") -> str:
     """Box shown before the numbers: the first run compiles the numerical core."""
-    return box("quiet", "Getting ready", escape(what))
+    return verdict_box("quiet", "Getting ready", escape(what))
 
 
-def numbers(
+def numbers_html(
     snapshot: Snapshot, scale: TensionScale, frequencies: Array | None, *, frequencies_later: bool = False
 ) -> str:
     """The pose, the numbers of every cable, and the platform's natural frequencies, or that they come later."""
@@ -73,7 +73,7 @@ def numbers(
         _material_line(snapshot),
         _pulley_line(snapshot.robot),
     )
-    return block("".join(parts))
+    return html_block("".join(parts))
 
 
 def legend(scale: TensionScale, robot: Robot) -> str:
@@ -89,7 +89,7 @@ def legend(scale: TensionScale, robot: Robot) -> str:
         f"{tick / unit.newtons:g}</span>"
         for tick, place in spaced_ticks(scale)
     )
-    return block(
+    return html_block(
         f"<b>Chord tension [{unit.name}]</b>"
         f'<div style="height:12px;background:linear-gradient(to right,{colors});margin-top:3px"></div>'
         f'<div style="position:relative;height:17px">{marks}</div>'
@@ -97,7 +97,7 @@ def legend(scale: TensionScale, robot: Robot) -> str:
     )
 
 
-def box(kind: str, head: str, text: str) -> str:
+def verdict_box(kind: str, head: str, text: str) -> str:
     """A verdict in a box: "good", "bad" or "quiet"."""
     return (
         f'<div class="sagline sagline-verdict {kind}"><h2>{head}</h2>'
@@ -121,7 +121,7 @@ def color_key(entries: Iterable[tuple[Array | Color, str]]) -> str:
     return "".join(f'<span class="key">{swatch(color)}{text}</span>' for color, text in entries)
 
 
-def cable_table(heads: Iterable[str], columns: Sequence[Sequence[str]], colors: Array | Colors) -> str:
+def cable_table_html(heads: Iterable[str], columns: Sequence[Sequence[str]], colors: Array | Colors) -> str:
     """HTML of a table with a row a cable: number with its color, and its texts of each column."""
     rows = "".join(
         f"<tr><td>{swatch(colors[i])}{i}</td>{''.join(f'<td>{text}</td>' for text in texts)}</tr>"
@@ -182,8 +182,8 @@ def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
 
 def pose_line(pose: Pose) -> str:
     """Position and angles."""
-    position = ", ".join(number(value, ".3f") for value in pose.position)
-    turned = ", ".join(f"{number(value, '.1f')}°" for value in pose.rotation.as_euler("ZYX", degrees=True))
+    position = ", ".join(number_text(value, ".3f") for value in pose.position)
+    turned = ", ".join(f"{number_text(value, '.1f')}°" for value in pose.rotation.as_euler("ZYX", degrees=True))
     return f"<b>Position</b> {position} m<br><b>α, β, γ</b> {turned}"
 
 
@@ -199,8 +199,8 @@ def _cable_numbers(snapshot: Snapshot, scale: TensionScale) -> str:
         f"to limit<br>[{unit.name}]": (snapshot.margin / unit.newtons, unit.form),
         **wrap,
     }
-    texts = [[number(value, form) for value in values] for values, form in columns.values()]
-    return cable_table(("cable", *columns), texts, scale.colors(snapshot.tension))
+    texts = [[number_text(value, form) for value in values] for values, form in columns.values()]
+    return cable_table_html(("cable", *columns), texts, scale.colors(snapshot.tension))
 
 
 def _wrap_column(snapshot: Snapshot) -> dict[str, tuple[Array, str]]:
@@ -214,7 +214,7 @@ def _wrap_column(snapshot: Snapshot) -> dict[str, tuple[Array, str]]:
 
 
 def _pulley_line(robot: Robot) -> str:
-    """Pulleys and dead cables, with a remark where the path of a dead cable is not known."""
+    """Pulleys and dead lengths, with a remark where the path of a dead length is not known."""
     winches = robot.winches
     if winches is None or not winches.anything_behind:
         return ""
@@ -238,7 +238,7 @@ def _listed(frequencies: Array | None) -> str:
 
 def _pressed(mode: int, frequency: float) -> str:
     """A frequency [Hz] that is pressed to see its mode move, where it has one."""
-    text = number(frequency, ".2f")
+    text = number_text(frequency, ".2f")
     if not frequency > 0.0:  # NaN neither
         return text
     name = f"{MASSLESS} {mode + 1}"

@@ -149,9 +149,9 @@ class RobotScene:
         self._build_lights()
         self._low, self._high = shapes.bounds(robot)
         self._size = shapes.size_of(robot)
-        self._winches = shapes.winches(robot)
+        self._winches = shapes.winch_solid(robot)
         self._build_surroundings(robot)
-        body = self._body = shapes.platform(robot)
+        body = self._body = shapes.platform_solid(robot)
         self._gizmo: Any = self._build_gizmo(robot, body) if live else scene.add_frame("/platform", show_axes=False)
         self._traces: list[Any] = []
         self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
@@ -271,7 +271,7 @@ class RobotScene:
         )
 
     def _build_surroundings(self, robot: Robot) -> None:
-        frame = shapes.frame(robot)
+        frame = shapes.frame_solid(robot)
         self._scene.add_mesh_simple("/frame", frame.vertices, frame.faces, color=STEEL)
         if len(self._winches.faces):
             self._scene.add_mesh_simple("/winches", self._winches.vertices, self._winches.faces, color=DRUM)
@@ -303,7 +303,7 @@ class RobotScene:
         )  # fmt: skip
 
     def _build_dead_cables(self, robot: Robot) -> None:
-        """Dead cables, dashed where only their rise is known."""
+        """Dead lengths, dashed where only their rise is known."""
         runs, upright = shapes.dead_runs(robot)
         for name, which in (("/dead", upright), ("/dead_assumed", ~upright)):
             shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]

@@ -104,7 +104,7 @@ class PageServer(viser.ViserServer):
     """A viser server with our page; no page can ask it to open a tunnel to the internet."""
 
     def __init__(self, host: str, port: int, title: str) -> None:
-        """Start serving; the title stands at the top of the panel and in the browser's tab."""
+        """Start serving, with a title for the panel and the browser's tab."""
         with _serving_our_page(title if title == NAME else f"{title} – {NAME}"):
             super().__init__(host=host, port=port, label=title, verbose=False)
 
@@ -241,7 +241,7 @@ class Channel(Messages):
             messages.send(topic, value)
 
     async def connect(self, client: viser.ClientHandle) -> None:
-        """Tell a client that its messages arrive from now on; viser drops earlier ones.
+        """Confirm to a client that its messages arrive from now on; viser drops earlier ones.
 
         A coroutine that awaits nothing is called before the next message of the client is read; a thread is not.
         """

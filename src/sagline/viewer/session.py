@@ -20,18 +20,18 @@ from sagline.files.mcap_reader import LogReader, RecordedLog
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.player import InMotion
-from sagline.viewer.readout import box, definitions
+from sagline.viewer.readout import definitions, verdict_box
 from sagline.viewer.robot_scene import ACTUAL, TRUTH, WANTED
-from sagline.viewer.tension_scale import force_unit, number
+from sagline.viewer.tension_scale import force_unit, number_text
 from sagline.viewer.timeline import (
     Chart,
     Span,
     TimelineMark,
     Track,
     cable_names,
+    chart_limits,
     limit_violations,
     spans_of,
-    tension_limits,
 )
 
 PER_METER = 1e3  # mm
@@ -112,17 +112,19 @@ class PlayedLog:
         heads = ("cable", f"tension<br>[{unit.name}]", "less planned<br>[N]", "set less read<br>[mm]")
         columns = (
             [unit.bare(each) for each in tension],
-            [number(each, ".1f") for each in tension - self.planned_tension[k]],
-            [number(each, ".2f") for each in PER_METER * (self.set_length[k] - self.length[k])],
+            [number_text(each, ".1f") for each in tension - self.planned_tension[k]],
+            [number_text(each, ".2f") for each in PER_METER * (self.set_length[k] - self.length[k])],
         )
         feasible = state not in WRONG
+        text = definitions((name, escape(text)) for name, text in rows)
+        verdict = verdict_box("quiet" if feasible else "bad", state.name, text)
         return InMotion(
             self.robot,
             self.pose_at(k),
             k,
             tension,
             np.asarray(self.length[k]),
-            box("quiet" if feasible else "bad", state.name, definitions((name, escape(text)) for name, text in rows)),
+            verdict,
             heads,
             columns,
             NO_CHOICE,
@@ -162,7 +164,7 @@ class PlayedLog:
     def track(self) -> Track:
         """Charts of the tensions and of the errors of tensions, lengths and position, and the events."""
         unit, cables, axes = force_unit(self.robot), cable_names(self.robot), ("x", "y", "z")
-        limits = tension_limits(self.robot, unit.newtons, at="frame_end")
+        limits = chart_limits(self.robot, unit.newtons, at="frame_end")
 
         def error(value: Array, reference: Array, scale: float = PER_METER) -> Callable[[slice], Array]:
             return lambda rows: scale * (value[rows] - reference[rows])

@@ -22,7 +22,7 @@ from sagline.statics.tables import touching_angle
 
 POINTS = 41  # along a free cable: odd, so that dashes begin and end alike
 WRAP_POINTS = 16  # along the cable on a pulley
-_UPRIGHT = 1e-6  # of the length of a dead cable: largest difference to its rise if it is vertical
+_UPRIGHT = 1e-6  # of a dead length: largest difference to its rise if it is vertical
 
 
 def points_per_cable(robot: Robot) -> int:
@@ -49,7 +49,7 @@ def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
 
 
 def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
-    """Dead cables as vertical lines below the frame anchors: only their lengths and rises are known.
+    """Dead lengths as vertical lines below the frame anchors: only their lengths and rises are known.
 
     Returns:
         Frame anchors and the points lower by the rises [m], shape (m, 2, 3); and whether each is truly vertical by its
@@ -67,7 +67,7 @@ def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
 def drum_axes(robot: Robot) -> Array:
     """Ends of the axes of the drums whose radius is known [m], shape (k, 2, 3).
 
-    A drum touches the lower end of its dead cable on the side away from the robot's middle; its axis is horizontal.
+    A drum touches the lower end of its dead length on the side away from the robot's middle; its axis is horizontal.
     """
     winches = robot.winches
     if winches is None or winches.drum_radius is None:
@@ -157,7 +157,7 @@ def size_of(robot: Robot) -> float:
     return float(np.linalg.norm(high - low))
 
 
-def frame(robot: Robot) -> Solid:
+def frame_solid(robot: Robot) -> Solid:
     """The twelve beams of the robot's box, dashed where the box is assumed."""
     low, high = bounds(robot)
     corners = low + (_SIGNS + 0.5) * (high - low)
@@ -182,10 +182,10 @@ def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
     """A beam along an axis; or dashes about so long, with gaps as long, with a dash at each end."""
     pieces = 2 * round(0.5 * float(np.linalg.norm(end - start)) / dash) + 1
     cuts = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (end - start)
-    return [box(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
+    return [cuboid(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
 
 
-def winches(robot: Robot) -> Solid:
+def winch_solid(robot: Robot) -> Solid:
     """Drums that are known, and a mark at every frame anchor without a visible pulley."""
     radius = _WINCH * size_of(robot)
     marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
@@ -232,15 +232,15 @@ def rod(ends: Array, radius: float) -> Solid:
     return _hull(np.concatenate((ends[0] + ring, ends[1] + ring)))
 
 
-def platform(robot: Robot) -> Solid:
+def platform_solid(robot: Robot) -> Solid:
     """The platform in its own frame: a box of its size, or the hull of its anchors."""
     anchors = robot.platform_anchors
     low, high = anchors.min(axis=0), anchors.max(axis=0)
     if robot.platform_size is not None:
-        return box(0.5 * (low + high), robot.platform_size)
+        return cuboid(0.5 * (low + high), robot.platform_size)
     extent = high - low
     thinnest = max(_THINNEST * float(extent.max()), 0.002 * size_of(robot))
-    flat = box(0.5 * (low + high), np.maximum(extent, thinnest))
+    flat = cuboid(0.5 * (low + high), np.maximum(extent, thinnest))
     if extent.min() < thinnest:
         return flat
     try:
@@ -249,7 +249,7 @@ def platform(robot: Robot) -> Solid:
         return flat
 
 
-def box(middle: Array, edges: Array) -> Solid:
+def cuboid(middle: Array, edges: Array) -> Solid:
     """A box along the axes."""
     return _hull(middle + _SIGNS * edges)
 

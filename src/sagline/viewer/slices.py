@@ -12,7 +12,7 @@ from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 
 from sagline.core.arrays import Array, Indices
-from sagline.viewer.readout import block, css_color
+from sagline.viewer.readout import css_color, html_block
 from sagline.viewer.tension_scale import Colors, ForceUnit
 from sagline.workspaces.region import Slice
 
@@ -60,7 +60,7 @@ class MarginScale:
             f'<span class="key"><span class="swatch" style="background:{css_color(color)}"></span> {name}</span>'
             for color, name in zip(_COLORS, names, strict=True)
         )
-        return block(f"<b>Margin [{unit.name}]</b> &nbsp;{marks}")
+        return html_block(f"<b>Margin [{unit.name}]</b> &nbsp;{marks}")
 
 
 def _bare(edge: float, unit: ForceUnit) -> str:

@@ -121,7 +121,7 @@ class Snapshot:
 
     @property
     def reason(self) -> str:
-        """Why it is not feasible, with the shortfall and the blocking cables; "" if it is."""
+        """Reason why it is not feasible, with the shortfall and the blocking cables; "" if it is."""
         if self.feasible:
             return ""
         if self.plan is None:

@@ -104,14 +104,14 @@ class ForceUnit(NamedTuple):
 
     def bare(self, force: float) -> str:
         """A force [N] without the unit."""
-        return number(force / self.newtons, self.form)
+        return number_text(force / self.newtons, self.form)
 
     def written(self, force: float) -> str:
         """A force [N] with the unit."""
         return f"{self.bare(force)} {self.name}"
 
 
-def number(value: float, form: str) -> str:
+def number_text(value: float, form: str) -> str:
     """A number, or a dash for one that is not finite; what rounds to zero has no sign."""
     if not isfinite(value):
         return _NONE
@@ -125,7 +125,7 @@ def force_unit(robot: Robot) -> ForceUnit:
 
 
 def linear(colors: Colors) -> Colors:
-    """Colors with the sRGB curve undone, as viser's client wants those of line ends."""
+    """Colors with the sRGB curve undone, as viser's client needs those of line ends."""
     share = colors / 255.0
     undone = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.rint(255.0 * undone).astype(np.uint8)

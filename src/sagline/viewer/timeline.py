@@ -91,7 +91,7 @@ def cable_names(robot: Robot) -> tuple[str, ...]:
     return tuple(map(str, range(robot.cable_count)))
 
 
-def tension_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, ...]:
+def chart_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, ...]:
     """The tension limits; where they differ between cables, the tightest."""
     low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"

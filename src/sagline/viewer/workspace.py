@@ -16,7 +16,7 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.core.numbers import counted, n
 from sagline.robot.robot import Robot
 from sagline.tension.methods import MinimumNorm
-from sagline.viewer.readout import block, color_key
+from sagline.viewer.readout import color_key, html_block
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.slices import MarginScale
 from sagline.viewer.tension_scale import ForceUnit, cable_color
@@ -326,7 +326,7 @@ def travel_text(found: FreeTravel, unit: ForceUnit) -> str:
         f"<td>{_end(bool(crossed), int(cable), found.inside)}</td></tr>"
         for which, distance, crossed, cable in zip(found.which, found.distance, found.crossed, found.cable, strict=True)
     )
-    return block(f"{head}<table><tr><th>direction</th><th>length</th><th>ends at</th></tr>{rows}</table>")
+    return html_block(f"{head}<table><tr><th>direction</th><th>length</th><th>ends at</th></tr>{rows}</table>")
 
 
 def _limited(cable: int) -> str:

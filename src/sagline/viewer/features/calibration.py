@@ -26,7 +26,7 @@ from sagline.core.numbers import counted, n
 from sagline.viewer import shapes
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import block, box, color_key, refused, sentence
+from sagline.viewer.readout import color_key, html_block, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, TRACE_WIDTH, TRUTH, Nodes
 from sagline.viewer.server import chosen_by
 from sagline.viewer.shapes import Ellipsoids, ball, readable
@@ -62,7 +62,7 @@ def bands(found: Calibration) -> Indices:
 def _key_text(counts: Indices) -> str:
     """HTML of the key of colors, with the number of poses of each."""
     key = color_key((color, f"{name}: {count}") for color, name, count in zip(COLORS, NAMES, counts, strict=True))
-    return block(f"<b>Chi squared of the poses</b><br>{key}")
+    return html_block(f"<b>Chi squared of the poses</b><br>{key}")
 
 
 def verdict_text(found: Calibration) -> str:
@@ -74,7 +74,7 @@ def verdict_text(found: Calibration) -> str:
     text = "" if kind == "good" else f"{escape(found.status.text)}<br>"
     of = f"{len(found.values)} numbers from {counted(len(found.rows), 'pose')}"
     out = (f"<br>{counted(len(rows), 'row')} left out: {escape(why.text)}" for why, rows in found.left_out.items())
-    return box(kind, head, f"{text}{of}; {escape(chi_squared_text(found))}{''.join(out)}")
+    return verdict_box(kind, head, f"{text}{of}; {escape(chi_squared_text(found))}{''.join(out)}")
 
 
 def parameters_text(found: Calibration) -> str:
@@ -89,7 +89,7 @@ def parameters_text(found: Calibration) -> str:
     head = "<tr><th></th><th>change</th><th>error</th><th>error before</th></tr>"
     items = "".join(f"<li>{_direction_text(one)}</li>" for one in (*found.gauge, *found.cannot_tell_apart))
     remark = f"<b>Not observed, or weakly identifiable</b><ul>{items}</ul>" if items else ""
-    return block(f"<table>{head}{rows}</table>{remark}")
+    return html_block(f"<table>{head}{rows}</table>{remark}")
 
 
 def _ellipsoids_text(factor: float, *, relative: bool) -> str:
@@ -109,7 +109,7 @@ def _outliers_text(found: Calibration, chosen: int | None) -> str:
     )
     rest = len(found.outliers) - MOST_LISTED
     more = f'<div class="quiet">and {rest:,} more</div>' if rest > 0 else ""
-    return block(f'<b>Outliers</b><div class="rows"><table>{rows}</table></div>{more}')
+    return html_block(f'<b>Outliers</b><div class="rows"><table>{rows}</table></div>{more}')
 
 
 def pose_residuals(found: Calibration, number: int) -> str:
@@ -129,7 +129,7 @@ def pose_residuals(found: Calibration, number: int) -> str:
     weight = f", counts {n(found.weights[number], '.2g')}" if found.weights[number] < 1.0 else ""
     freedom = degrees_of_freedom(found)[number]
     fit = f"chi squared {n(found.chi_squared_of_pose[number], '.3g')}, expected {freedom}{weight}"
-    return block(f"<b>Row {found.rows[number]}</b>: {fit}{cables}{measured}")
+    return html_block(f"<b>Row {found.rows[number]}</b>: {fit}{cables}{measured}")
 
 
 def _cell(residual: float, deviation: float, unit: str) -> str:

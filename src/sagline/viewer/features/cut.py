@@ -22,7 +22,7 @@ from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.player import PlayerState
-from sagline.viewer.readout import box, definitions, refused, sentence
+from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.tension_scale import force_unit
 
@@ -78,7 +78,7 @@ def _outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
     rows.append(("Damping", f"loss time {n(simulation.damping.loss_time, '.2g', 's')} of the cables, assumed"))
     if not whole:
         rows.append(("Simulated", f"{simulation.time[-1] - simulation.time[0]:.2f} s so far"))
-    return box("bad" if tension > limit else "quiet", f"Cable {cut} is cut", definitions(rows))
+    return verdict_box("bad" if tension > limit else "quiet", f"Cable {cut} is cut", definitions(rows))
 
 
 class CutFeature(Feature):

@@ -37,7 +37,7 @@ CLOCK: Final = "film clock"  # texts of its strip, before each picture
 
 
 _CABLE_RADIUS = 0.0012  # of the robot's size: real cables are too thin
-_DEAD_RADIUS = 0.0006  # of the robot's size, for dead cables
+_DEAD_RADIUS = 0.0006  # of the robot's size, for dead lengths
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
@@ -50,8 +50,8 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     scene = trimesh.Scene()
     place = np.eye(4)
     place[:3, :3], place[:3, 3] = snapshot.pose.matrix, snapshot.pose.position
-    _add(scene, "frame", shapes.frame(robot), STEEL)
-    winches = shapes.winches(robot)
+    _add(scene, "frame", shapes.frame_solid(robot), STEEL)
+    winches = shapes.winch_solid(robot)
     if len(winches.faces):
         _add(scene, "winches", winches, DRUM)
     for i, (radius, turn) in enumerate(
@@ -65,7 +65,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
         if run[0, 2] != run[1, 2]:
             name = f"dead cable {i}" if known else f"dead cable {i}, path not known"
             _add(scene, name, shapes.rod(run, thin), STEEL)
-    _add(scene, "platform", shapes.platform(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
+    _add(scene, "platform", shapes.platform_solid(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
     for i, course in enumerate(snapshot.courses(sag_scale)):
         _add(scene, f"cable {i}", shapes.tube(course, _CABLE_RADIUS * shapes.size_of(robot)), tuple(colors[i]))
@@ -108,7 +108,7 @@ def _filmed(
         speed: Ratio of the time of what is played to that of the film.
         name: Name of the file, without suffix.
         extent: Lowest and highest corner of all that is drawn [m].
-        cancelled: Function that tells if the film was cancelled.
+        cancelled: Function that returns whether the film was cancelled.
 
     Raises:
         InvalidValueError: If the film would be too long.

@@ -16,7 +16,7 @@ from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
 from sagline.viewer.readout import headline
-from sagline.viewer.tension_scale import force_unit, number
+from sagline.viewer.tension_scale import force_unit, number_text
 
 
 def screen_reader_text(view: View) -> dict[str, str]:
@@ -33,13 +33,13 @@ def screen_reader_text(view: View) -> dict[str, str]:
 
 def _description(robot: Robot) -> str:
     """Description of the robot."""
-    return f"{robot.name}: a platform of {number(robot.mass, '.4g')} kg on {robot.cable_count} cables"
+    return f"{robot.name}: a platform of {number_text(robot.mass, '.4g')} kg on {robot.cable_count} cables"
 
 
 def place_of(pose: Pose) -> str:
     """Position and, if not zero, angles of a platform in words."""
-    x, y, z = (number(value, ".2f") for value in pose.position)
-    angles = [number(value, ".0f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
+    x, y, z = (number_text(value, ".2f") for value in pose.position)
+    angles = [number_text(value, ".0f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
     place = f"x {x}, y {y}, z {z} m"
     return place if angles == ["0"] * 3 else f"{place}, turned {', '.join(angles)} degrees about z, y, x"
 
@@ -54,7 +54,7 @@ def _tensions(robot: Robot, tension: Array) -> str:
         return ""
     unit = force_unit(robot)
     form = ".0f" if unit.newtons == 1.0 else ".1f"
-    low, high = (number(value / unit.newtons, form) for value in (known.min(), known.max()))
+    low, high = (number_text(value / unit.newtons, form) for value in (known.min(), known.max()))
     return f"tensions {low} to {high} {unit.name}"
 
 

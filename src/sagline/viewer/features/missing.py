@@ -18,11 +18,11 @@ from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.features.tensions import SHARING
 from sagline.viewer.missing import MissingWrench, NearestFeasible, missing_of, nearest_feasible
 from sagline.viewer.page import Page
-from sagline.viewer.readout import block, definitions
+from sagline.viewer.readout import definitions, html_block
 from sagline.viewer.robot_scene import INFEASIBLE, Nodes
 from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import Snapshot, method_name
-from sagline.viewer.tension_scale import ForceUnit, force_unit, number
+from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
 
 GO: Final = "go-there"  # topic of the button that moves the platform to the nearest pose
 NEGLIGIBLE: Final = 1e-9  # of the force at an arm of one meter: smaller moments count as zero
@@ -35,7 +35,7 @@ def explanation(
     """HTML: the missing force, the cables at limits, and the nearest feasible pose with a button to go there."""
     rows = _missing_rows(snapshot, missing) if missing is not None else _other_rows(snapshot)
     if nearest is not None:
-        place = ", ".join(number(x, ".3f") for x in nearest.pose.position)
+        place = ", ".join(number_text(x, ".3f") for x in nearest.pose.position)
         button = f"<button {chosen_by(GO, '')}>Go there</button>"
         level = ", the platform level" if nearest.turned else ""
         rows.append(("Nearest feasible", f"{_distance_of(nearest)} away at {place} m{level}. {button}"))
@@ -43,7 +43,7 @@ def explanation(
         rows.append(("Nearest feasible", "searching …"))
     elif snapshot.status not in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED):
         rows.append(("Nearest feasible", "none within the robot, at this orientation or level"))
-    return block(definitions(rows, "missing"))
+    return html_block(definitions(rows, "missing"))
 
 
 def _distance_of(nearest: NearestFeasible) -> str:
@@ -63,7 +63,7 @@ def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str,
     size = unit.written(float(np.linalg.norm(missing.force)))
     rows = [("Missing force", f"{size}: x, y, z {parts} {unit.name}")]
     if _has_moment(missing):
-        turning = ", ".join(number(part, ".4g") for part in missing.moment)
+        turning = ", ".join(number_text(part, ".4g") for part in missing.moment)
         rows = [
             ("Missing force", f"{size}, not sufficient alone: x, y, z {parts} {unit.name}"),
             ("with moment", f"{_moment(missing)}: {turning} N m about x, y, z through the center of mass"),
@@ -116,7 +116,7 @@ class MissingFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Draw nothing yet."""
         self._page, self._panel, self._nodes = page, page.panel, Nodes(page.server.scene)
-        self._body = shapes.platform(page.robot)
+        self._body = shapes.platform_solid(page.robot)
         self._task = BackgroundTask(page.later)
         self.missing: MissingWrench | None = None  # at the pose that is shown
         self._key: Key = ()  # of the pose that is shown; () while it is feasible

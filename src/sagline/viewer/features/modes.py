@@ -19,10 +19,10 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
-from sagline.viewer.readout import block, refused, sentence, waiting
+from sagline.viewer.readout import html_block, refused, sentence, waiting
 from sagline.viewer.server import chosen_by
 from sagline.viewer.swing import PERIOD, Swing, mode_of
-from sagline.viewer.tension_scale import number
+from sagline.viewer.tension_scale import number_text
 
 Place = Callable[[Array], Array]
 
@@ -62,7 +62,9 @@ def _response_figure(curves: ResponseCurves, modes: list[ListedMode], words: str
         '<span class="key"><span class="stroke massive"></span> with cable mass</span>'
         '<span class="key"><span class="stroke massless"></span> massless</span>'
     )
-    return block(f'<svg class="response" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">{axes}{lines}{marks}</svg>{key}')
+    return html_block(
+        f'<svg class="response" viewBox="0 0 {WIDTH} {HEIGHT}" role="img">{axes}{lines}{marks}</svg>{key}'
+    )
 
 
 def _points(x: Array, y: Array) -> str:
@@ -101,7 +103,7 @@ TOPIC: Final = "mode"  # of the messages with the name of a mode that is clicked
 def _swing_text(vibration: Vibration, swing: Swing | None, chosen: str) -> str:
     if swing is not None:
         mode = swing.mode
-        return block(f"<b>{mode.frequency:.3f} Hz, {mode.kind}</b>: {swing.text}")
+        return html_block(f"<b>{mode.frequency:.3f} Hz, {mode.kind}</b>: {swing.text}")
     if chosen:
         counts = vibration.frequency.size, int(np.isfinite(vibration.massless_frequency).sum())
         there = [f"{word}1 to {count}" for word, count in zip(("", "massless "), counts, strict=True) if count]
@@ -112,13 +114,13 @@ def _swing_text(vibration: Vibration, swing: Swing | None, chosen: str) -> str:
 def _list_text(vibration: Vibration, modes: list[ListedMode], chosen: str) -> str:
     head = "<tr><th>mode</th><th>Hz</th><th></th><th>platform</th><th>location</th><th>damping</th></tr>"
     rows = "".join(_row(mode, chosen) for mode in sorted(modes, key=lambda mode: mode.frequency))
-    table = block(f'<div class="modes"><table>{head}{rows}</table></div>')
+    table = html_block(f'<div class="modes"><table>{head}{rows}</table></div>')
     if vibration.status is not VibrationStatus.SOLVED:
-        return block(escape(vibration.status.text)) + table
+        return html_block(escape(vibration.status.text)) + table
     count = "complete" if vibration.complete else "not complete"
     ratio = 100.0 * vibration.damping.modal_damping
     text = f"{vibration.frequency.size} modes with cable mass below {vibration.up_to:g} Hz: {count}."
-    return block(f'{text} <span class="quiet">A damping of {ratio:g} % is assumed.</span>') + table
+    return html_block(f'{text} <span class="quiet">A damping of {ratio:g} % is assumed.</span>') + table
 
 
 def _row(mode: ListedMode, chosen: str) -> str:
@@ -127,7 +129,7 @@ def _row(mode: ListedMode, chosen: str) -> str:
         f'<tr {chosen_by(TOPIC, mode.name)} class="{looks}"><td>'
         f"<button {chosen_by(TOPIC, mode.name)}>{mode.number}</button></td>"
         f"<td>{mode.frequency:.3f}</td><td>{mode.kind}</td><td>{100.0 * mode.platform_share:.0f} %</td>"
-        f"<td>{mode.swings}</td><td>{number(100.0 * mode.loss, '.2g')} %</td></tr>"
+        f"<td>{mode.swings}</td><td>{number_text(100.0 * mode.loss, '.2g')} %</td></tr>"
     )
 
 

@@ -13,10 +13,10 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.feature import Feature, View
 from sagline.viewer.features.missing import MissingFeature
 from sagline.viewer.page import Page
-from sagline.viewer.readout import block, css_color, sentence, swatch
+from sagline.viewer.readout import css_color, html_block, sentence, swatch
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.snapshot import Snapshot
-from sagline.viewer.tension_scale import NONE, Color, cable_color, force_unit, number
+from sagline.viewer.tension_scale import NONE, Color, cable_color, force_unit, number_text
 
 WEIGHT, LOAD, MISSING = "weight", "load", "missing"
 WEIGHT_COLOR: Color = NONE
@@ -35,7 +35,7 @@ class _PlatformForce:
     at: Array  # point at which it acts [m], shape (3,)
 
 
-def cable_forces(state: Equilibrium) -> Array:
+def forces_of_cables(state: Equilibrium) -> Array:
     """Forces of the cables on the platform [N], shape (m, 3), in the directions of their ends."""
     back = (state.exit_point - state.pose.transform(state.one_robot.platform_anchors))[:, :2]
     far = np.linalg.norm(back, axis=1, keepdims=True)
@@ -49,7 +49,7 @@ def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tupl
     robot, pose = state.one_robot, state.pose
     center = pose.transform(robot.center_of_mass)
     ends = pose.transform(robot.platform_anchors)
-    pulls = cable_forces(state)
+    pulls = forces_of_cables(state)
     order = np.argsort(np.arctan2(pulls[:, 1], pulls[:, 0]), kind="stable").tolist()
     moments = np.cross(ends - center, pulls)
     forces = [_PlatformForce(str(k), cable_color(k), pulls[k], moments[k], ends[k]) for k in order]
@@ -107,7 +107,7 @@ def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> st
     extents = np.array([np.ptp(points, axis=0) for _, points in views])
     scale = float(min((WIDTH - 2.0 * BORDER) / max(extents[:, 0].max(), 1e-12), HIGHEST / extents[:, 1].max()))
     drawn = "".join(_projection(*view, forces, scale) for view in views)
-    return block(drawn) + sentence(_residual_text(state, forces, missing)) + block(_table(state, forces))
+    return html_block(drawn) + sentence(_residual_text(state, forces, missing)) + html_block(_table(state, forces))
 
 
 def _projection(axes: str, points: Array, forces: tuple[_PlatformForce, ...], scale: float) -> str:
@@ -208,7 +208,7 @@ def _decimals(largest: float) -> int:
 
 def _cells(force: Array, moment: Array, decimals: int, *, turning: bool) -> str:
     parts = np.concatenate((force, moment)) if turning else force
-    cells = [number(part, f".{decimals}f") for part in parts]
+    cells = [number_text(part, f".{decimals}f") for part in parts]
     return "".join(f"<td>{cell}</td>" for cell in cells)
 
 

@@ -18,7 +18,7 @@ from sagline.viewer.camera import Camera, camera_of, ray_distance, screen_point
 from sagline.viewer.feature import Computation, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, Reserve, push_response, semi_axes
-from sagline.viewer.readout import LATER, box, definitions, refused, sentence
+from sagline.viewer.readout import LATER, definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.shapes import THINNEST, ball, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
@@ -51,7 +51,7 @@ def response_text(response: PushResponse, drawn_for: float | None) -> str:
         ("Compliance", _compliance_text(response, drawn_for)),
     ]
     within = response.loaded is not None and response.reserve.force >= response.force
-    return box("quiet" if within else "bad", "Pushed" if within else "Pushed beyond a limit", definitions(rows))
+    return verdict_box("quiet" if within else "bad", "Pushed" if within else "Pushed beyond a limit", definitions(rows))
 
 
 def _motion_text(response: PushResponse) -> str:
@@ -92,7 +92,7 @@ class PushFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Build the folder."""
         self._page, self._size, self._nodes = page, page.size, Nodes(page.server.scene)
-        self.body, self._ball = shapes.platform(page.robot), ball()
+        self.body, self._ball = shapes.platform_solid(page.robot), ball()
         scale = page.scale
         self._stiffness = float(np.sqrt(scale.low * scale.high)) / (FAR * self._size)  # N/m of a drag
         self._hold: tuple[int, Array] | None = None  # client and point that it drags, platform frame [m]

@@ -14,7 +14,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import LATER, block, refused, sentence
+from sagline.viewer.readout import LATER, html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Picture, picture_of
 from sagline.viewer.tension_scale import force_unit
@@ -214,7 +214,7 @@ class RegionFeature(Feature):
         if key != self._hull_key:
             self._hull_key = key
             self._show_hull(hull.by_cable if self._by_cable else hull.by_margin(self._scale), opened=opened)
-            self._hull_html.content = block(hull.text)
+            self._hull_html.content = html_block(hull.text)
 
     def _compute(self, *, rough: bool) -> None:
         """Have the hull of the workspace that is shown computed in the background."""
@@ -254,7 +254,7 @@ class RegionFeature(Feature):
             text = margin_text(float(here.margin[0]), int(here.cable[0]), force_unit(self._levels.robot))
             if self._result is not None and (hull := self._result[2]) is not None:
                 patches = near_patches(hull, self._place, REACH * self._size)
-            self._margin_html.content = block(f"<b>Here</b> {text}")
+            self._margin_html.content = html_block(f"<b>Here</b> {text}")
         with self._server.atomic():
             draw_patches(self._nodes, "/wall", patches)
             below = (0.0, 0.0, -_BELOW * self._size)

@@ -32,15 +32,15 @@ from sagline.viewer.link import (
 )
 from sagline.viewer.page import Page, Source
 from sagline.viewer.player import InMotion
-from sagline.viewer.readout import block
+from sagline.viewer.readout import html_block
 from sagline.viewer.snapshot import Settings, Snapshot
-from sagline.viewer.tension_scale import number
+from sagline.viewer.tension_scale import number_text
 
 FIRST: Final = -0.9  # order among the controls: above all but what is played
 EXAMPLE: Final = "1, 0, 1.5 or 1, 0, 1.5, 10, 0, 0"
 POSE_STEP: Final = f"Give meters, and degrees about z, y and x: {EXAMPLE}."
 HINT: Final = "Position in meters; angles about z, y and x in degrees, if any. Enter moves the platform there."
-_CONTENT: Final = block(
+_CONTENT: Final = html_block(
     '<div class="state"><label for="sagline-pose">x, y, z [m], α, β, γ [°]</label>'
     f'<input id="sagline-pose" type="text" autocomplete="off" spellcheck="false" title="{HINT}"'
     ' aria-describedby="sagline-pose-reply">'
@@ -63,7 +63,7 @@ def _pose_text(pose: Pose) -> str:
 
 
 def _short(value: float, form: str) -> str:
-    return number(value, form).rstrip("0").rstrip(".")
+    return number_text(value, form).rstrip("0").rstrip(".")
 
 
 class StateFeature(Feature):
@@ -229,7 +229,7 @@ def _weighed(mass: float) -> str:
 def _planned(snapshot: Snapshot, view: View) -> list[str]:
     """Lines of the plan of a pose."""
     settings, pose = view.settings, snapshot.pose
-    angles = ", ".join(number(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
+    angles = ", ".join(number_text(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
     arguments = [
         f"model={_constructor(settings.model)}",
         f"tension={_constructor(settings.tension)}",

@@ -22,10 +22,10 @@ from sagline.tension.polygon import TensionPolygon
 from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
 from sagline.viewer.feature import Computation, Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import LATER, block, sentence
+from sagline.viewer.readout import LATER, html_block, sentence
 from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import METHODS, Snapshot, method_name
-from sagline.viewer.tension_scale import force_unit, number
+from sagline.viewer.tension_scale import force_unit, number_text
 
 NEAR: Final = 10.0  # px: marks that are closer are joined
 
@@ -122,11 +122,11 @@ def polygon_figure(
     """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
     if remark := _why_not_drawn(snapshot):
         return sentence(remark)
-    drawn = field_of(snapshot) if field is None else field
+    drawn = dot_field_of(snapshot) if field is None else field
     if drawn is None:
         return sentence("No tensions within the limits balance the platform.")
     return (
-        block(_drawing(snapshot, drawn, marks, movable=field is not None))
+        html_block(_drawing(snapshot, drawn, marks, movable=field is not None))
         + sentence(_description(snapshot, drawn, movable=field is not None))
         + _key(snapshot, marks, back)
     )
@@ -145,7 +145,7 @@ def _why_not_drawn(snapshot: Snapshot) -> str:
     return "No redundant cable: the force balance determines the tensions." if redundant == 0 else ""
 
 
-def field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
+def dot_field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
     """Feasible tensions of a pose, with the sag forces of its cables; None where there are none."""
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
@@ -227,7 +227,7 @@ def _description(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
         ends = field.polygon.vertices[:, 0]
         point = float(field.polygon.coordinates(snapshot.tension)[0])
         span = f"{ends.min():.4g} to {ends.max():.4g} N" if np.isfinite(ends).all() else "unbounded"
-        text = f"One redundant cable: λ may be {span}; chosen: {number(point, '.4g')} N."
+        text = f"One redundant cable: λ may be {span}; chosen: {number_text(point, '.4g')} N."
         return f"{text} {how}" if movable else text
     if not field.polygon.bounded:
         return f"{how} Sides: limits of the cables; the set is unbounded at a side without a name."
@@ -256,7 +256,7 @@ def _key(snapshot: Snapshot, marks: tuple[_MethodMark, ...], back: str) -> str:
         again = f" <button {chosen_by(SHARING, back)}>Back to {escape(back)}</button>" if back else ""
         kept = "at other poses the tensions stay as close to these as force balance and limits allow"
         remark = f'<div class="hand"><b>{BY_HAND.capitalize()}</b>: {kept}.{again}</div>'
-    return block(f'{remark}<div class="ways">{"".join(parts)}</div>')
+    return html_block(f'{remark}<div class="ways">{"".join(parts)}</div>')
 
 
 def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
@@ -314,7 +314,7 @@ class TensionsFeature(Feature):
             state = snapshot.plan.state
             place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
             key = (*place, view.settings.changes, type(state.cables.model))
-            self._field = field_of(snapshot, before if key == self._key else None)
+            self._field = dot_field_of(snapshot, before if key == self._key else None)
             if key != self._key or not isinstance(snapshot.plan.tension, ByHand):
                 self._aim = None
             self._key = key
