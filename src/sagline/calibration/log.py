@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from attrs import evolve, field, fields, frozen
@@ -28,8 +28,29 @@ def _default_if_none(sensors: Sensors | None) -> Sensors:
     return Sensors() if sensors is None else sensors
 
 
+class _Replaceable(Result):
+    """Base of input types whose fields can be replaced; pickled through the constructor."""
+
+    __slots__ = ()
+
+    def replace(self, **changes: Any) -> Self:
+        """The same with some fields changed, checked like a new one.
+
+        Args:
+            changes: Fields and their new values.
+
+        Raises:
+            InvalidValueError: If there is no such field, or the constructor refuses a value.
+        """
+        for name in changes:
+            choice(name, "field", self.__slots__)
+        return evolve(self, **changes)  # type: ignore[misc]
+
+    __reduce__ = reduced
+
+
 @frozen(eq=False, weakref_slot=False)
-class Sensors(Result):
+class Sensors(_Replaceable):
     """Accuracy of a robot's sensors, and the pose of its measuring system.
 
     Attributes:
@@ -75,21 +96,6 @@ class Sensors(Result):
             raise InvalidValueError("frame", value, "a single pose", "Take one of them: frame[0].")
         object.__setattr__(self, "target", exactly(self.target, "target", "m", (3,)))
 
-    def replace(self, **changes: Any) -> Sensors:
-        """Sensors with some fields changed, checked like new ones.
-
-        Args:
-            changes: Fields and their new values.
-
-        Raises:
-            InvalidValueError: If there is no such field, or the constructor refuses a value.
-        """
-        for name in changes:
-            choice(name, "field", self.__slots__)
-        return evolve(self, **changes)
-
-    __reduce__ = reduced
-
 
 def reading_deviations(sensors: Sensors, cables: int) -> Array:
     """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite for no sensor."""
@@ -112,7 +118,7 @@ _UNIT = 1e-6  # by how much the length of a quaternion may be off: one printed w
 
 
 @frozen(eq=False, repr=False, weakref_slot=False)
-class WinchLog(Result, Saved):
+class WinchLog(_Replaceable, Saved):
     """Readings of a robot at rest at N poses; NaN where a reading is missing.
 
     Attributes:
@@ -176,8 +182,6 @@ class WinchLog(Result, Saved):
         object.__setattr__(self, "source", text(self.source, "source"))
         _check_sensors(self, m)
 
-    __reduce__ = reduced
-
     @property
     def readings(self) -> Array:
         """The counts, or the lengths [m], shape (N, m)."""
@@ -205,19 +209,6 @@ class WinchLog(Result, Saved):
             if isinstance(values, np.ndarray):
                 locked(values)  # ours: no need for another copy
         return evolve(self, **parts)
-
-    def replace(self, **changes: Any) -> WinchLog:
-        """A log with some fields changed, checked like a new one.
-
-        Args:
-            changes: Fields and their new values.
-
-        Raises:
-            InvalidValueError: If there is no such field, or the constructor refuses a value.
-        """
-        for name in changes:
-            choice(name, "field", self.__slots__)
-        return evolve(self, **changes)
 
     def __str__(self) -> str:
         """Number of rows and the kinds of readings."""

@@ -239,33 +239,14 @@ def sample_of(
     groups: Sequence[Mapping[str, Any]], *, winches: int, time: float, age: Array, discarded: Whole
 ) -> Sample:
     """Sample from valid blocks of all groups; time [s], age [s] (G,), discarded (G,)."""
-
-    def heads(name: str) -> Whole:
-        return np.array([group[name] for group in groups], dtype=np.int64)
-
-    def winch(name: str) -> list[Any]:
-        rows = [winch_row(i, name) for i in range(GROUP_SIZE)]
-        return [group[row] for group in groups for row in rows][:winches]
-
-    return Sample(
-        time=time,
-        age=age,
-        counter=heads("counter"),
-        plc_time=np.array([1e-6 * group["time"] for group in groups]),
-        owner=heads("owner"),
-        echo=heads("echo"),
-        status=heads("status"),
-        fault=heads("fault"),
-        length=np.array(winch("length"), dtype=np.float64),
-        rate=np.array(winch("rate"), dtype=np.float64),
-        torque=np.array(winch("torque"), dtype=np.float64),
-        tension=np.array(winch("tension"), dtype=np.float64),
-        filtered=np.array(winch("filtered"), dtype=np.float64),
-        counts=np.array(winch("counts"), dtype=np.int64),
-        state=np.array(winch("state"), dtype=np.int64),
-        winch_fault=np.array(winch("fault"), dtype=np.int64),
-        discarded=discarded,
-    )
+    heads = ("counter", "owner", "echo", "status", "fault")
+    columns: dict[str, Any] = {name: np.array([group[name] for group in groups], dtype=np.int64) for name in heads}
+    for name in ("length", "rate", "torque", "tension", "filtered", "counts", "state", "winch_fault"):
+        rows = [winch_row(i, name.removeprefix("winch_")) for i in range(GROUP_SIZE)]
+        values = [group[row] for group in groups for row in rows][:winches]
+        columns[name] = np.array(values, dtype=np.int64 if name in ("counts", "state", "winch_fault") else np.float64)
+    plc_time = np.array([1e-6 * group["time"] for group in groups])
+    return Sample(time=time, age=age, plc_time=plc_time, discarded=discarded, **columns)
 
 
 def winch_rows(names: Sequence[str], columns: Sequence[Sequence[Any]]) -> dict[str, Any]:
