@@ -1,1 +1,1 @@
-"""Cables that stretch and sag: their material, five models of them, and the states they hang in."""
+"""Cables that stretch and sag: their material, five models of them, and their states."""

@@ -178,7 +178,7 @@ def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
     if not isinstance(given, str):
         raise InvalidValueError(item, brief(file), "the path of a file, a text or a Path", f"Give {item} as a text.")
     if not given.strip():
-        raise FileError(".", f"is what an empty {item} stands for", "Give the name of a file.")
+        raise FileError(".", f"is the meaning of an empty {item}", "Give the name of a file.")
     path = Path(given)
     if not path.name and not folder:
         raise FileError(path, "is a folder", "Give the name of a file in it.")

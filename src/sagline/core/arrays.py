@@ -46,7 +46,7 @@ def checked(
 ) -> Array:
     """A locked float64 copy of a caller's value, or an error that names what is wrong.
 
-    unit: unit of the value, for the message; "" for none; shape: trailing axes the array must have; None stands for any
+    unit: unit of the value, for the message; "" for none; shape: trailing axes the array must have; None means any
     length. Leading axes are free. None (the default) accepts every shape; above: every value must be strictly larger
     than this; missing: whether NaN may pass. Returns array of float64, C-contiguous, write-locked, with memory of its
     own; an array that already is all this down to its memory, such as a result of ours, is taken as it is.

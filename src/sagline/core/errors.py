@@ -142,7 +142,7 @@ def is_seen(character: str) -> bool:
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that somebody may have meant, for "Did you mean".
+    """The known word that was probably meant, for "Did you mean".
 
     Returns the nearest known word; None where none is near.
 

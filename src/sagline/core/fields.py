@@ -20,7 +20,7 @@ from sagline.core.arrays import Array, number
 
 
 def given(value: ArrayLike) -> Array:
-    """A value as it is: a converter that tells type checkers what the constructor takes."""
+    """A value as it is: a converter that gives type checkers the type of the argument."""
     return value  # type: ignore[return-value]
 
 

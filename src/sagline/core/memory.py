@@ -25,7 +25,7 @@ def check_memory(item: str, size: float, next_step: str) -> None:
     64 MB are not asked about.
     """
     if size > UNASKED and size > (free := free_memory()):
-        digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)  # that tell the two apart
+        digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)  # in which the two differ
         wanted, left = f"{size / 1e9:.{digits}g} GB", f"<= {free / 1e9:.{digits}g} GB, which are free"
         raise InvalidValueError(f"the memory for {item}", wanted, left, next_step)
 
@@ -40,7 +40,7 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 
 
 def free_memory() -> float:
-    """Memory that this process can still take [bytes]; infinite where the system does not tell.
+    """Memory that this process can still take [bytes]; infinite where the system does not report it.
 
     Returns the least of what the machine has free, what its container is allowed and what the process is.
     """

@@ -6,10 +6,10 @@ import re
 from math import floor, isfinite, log10
 from typing import SupportsFloat
 
-ROUNDING = 1e-12  # of the size of what a number is the difference of: what is smaller says nothing but the arithmetic
+ROUNDING = 1e-12  # of the size of what a number is the difference of: what is smaller is rounding
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
-HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # larger prefixes that nobody writes; of other units all
+HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # largest usual prefix; of other units all
 LONGEST_PLAIN = 1e7  # from here on a number without a prefix is written with a power of ten
 SPACE = "\N{NO-BREAK SPACE}"
 TIGHT = ("", "°")  # units that stand close
@@ -33,7 +33,7 @@ def n(
     1 and 1000, and where there is none a power of ten is written out. A minus is a true one, a space before a unit
     does not break.
 
-    value: the number, in the unit; "–" stands for what is not finite; form: how its digits are formatted, as in
+    value: the number, in the unit; "–" where it is not finite; form: how its digits are formatted, as in
     `format`; not used with an uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" for none; uncertainty:
     standard uncertainty, in the unit, written behind the last digits of the value to two digits: 43.98(10) is 43.98 ±
     0.10. None for none; size: of what the value is a difference, in the unit: a value that is `ROUNDING` of it is "0
@@ -62,7 +62,7 @@ def n(
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
     """A number with its standard error, both to the two digits of the error that count: "512 ± 12 kN".
 
-    error: its standard error, in the unit; one that is not finite is written as "not told"; prefixed: whether
+    error: its standard error, in the unit; not finite: unknown; prefixed: whether
     the unit takes the prefix it reads best with; in a column of a table none does.
     """
     number, own = float(value), float(error)

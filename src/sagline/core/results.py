@@ -71,7 +71,7 @@ class Saved:
     __slots__ = ()
 
     def save(self, file: os.PathLike[str] | str) -> None:
-        """Write the result to a file, whole or not at all, with units.
+        """Write the result to a file atomically, with units.
 
         The format follows from the type: NetCDF with the robot inside for plans, simulations, workspaces, frequency
         maps and calibrations (.nc); CSV for logs of winches (.csv); YAML for calibration poses (.yaml); MCAP or NetCDF

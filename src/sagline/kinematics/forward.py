@@ -214,7 +214,7 @@ def forward(
         ForwardSolution, single or with a leading axis N.
 
     Raises:
-        InvalidValueError: If a length is not positive, or no longer than the dead cable behind its pulley, or single
+        InvalidValueError: If a length is not positive, or no longer than the dead length behind its pulley, or single
             lengths of a sample are NaN (the message names the cable), several robots do not fit together (it names
             which), an argument is of the wrong kind or shape, the start is outside the motions of the robot's pattern,
             or so many samples need more memory than is free.
@@ -260,9 +260,9 @@ def forward(
 
 
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
-    """The caller's lengths, shape (m,) or (N, m), positive and beyond the dead cable, or whole rows of NaN.
+    """The caller's lengths, shape (m,) or (N, m), positive and beyond the dead length, or whole rows of NaN.
 
-    robot: gives the number of cables, their dead cable, and its name to messages; or one a sample; lengths: what the
+    robot: gives the number of cables, their dead length, and its name to messages; or one a sample; lengths: what the
     caller gave [m]. Returns write-locked array of shape (m,) or (N, m).
     """
     array = numbers(lengths, "unstrained_length", "m")
@@ -295,7 +295,7 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
 def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
     """The error of a length that would not reach from drum to pulley.
 
-    lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead cable [m], of the same shape; no less than one of
+    lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead length [m], of the same shape; no less than one of
     the lengths. Returns the error, to be raised: it names the cable and, of many, the sample.
     """
     index = tuple(int(i) for i in np.argwhere((lengths <= dead) & (dead > 0.0))[0])
@@ -303,7 +303,7 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
     return InvalidValueError(
         f"{sample}cable {index[-1]}: unstrained length",
         f"{lengths[index]:.9g} m",
-        f"> {dead[index]:.9g} m, the dead cable behind its pulley",
+        f"> {dead[index]:.9g} m, the dead length behind its pulley",
         "Give all cable off the drum, or correct its dead_cable.",
     )
 

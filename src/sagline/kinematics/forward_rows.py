@@ -130,7 +130,7 @@ class ForwardRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, behind: bool | None) -> ForwardRows:
-        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead cable."""
+        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead lengths."""
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
@@ -192,7 +192,7 @@ def solve_forward_rows(
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
     bodies, cables, behind = body_table(robot), cable_table(robot), has_routing(robot) or None
-    chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain goes on from block to block
+    chain, memory = new_chain(m, len(allowed)), memory_for(m)  # the chain continues from block to block
     found = ForwardRows.empty(count, m, behind)
     for part in blocks(count, max(1, BLOCK // m), progress):
         block = ForwardRows.empty(part.stop - part.start, m, behind)

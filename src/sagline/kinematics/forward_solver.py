@@ -85,7 +85,7 @@ class ForwardSolver:
         self._status: Codes = np.empty(1, dtype=np.int8)
         self._arguments: tuple[Any, ...] = (
             (self._model.code, *self._model.parameters, behind or None),
-            True,  # a chain goes on from what it remembers of the last equilibrium
+            True,  # a chain continues from the last equilibrium
             (
                 robot.freedom,
                 body_table(robot),
@@ -130,7 +130,7 @@ class ForwardSolver:
             A fresh result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If a length is not positive, or no longer than its dead cable (the message names the
+            InvalidValueError: If a length is not positive, or no longer than its dead length (the message names the
                 cable), or a shape is wrong.
         """
         lengths = self._checked(unstrained_length)

@@ -55,7 +55,7 @@ def home(
 
     Raises:
         InvalidValueError: If the robot has no winches, or they have guides, the pose is none or a batch, a reading is
-            beyond load_cell_range, no cable hangs there with so little tension or holds so much, or more is off a drum
+            beyond load_cell_range, no cable has so little tension there or holds so much, or more is off a drum
             than its cable_length; the message names the cable.
         CableGeometryError: If a cable's ends coincide there, or its platform end is inside its pulley.
 

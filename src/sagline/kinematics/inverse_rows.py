@@ -22,7 +22,7 @@ DECIDED = 1 << 10  # and poses decided at once, which take longer
 
 
 class InverseRows(NamedTuple):
-    """Results of the kernel, in its order; arrays lead with the N poses but for results (RESULT_ROWS, N, m)."""
+    """Results of the kernel, in its order; arrays lead with the N poses except results (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
@@ -32,7 +32,7 @@ class InverseRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> InverseRows:
-        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead cable."""
+        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead lengths."""
         return cls(
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
@@ -98,7 +98,7 @@ class Verdicts(NamedTuple):
     brackets: Array
     reliefs: Array  # the force that suffices [N], along the free motions, (N, n), NaN where none is needed or known
     farkas: Array  # Farkas vectors along the free motions, (N, n)
-    blocking: Flags  # cables whose limits stand against the needed wrench, (N, m)
+    blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
     at_border: Flags  # poses solved here, not by the tension distribution method, (N,)
 
     @classmethod

@@ -46,7 +46,7 @@ class InverseStep(NamedTuple):
         chord_tension: tau [N], shape (m,).
         horizontal_tension: T_x [N], shape (m,).
         vertical_force: T_z on the cable at its platform end [N], shape (m,).
-        status: Why there is no answer, or SOLVED.
+        status: Reason for a missing solution, or SOLVED.
         shortfall: Smallest change of the force that would make the pose feasible [N].
     """
 
@@ -158,7 +158,7 @@ class InverseSolver:
             position: Of the platform origin [m], shape (3,).
             quaternion: Rotation platform -> world, scalar last, of length 1 to 1e-6 (what is left is normalized away),
                 shape (4,).
-            out: Filled with the unstrained lengths [m], shape (m,); NaN where there is no answer.
+            out: Filled with the unstrained lengths [m], shape (m,); NaN without a solution.
             wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
 
         Returns:

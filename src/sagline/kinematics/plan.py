@@ -26,10 +26,10 @@ class Gap(NamedTuple):
     Attributes:
         first: Index of its first pose.
         last: Index of its last pose.
-        status: Why its first pose has no answer.
+        status: Why its first pose has no solution.
         shortfall: Largest finite shortfall in it [N]; infinite where no change of the force alone would do at any of
             its poses, NaN where it has none.
-        cables: Indices of the cables that stand against the wrench somewhere in it.
+        cables: Indices of the cables whose limits oppose the wrench at some pose of it.
         hopeless: At how many of its poses no change of the force alone would do.
     """
 
@@ -46,7 +46,7 @@ class Plan(Result, Saved):
     """Result of `inverse`: a single pose with fields of shape (m,), or N poses with fields of shape (N, m).
 
     Attributes:
-        state: Robot, poses, wrench and cables; NaN forces and lengths where a pose has no answer.
+        state: Robot, poses, wrench and cables; NaN forces and lengths where a pose has no solution.
         path: The path that was followed, or None for poses alone.
         tension: Tension distribution method.
         status: Codes of `PoseStatus`, shape () or (N,).
@@ -55,7 +55,7 @@ class Plan(Result, Saved):
             force alone would do, NaN where that is not the reason or none was found.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
-        blocking: Cables at a limit that stands against the needed wrench: a wider one lessens the shortfall, shape
+        blocking: Cables at a limit that opposes the needed wrench: a wider limit reduces the shortfall, shape
             (m,) or (N, m).
         farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas, what the cables
             give along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)) with J the structure matrix and G_i what a
@@ -66,7 +66,7 @@ class Plan(Result, Saved):
             direction alone proves nothing and ranges of tensions were narrowed or split. None for a plan from a file
             that was written before files kept it.
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
-            the cables' pulls T_z - tau sin phi; where there is no answer, at the tensions that leave least of it.
+            the cables' sag forces T_z - tau sin phi; without a solution, at the tensions that leave least of it.
             None as above.
         bracket: What is proved, and what suffices, of the shortfall [N], shape (2,) or (N, 2); infinite where nothing
             was found that does. None as above.
@@ -96,7 +96,7 @@ class Plan(Result, Saved):
 
     @property
     def unstrained_length(self) -> Array:
-        """L: lengths to wind [m]: all cable off the drum, with what is wrapped on pulleys, and dead cable."""
+        """L: lengths to wind [m]: all cable off the drum, with wrapped and dead lengths."""
         return self.state.unstrained_length
 
     @property
@@ -134,7 +134,7 @@ class Plan(Result, Saved):
         """dL/dt: how fast to wind [m/s], shape (N, m), along the path; None for poses without a path.
 
         The rate at which `unstrained_length` changes as the platform moves and the tensions change; NaN where
-        the plan has no answer. Computed at each call. See docs/model.md, section 7.
+        the plan has no solution. Computed at each call. See docs/model.md, section 7.
         """
         return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
 

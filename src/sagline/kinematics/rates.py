@@ -265,7 +265,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 
     state: robot, poses, wrench and cables along the path; path: the path; where it knows no jerk, a spline through its
     accelerations gives it; feasible: which samples have an answer, shape (N,). Returns dL/dt [m/s], shape (N, m): good
-    to 1e-8 of its largest value; NaN where the plan has no answer. Where the rate jumps, as where a cable reaches a
+    to 1e-8 of its largest value; NaN where the plan has no solution. Where the rate jumps, as where a cable reaches a
     limit, it is one of the two sides'.
 
     Source:

@@ -38,7 +38,7 @@ def encoder_counts(
             `chord_tension`; None for not at all.
 
     Returns:
-        Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no answer.
+        Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no solution.
 
     Raises:
         InvalidValueError: If the robot's winches or cables lack what is needed (the message names it), a drum cannot
@@ -184,7 +184,7 @@ def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WinchRates(Result):
-    """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no answer.
+    """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no solution.
 
     Speeds of the drum are positive where cable is let out; what holds at the motor is positive in the direction in
     which the encoder, on its shaft, counts up. With a positive gear both are the same direction, and a motor that only
@@ -227,7 +227,7 @@ def winch_rates(plan: Plan) -> WinchRates:
     """Speeds and torques that the winches need to follow a plan, and where they exceed their limits.
 
     The lever of the cable is the change of its length in a turn of the drum, over 2 pi, so that no power is lost: the
-    pitch radius of its layer but for the pitch of the helix, which adds some 0.01 %, and the wandering exit: the
+    pitch radius of its layer except for the pitch of the helix, which adds some 0.01 %, and the wandering exit: the
     pitch times the slant of the run in a turn, 0.06 % where a groove pitch of 4 mm is 40 mm off at 0.8 m. Drums are
     wound at winding_tension.
 

@@ -47,7 +47,7 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 
 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
-    """The robot, refused where its cables hang between guides.
+    """The robot, refused where its cables sag between guides.
 
     solver: what does not take them, for the message.
     """
@@ -74,8 +74,8 @@ def iterate_routing(
     found: equilibria over a straight guided run without friction, at the lengths less what is taken for the rest;
     lengths: unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of
     friction, shape (m,) or (N, m), or None; taken: what they were solved with for what guides and friction add [m], (N,
-    m); None for nothing. Returns the answers; NOT_CONVERGED where that does not converge, or a cable is too slack to
-    hang between its guides.
+    m); None for nothing. Returns the answers; NOT_CONVERGED where that does not converge, or a cable is too slack for a
+    catenary between its guides.
     """
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
     past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # what was taken, and what it missed

@@ -25,7 +25,7 @@ class Path(Shown):
         twist_rate: Acceleration of the platform's origin [m/s^2], then its angular acceleration [rad/s^2],
             in world axes, shape (N, 6).
         jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None where it is not known, as of sampled poses.
-        rests: When the platform stands between one move and the next [s], first and last time included, shape (R,);
+        rests: Times at which the platform rests between two moves [s], first and last time included, shape (R,);
             they need not be times of samples. None where they are not known, as of sampled poses.
     """
 

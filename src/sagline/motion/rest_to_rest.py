@@ -173,7 +173,7 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
 
 
 def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None:
-    """Refuse a segment that moves without a sample between its ends: no answer would know of its motion."""
+    """Refuse a segment that moves without a sample between its ends: no result would contain its motion."""
     rounding = 1e-9 * ends[-1]
     inside = np.searchsorted(grid, ends - rounding) - np.searchsorted(grid, ends - times + rounding)
     if (unseen := np.flatnonzero((inside < 1) & moves)).size:

@@ -28,7 +28,7 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
         pose: The N poses; from one to the next the platform turns by less than 180 degrees.
 
     Returns:
-        Path with the given times and poses; its jerk is None, as a cubic spline has none to speak of.
+        Path with the given times and poses; its jerk is None: a cubic spline does not define it.
 
     Raises:
         InvalidValueError: If the times do not increase, there are fewer than two, or the number of poses differs.

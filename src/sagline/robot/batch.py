@@ -94,7 +94,7 @@ def cables_of(robot: Robots) -> Cable:
 
 
 def has_routing(robot: Robots) -> bool:
-    """True if any cable runs over a pulley, or has dead cable behind its frame anchor."""
+    """True if any cable runs over a pulley, or has a dead length behind its frame anchor."""
     robots = (robot,) if isinstance(robot, Robot) else robot
     return any(one.winches is not None and one.winches.anything_behind for one in robots)
 

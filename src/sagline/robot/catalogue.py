@@ -50,7 +50,7 @@ def preset_text(name: str) -> str:
 
 LAYOUTS: Final = ("top", "mixed", "bottom")
 COUNTS: Final = {"top": (8, 6), "mixed": (8, 7)}
-THINNEST, THICKEST = 0.0003, 0.08  # m, of ropes that robots hang on
+THINNEST, THICKEST = 0.0003, 0.08  # m, of ropes for cable robots
 SLACK_LIMIT = 0.05  # lowest tension, of the platform's weight
 _CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, of the edges
 _POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # a triangle in the same rectangle
@@ -62,7 +62,7 @@ class Design:
 
     Attributes:
         name: What the robot is called.
-        frame: Edges of the frame [m], shape (3,); it stands on the floor around the origin.
+        frame: Edges of the frame [m], shape (3,); on the floor, around the origin.
         platform: Edges of the platform [m], shape (3,).
         mass: Mass of the platform with its load [kg].
         rope: Name in the catalogue of ropes.

@@ -67,7 +67,7 @@ def cables(given: Cable, count: int) -> Cable:
 
 
 def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
-    """The winches, one a cable, or None; dead cable follows from guides that lead to the frame anchors (m, 3)."""
+    """The winches, one a cable, or None; the dead length follows from guides that lead to the frame anchors (m, 3)."""
     winch = optional(given, Winch, "winches")
     return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 

@@ -212,7 +212,7 @@ def drum_tension(state: Equilibrium) -> Array:
     Along an exact cable without friction T + T^2/(2 EA) - w z is constant, z the height. Cables of the other models
     weigh nothing behind their pulleys, and have the chord tension there.
 
-    Returns tensions [N], shape (m,) or (N, m); negative where a slack cable hangs down from a drum, NaN where one would
+    Returns tensions [N], shape (m,) or (N, m); negative where a slack cable leaves a drum downward, NaN where one would
     be pressed to less than no length.
 
     Source:

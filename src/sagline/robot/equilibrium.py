@@ -29,7 +29,7 @@ from sagline.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact(Result):
-    """Cables on pulleys and dead cable behind them; fields of shape (m,) or (N, m).
+    """Cables on pulleys, and their dead lengths; fields of shape (m,) or (N, m).
 
     Attributes:
         wrap_angle: Psi, the angle over which a cable lies on its pulley [rad].
@@ -69,10 +69,10 @@ class Equilibrium(Result):
         pose: Pose of the platform, single or a batch of N.
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
-        cables: State of the hanging cables, from where they leave the frame to their platform ends, fields of shape
+        cables: State of the free spans, from where they leave the frame to their platform ends, fields of shape
             (m,) or (N, m).
-        contact: What is behind them, on pulleys and as dead cable; None where nothing is: a cable then starts at its
-            frame anchor and is all there is off the drum.
+        contact: Wrapped and dead lengths behind them; None without any: a cable then starts at its frame anchor, and
+            its length is all off the drum.
     """
 
     robot: Robot | tuple[Robot, ...]
@@ -83,14 +83,14 @@ class Equilibrium(Result):
 
     @property
     def unstrained_length(self) -> Array:
-        """L: all cable off the drum, hanging, wrapped and dead [m], shape (m,) or (N, m)."""
+        """L: all cable off the drum: free, wrapped and dead length [m], shape (m,) or (N, m)."""
         if self.contact is None:
             return self.cables.unstrained_length
         return locked(self.free_length + (self.contact.wrapped_length + self.contact.dead_length))
 
     @property
     def free_length(self) -> Array:
-        """Unstrained length of the hanging cables [m], shape (m,) or (N, m)."""
+        """Unstrained length of the free spans [m], shape (m,) or (N, m)."""
         return self.cables.unstrained_length
 
     @property
@@ -174,7 +174,7 @@ def limited_tension(robot: Robots, cables: CableState, contact: Contact | None =
 def cables_of_results(
     robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
 ) -> tuple[CableState, Contact | None]:
-    """State of the free spans of solved poses, and of their routing, or None without pulleys and dead cable.
+    """State of the free spans of solved poses, and of their routing, or None without pulleys and dead lengths.
 
     results: rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: ()
     for a single pose, (N,) for a batch.

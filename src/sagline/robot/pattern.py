@@ -34,7 +34,7 @@ def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
 def _plane_axes(normal: Array) -> Array:
     horizontal = np.cross((0.0, 0.0, 1.0), normal)  # its length is the sine of the normal's angle to the vertical
     length = float(np.linalg.norm(horizontal))
-    if length < 1e-12:  # a level plane, but for rounding: every direction is horizontal, x is as good as any
+    if length < 1e-12:  # a level plane, up to rounding: every direction is horizontal, x is as good as any
         horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
         length = float(np.linalg.norm(horizontal))
     first = horizontal / length

@@ -163,7 +163,7 @@ class Pose:
 
     @classmethod
     def _adopt(cls, position: Array, quaternion: Array) -> Pose:
-        """A pose around arrays of our own making: no copy, no check but that their counts agree."""
+        """A pose around arrays of our own making: no copy; only their counts are checked."""
         pose = object.__new__(cls)
         pose._fill(position, quaternion)
         return pose

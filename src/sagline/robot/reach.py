@@ -86,13 +86,13 @@ def out_of_plane(robot: Robot, pose: Pose) -> Array:
     return distance
 
 
-_FLAT: Final = 0.05  # anchors that differ in height by less than this, of the robot's size, all hang at the top
+_FLAT: Final = 0.05  # anchors that differ in height by less than this, of the robot's size, are all at the top
 
 
 def bounds(robot: Robot) -> tuple[Array, Array]:
-    """Lowest and highest corner of the box that the robot stands in [m]: its frame, or what its anchors span.
+    """Lowest and highest corner of the box around the robot [m]: its frame, or the range of its anchors.
 
-    Frames stand: their top is where the highest anchors are. Where all anchors hang at the top and no frame is given,
+    Frames stand: their top is where the highest anchors are. Where all anchors are at the top and no frame is given,
     the box reaches down to the floor, or to the lowest pose that the robot is meant for.
 
     Returns the two corners, shape (3,) each.

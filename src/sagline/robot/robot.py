@@ -33,7 +33,7 @@ class Robot(Shown):
         frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
         cables: Material of the cables, one for all or one a cable; fields of shape (m,).
-        winches: Pulleys, dead cable, drums and motors behind the frame anchors, one for all cables or one a cable,
+        winches: Pulleys, dead lengths, drums and motors behind the frame anchors, one for all cables or one a cable,
             fields of shape (m,); None where cables start at the frame anchors and their lengths are given to them
             directly.
         mass: Mass of the platform [kg], > 0.
@@ -176,7 +176,7 @@ class Robot(Shown):
             choice(name, "field", Robot.__slots__)
         guides = None if self.winches is None else self.winches.guides
         if self.winches is not None and guides is not None and "frame_anchors" in changes and "winches" not in changes:
-            changes["winches"] = self.winches.replace(guides=guides)  # dead cable follows anew
+            changes["winches"] = self.winches.replace(guides=guides)  # the dead length follows again
         return evolve(self, **changes)._kept(self) if "calibration" not in changes else evolve(self, **changes)
 
     def _kept(self, before: Robot) -> Robot:

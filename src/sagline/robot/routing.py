@@ -5,7 +5,7 @@ difference of unstrained length between the actual routing and that run; docs/mo
 
 Friction: over a bend of the angle psi tensions differ by exp(mu psi), and the pulley's bearing takes the share f; both
 are larger toward the drum while winding in. What the weight on the pulley changes is kept to first order: as if nothing
-rubbed. Between guides a cable hangs as a catenary: its far end's tension follows, so that T + T^2/(2 EA) - w z is the
+rubbed. Between guides a cable is a catenary: its far end's tension follows, so that T + T^2/(2 EA) - w z is the
 same number along all of it where nothing rubs.
 """
 
@@ -38,7 +38,7 @@ class _Routing(NamedTuple):
     """Cable behind the exit points, arrays of shape (N, m)."""
 
     wrapped: Array  # unstrained length on the pulleys [m]
-    dead: Array  # unstrained length between pulleys and drums [m]; NaN where the cable is too slack to hang there
+    dead: Array  # unstrained length between pulleys and drums [m]; NaN where the cable is too slack for a catenary
     drum_tension: Array  # where the cables leave the drums [N]
 
 
@@ -81,7 +81,7 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
 
     state: robot, pose and cables as kernels have them; winding: +1 winding in, -1 paying out, 0 standing, shape (m,) or
     (N, m); None: nothing rubs. Returns the equilibrium with other wrapped and dead lengths, NaN where a cable is too
-    slack to hang between guides; the same one where nothing is behind its frame anchors.
+    slack for a catenary between guides; the same one where nothing is behind its frame anchors.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -240,7 +240,7 @@ def _guided_spans(
 
 
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
-    """Cables that hang over steps (K, 3) with a given tension at their upper, "platform", ends; NaN where none does.
+    """Catenaries over steps (K, 3) with a given tension at their upper, "platform", ends; NaN where none does.
 
     That tension grows with the one along the chord, down to a least tension: below it the cable would run out.
     """
@@ -272,7 +272,7 @@ def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity:
 
 
 def _tangents(span: CableState, step: Array) -> tuple[Array, Array]:
-    """Unit tangents of hanging cables at the ends of a step, at its start first, both toward the platform."""
+    """Unit tangents of catenaries at the ends of a step, at its start first, both toward the platform."""
     level = np.hypot(step[:, 0], step[:, 1])[:, None]
     outward = step[:, :2] / np.maximum(level, _TINY)
 

@@ -109,7 +109,7 @@ class Provenance:
         log: The log of readings that it used.
         date: When it was done, ISO 8601.
         standard_error: Name of what was found -> standard error of the robot's number, in the shape of the field and
-            its SI unit; infinite where neither reading nor prior told of it. The names are those of tolerances.
+            its SI unit; infinite with neither observations nor a prior. The names are those of tolerances.
         note: What else a user should know.
 
     Raises:

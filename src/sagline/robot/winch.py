@@ -1,4 +1,4 @@
-"""The machine between encoder and cable: motor, gear, drum, dead cable and pulley."""
+"""The machine between encoder and cable: motor, gear, drum, dead length and pulley."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sagline.core.memory import check_memory
 from sagline.robot.pose import unit
 
 UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
-_AGREEING: Final = 1e-9  # of the dead cable: how far a given one may be from that of the guides
+_AGREEING: Final = 1e-9  # of the dead length: largest difference of a given one to that of the guides
 MOST_NAMED: Final = 3  # fields that a message names
 _AXES: Final = {"swivel_axis": 1, "guides": 2}  # of a field for one cable, where it is no number
 
@@ -46,8 +46,8 @@ class Winch:
             are guides a robot fills it in.
         guides: Eyelets, or pulleys small enough to be points, that a cable passes on its way from the drum to the frame
             anchor, world axes [m], shape (..., k, 3): the first is where it leaves the drum, the frame anchor is not
-            among them. Between two of them it hangs freely. None: the dead cable is guided all along. Stiffness and
-            sensitivities are those of a straight guided run of the same length.
+            among them. Between two of them it is a free catenary. None: the dead length is guided all along. Stiffness
+            and sensitivities are those of a straight guided run of the same length.
         drum_radius: Radius of the drum at the bottom of the cable [m]; None where the drum is not known.
         drum_width: Width that the cable may fill, along the drum's axis [m], >= groove_pitch; a layer has drum_width
             over groove_pitch turns, which need not be whole. None: wide enough for one layer.
@@ -63,7 +63,7 @@ class Winch:
         count_zero: Counts at which length_zero is off the drum.
         length_zero: Length of cable off the drum at count_zero, at the winding tension, with dead_cable for the run
             to the pulley [m]; `home` finds it.
-        cable_length: All there is of the cable, on the drum and off it, at the winding tension [m]; no less
+        cable_length: Whole length of the cable, on the drum and off it, at the winding tension [m]; no less
             than dead_cable.
         winding_tension: Tension at which the cable lies on the drum [N], >= 0.
         inertia: Moment of inertia of motor, gear and drum at the motor's shaft [kg m^2].
@@ -82,7 +82,7 @@ class Winch:
     have the shape (k, 3) for all cables or (m, k, 3), k >= 1, and leave dead_cable and dead_rise at 0.
 
     Raises:
-        InvalidValueError: If a value is out of its range, the dead cable rises by more than its length or is longer
+        InvalidValueError: If a value is out of its range, the dead length rises by more than itself or is longer
             than all of the cable, a gear is zero, a swivel axis is not vertical, two guides in a row coincide, or
             the shapes do not fit.
 
@@ -148,7 +148,7 @@ class Winch:
 
     @property
     def anything_behind(self) -> bool:
-        """True if a cable runs over a pulley, or has dead cable behind it; guides count once a robot has them."""
+        """True if a cable runs over a pulley, or has a dead length behind it; guides count once a robot has them."""
         return bool(self.pulley_radius.any() or self.dead_cable.any())
 
     def per_cable(self, count: int) -> Winch:
@@ -210,11 +210,11 @@ class Winch:
         for name in changes:
             choice(name, "field", self.__slots__)
         if self.guides is not None and changes.get("guides") is not None:
-            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # they follow anew
+            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # they follow again
         return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
-        """These winches with the dead cable that follows from their guides.
+        """These winches with the dead length that follows from their guides.
 
         Args:
             frame_anchors: Where the guides lead to, world axes [m], shape (m, 3).
@@ -223,7 +223,7 @@ class Winch:
             Winch with fields of shape (m,); this one where there are no guides.
 
         Raises:
-            InvalidValueError: If the last guide is at the frame anchor, or a dead cable or rise other than 0 is given
+            InvalidValueError: If the last guide is at the frame anchor, or a dead length or rise other than 0 is given
                 and is not what follows from the guides to a billionth.
         """
         if self.guides is None:
@@ -373,5 +373,5 @@ def _check_whole(dead_cable: Array, cable_length: Array | None) -> None:
             f"winches: cable_length[{i}]",
             f"{cable_length.flat[i]:g} m",
             f">= {dead_cable.flat[i]:g} m, its dead_cable",
-            "All there is of a cable reaches from the drum to the pulley at least; correct one of the two.",
+            "A cable reaches from the drum to the pulley at least; correct one of the two.",
         )

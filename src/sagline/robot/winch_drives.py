@@ -54,7 +54,7 @@ class WinchDrive:
             The winch; its gear, inertia and limits are the drive's, the drum's inertia included.
 
         Raises:
-            InvalidValueError: If a value is out of its range, or a field is none of `Winch` or one of the drive's.
+            InvalidValueError: If a value is out of its range, or a field is not one of `Winch` or one of the drive's.
 
         Examples:
             >>> import sagline as sl

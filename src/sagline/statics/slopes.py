@@ -37,7 +37,7 @@ class CableSlopes(NamedTuple):
     by_density: Array  # dT/d(rho), shape (..., m, 3) [N m/kg]
     by_stiffness: Array  # dT/d(EA), shape (..., m, 3) [1]
     by_radius: Array  # dT/dR of the pulley, shape (..., m, 3) [N/m]
-    by_dead: Array  # dT by the length of the dead cable, shape (..., m, 3) [N/m]
+    by_dead: Array  # dT by the dead length, shape (..., m, 3) [N/m]
     levers: Array  # from the center of mass to the platform ends, shape (..., m, 3) [m]
     force: Array  # T, on the platform ends, shape (..., m, 3) [N]
 

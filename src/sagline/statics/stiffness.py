@@ -18,7 +18,7 @@ from sagline.statics.strings import strings_below, strings_of
 _SINGULAR = 1e-14  # determinant, at diagonal elements of 1
 # of the largest square of a frequency: less positive, and less negative, is rounding
 NEUTRAL, UNSTABLE = 1e-13, 1e-10
-_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # a cable of a state, while it is worked out
+_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # a cable of a state, while it is computed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,14 +32,14 @@ class Stiffness(Result):
     Attributes:
         state: The state it belongs to.
         matrix: -d(wrench of the cables)/d(motion) at fixed lengths: elastic, sag and geometric stiffness, shape
-            (..., 6, 6). Symmetric but for half the given moment, whose direction does not turn with the platform.
+            (..., 6, 6). Symmetric except for half the given moment, whose direction does not turn with the platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
         stiffness_sensitivity: d(motion)/d(axial stiffness) of each cable, shape (..., 6, m) [m/N, rad/N].
         pulley_radius_sensitivity: d(motion)/d(pulley radius) of each cable, the length off the drum held, shape
             (..., 6, m) [m/m, rad/m]; of the shallow models as of the exact one, as is the next.
-        dead_cable_sensitivity: d(motion)/d(length of the dead cable) in the same way, shape (..., 6, m) [m/m, rad/m].
+        dead_cable_sensitivity: d(motion)/d(dead length) in the same way, shape (..., 6, m) [m/m, rad/m].
         cable_stiffness: dT/dB of each cable, T the force on its platform end, B that end's position, world axes, shape
             (..., m, 3, 3) [N/m].
         frame_anchor_sensitivity: d(motion)/d(frame anchor, world axes) at fixed lengths, shape (..., 6, m, 3)

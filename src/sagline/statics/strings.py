@@ -1,4 +1,4 @@
-"""Cables as strings: what their vibrations about an equilibrium need to know of them."""
+"""Cables as strings: the data of their vibrations about an equilibrium."""
 
 from __future__ import annotations
 

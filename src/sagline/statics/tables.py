@@ -64,7 +64,7 @@ def _cable_rows(robot: Robot) -> Array:
 
 
 def _behind(robot: Robot) -> Array:
-    """Data behind the frame anchors: pulley radius, entry, dead cable and its rise, (m, 4)."""
+    """Data behind the frame anchors: pulley radius, entry, dead length and its rise, (m, 4)."""
     none = np.zeros(robot.cable_count)
     run = (none, none) if robot.winches is None else (robot.winches.dead_cable, robot.winches.dead_rise)
     return np.stack((*pulleys_of(robot), *run), axis=1)

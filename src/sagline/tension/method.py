@@ -145,7 +145,7 @@ def takes_default_kernel(tension: TensionMethod) -> bool:
 
 
 def check_sharing(robot: Robot, tension: TensionMethod, name: str | None = None) -> None:
-    """Refuse a robot among whose cables a method cannot share the load."""
+    """Refuse a robot for which a tension distribution method is undefined."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     called = name or robot.name
     item = f"{called}: number of cables"

@@ -193,7 +193,7 @@ class AnalyticCenter(TensionMethod):
 
     Smooth wherever the feasible set has an inside: no limit ever becomes active. Near the border of the workspace,
     where the set shrinks to a point, it follows. Any number of redundant cables; the same point in every variable.
-    Choose it for controllers that want differentiable tensions. A set without end has no center: UNBOUNDED.
+    Choose it for controllers that need differentiable tensions. A set without end has no center: UNBOUNDED.
 
     Source:
         Di Paola, Goldsztejn, Zoso & Caro 2023, "Analytic center based tension distribution for cable-driven
@@ -223,7 +223,7 @@ class ImprovedClosedForm(TensionMethod):
     """The closed form, but a cable that misses its limit most is held there and the rest shared again.
 
     As many times as there are redundant cables; covers nearly all of the feasible poses, and says NOT_COVERED for the
-    others. Continuous but for changes of the held cable. Choose it where ClosedForm ends too early.
+    others. Continuous except at changes of the held cable. Choose it where ClosedForm ends too early.
 
     Source:
         Pott 2014, "An improved force distribution algorithm for over-constrained cable-driven parallel robots".

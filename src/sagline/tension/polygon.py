@@ -37,14 +37,14 @@ class TensionPolygon(Result):
             redundant cable one point without coordinates, shape (1, 0). Shape (0, r) where nothing is feasible.
         tensions: The article's Omega_t: tensions at the vertices [N], in the distribution's variable, shape (h, m).
         sides: The limit that each side is, from vertex k to vertex k + 1 (at vertex k for an interval); None where the
-            polygon has no such side: it is unbounded there, and the vertices at both ends only stand in for infinity.
+            polygon has no such side: it is unbounded there, and the vertices at both ends only represent infinity.
         bounded: Whether every side is a limit.
         basis: Orthonormal basis of the null space, shape (r, m).
         origin: The minimum-norm tensions of the balance without limits [N], shape (m,).
         scale: The distribution's variable is scale times the chord tension plus offset, shape (m,): 1, or cos phi for
         the
             horizontal tension, or the slope of the frame-end tension.
-        offset: Zero but for the frame-end tension [N], shape (m,).
+        offset: Zero except for the frame-end tension [N], shape (m,).
     """
 
     vertices: Array
