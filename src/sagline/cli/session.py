@@ -24,22 +24,9 @@ from sagline.robot.pose import Pose
 
 EVERY: Final = 0.2  # s between two updates of the status line
 PROMPT: Final = "> "
-FAILED: Final = 1  # exit code where a fault ended it
-LATE: Final = 0.02  # s, of which a note at the end tells
+FAILED: Final = 1  # exit code after a fault
+LATE: Final = 0.02  # s, above which a note is printed at the end
 AXES: Final = ("x", "y", "z")
-HELP: Final = (
-    ("home [X,Y,Z[,A,B,C]]", "the platform is held there: set lengths and begin; the middle of its box if left out"),
-    ("goto X,Y,Z[,A,B,C]", "straight there [m, degrees]"),
-    ("run FILE", "follow a path, path.yaml"),
-    ("jog WINCH LENGTH", "one winch, from 0: jog 3 +5mm lets cable out"),
-    ("jog AXIS LENGTH", "the platform: jog z -10mm"),
-    ("pause, resume, stop", "on the path's clock; stop gives the path up"),
-    ("wait SECONDS", "go on and do nothing else"),
-    ("state", "where it is, and what the cells read"),
-    ("ack", "what was wrong is mended"),
-    ("off, connect", "give the machine back, and take it again"),
-    ("quit", "give it back and end"),
-)
 
 
 class StatusLine:
@@ -95,7 +82,7 @@ class StatusLine:
 
 
 class _Line(NamedTuple):
-    """A line that was read: its text, None at the end of the input, and its action, which raises what is wrong."""
+    """A line: its text, None at the end of the input, and its action, which raises its error."""
 
     text: str | None
     act: Callable[[], object]
@@ -105,35 +92,35 @@ class OperatorSession:
     """Lines that are read, cycles of the controller, and events that are printed."""
 
     def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
-        """Prepare a session.
-
-        Args:
-            controller: The controller.
-            alone: Whether the lines come from a pipe: they wait for one another, and the first error ends it.
-            shadow: Whether the controller only reads and no lines are taken.
-        """
+        """Prepare a session: `alone` for lines from a pipe, which wait for one another; `shadow` to read only."""
+        control = controller
         self.control, self._alone, self._shadow = controller, alone, shadow
         self._event_count = 0
         self._ended = self._is_interrupted = False
         self._wait = 0  # cycles
         self._lines: SimpleQueue[_Line] = SimpleQueue()
         self._line = StatusLine(shown=not alone)
-        # how the rest of a line is understood, and its action, by the first word
-        self._words: dict[str, tuple[Callable[[str], Any], Callable[[Any], object]]] = {
-            "home": (self._home_pose, self.control.home),
-            "goto": (partial(_pose, "goto"), lambda pose: self.control.start(self.control.path_to(pose))),
-            "run": (load_path, self.control.start),
-            "jog": (self._jog, lambda jog: jog()),
-            "pause": (_nothing, lambda _: self.control.pause()),
-            "resume": (_nothing, lambda _: self.control.resume()),
-            "stop": (_nothing, lambda _: self.control.stop()),
-            "wait": (self._cycles, self._wait_for),
-            "state": (_nothing, lambda _: self._show_state()),
-            "ack": (_nothing, lambda _: self.control.acknowledge()),
-            "connect": (_nothing, lambda _: self.control.connect()),
-            "off": (_nothing, lambda _: self.control.off()),
-            "help": (_nothing, lambda _: self._show_help()),
-            "quit": (_nothing, lambda _: self._end()),
+        # arguments, help, parser of the arguments and action, by the first word
+        self._words: dict[str, tuple[str, str, Callable[[str], Any], Callable[..., object]]] = {
+            "home": (
+                "[X,Y,Z[,A,B,C]]",
+                "set lengths and start at this pose, by default the middle of the test box",
+                self._home_pose,
+                control.home,
+            ),
+            "goto": ("X,Y,Z[,A,B,C]", "move straight to a pose [m, degrees]", partial(_pose, "goto"), self._go_to),
+            "run": ("FILE", "follow a path, path.yaml", load_path, control.start),
+            "jog": ("WINCH|AXIS LENGTH", "jog 3 +5mm: a winch, from 0; jog z -10mm: the platform", self._jog, _call),
+            "pause": ("", "pause the path", _nothing, control.pause),
+            "resume": ("", "resume the path", _nothing, control.resume),
+            "stop": ("", "stop and abandon the path", _nothing, control.stop),
+            "wait": ("SECONDS", "wait before the next line", self._cycles, self._wait_for),
+            "state": ("", "show pose, lengths and tensions", _nothing, self._show_state),
+            "ack": ("", "acknowledge a fault", _nothing, control.acknowledge),
+            "connect": ("", "take control of the machine", _nothing, control.connect),
+            "off": ("", "release the machine", _nothing, control.off),
+            "help": ("", "show this list", _nothing, self._show_help),
+            "quit": ("", "release the machine and end", _nothing, self._end),
         }
 
     def run(self) -> int:
@@ -156,17 +143,17 @@ class OperatorSession:
 
     def _begin(self) -> None:
         if self._shadow:
-            show_text("Reads only: nothing is sent. Ctrl-C ends it.")
+            show_text("Read only: nothing is sent. Ctrl-C ends the session.")
             return
         self.control.connect()
         self._show_events()
         if not self._alone:
-            show_text("help lists what there is to say; home comes first.")
+            show_text("help lists the commands; begin with home.")
         Thread(target=self._read, name="sagline lines", daemon=True).start()
         self._line.ask()
 
     def _read(self) -> None:
-        """Read lines, and the numbers and files in them, in a thread of its own."""
+        """Read and parse lines in a separate thread."""
         for line in sys.stdin:
             for part in line.split(";"):
                 self._lines.put(self._parse(part.strip()))
@@ -181,9 +168,10 @@ class OperatorSession:
             if word not in self._words:
                 near = nearest(word, self._words)
                 step = f"Did you mean {near}?" if near else "help lists them."
-                raise InvalidValueError("the line", repr(text), "one that begins with a word that is known", step)
-            parse, act = self._words[word]
-            return _Line(text, partial(act, parse(rest.strip())))
+                raise InvalidValueError("the line", repr(text), "one that begins with a known word", step)
+            _, _, parse, act = self._words[word]
+            arguments = parse(rest.strip())
+            return _Line(text, act if parse is _nothing else partial(act, arguments))
         except SaglineError as error:
             return _Line(text, partial(_refuse, error))
 
@@ -205,8 +193,8 @@ class OperatorSession:
         self._show_events()
         pace = control.pace
         if pace is not None and pace.lateness.longest > LATE:
-            often = f"{1e3 * pace.lateness.quantile(0.999):.1f} ms in 999 of 1000 cycles"
-            show_note("Note: ", f"cycles began up to {1e3 * pace.lateness.longest:.0f} ms late, {often} no more.")
+            often = f"{1e3 * pace.lateness.quantile(0.999):.1f} ms in 999 of 1000"
+            show_note("Note: ", f"cycles began up to {1e3 * pace.lateness.longest:.0f} ms late, at most {often}.")
 
     def _cycle(self) -> None:
         self.control.cycle()
@@ -215,7 +203,7 @@ class OperatorSession:
         self._line.update(self._status)
 
     def _next_line(self) -> _Line | None:
-        """The next line: at once if an operator types, from a pipe when the platform is at rest."""
+        """The next line: at once from an operator, from a pipe when the platform is at rest."""
         if self._wait or (self._alone and self.control.moving):
             return None
         if self._alone and self.control.state in (State.FAULT, State.EMERGENCY):
@@ -238,6 +226,9 @@ class OperatorSession:
             show_note("Error: ", str(error), style="bold red")
         self._show_events()
         self._line.ask()
+
+    def _go_to(self, pose: Pose) -> None:
+        self.control.start(self.control.path_to(pose))
 
     def _home_pose(self, text: str) -> Pose:
         return _pose("home", text) if text else middle_pose(self.control.robot)
@@ -292,15 +283,20 @@ class OperatorSession:
             show_text(f"cycles late      {1e3 * often:.1f} ms (999 of 1000), {1e3 * most:.1f} ms at most")
 
     def _show_help(self) -> None:
-        wide = max(len(words) for words, _ in HELP)
-        for words, sense in HELP:
-            show_text(f"{words.ljust(wide)}  {sense}")
+        usages = {f"{word} {arguments}".strip(): text for word, (arguments, text, _, _) in self._words.items()}
+        wide = max(map(len, usages))
+        for usage, text in usages.items():
+            show_text(f"{usage.ljust(wide)}  {text}")
 
 
 def _pose(item: str, text: str) -> Pose:
     if not text:
-        raise InvalidValueError(item, "without a pose", "X,Y,Z or X,Y,Z,A,B,C", f"Say {item} 0.2,-0.4,1.4.")
+        raise InvalidValueError(item, "without a pose", "X,Y,Z or X,Y,Z,A,B,C", f"Enter {item} 0.2,-0.4,1.4.")
     return pose_of_text(text, item, f"Give meters, and degrees about z, y and x: {item} 0.2,-0.4,1.4.")
+
+
+def _call(action: Callable[[], object]) -> None:
+    action()
 
 
 def _nothing(text: str) -> None:
