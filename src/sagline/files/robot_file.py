@@ -5,19 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from sagline.core.arguments import brief, file_path, instance
 from sagline.core.arrays import Array
 from sagline.core.errors import FileError, InvalidValueError, nearest
-from sagline.files.mesh_file import load_mesh
 from sagline.files.reading import exists, read_text
 from sagline.files.robot_schema import SWIVEL_AXES, ObstacleEntry, RobotEntry
 from sagline.files.yaml_text import YAML_LIMIT, dump_mapping, parse_mapping, validate
-from sagline.interference.pairs import Obstacle
 from sagline.robot.catalogue import preset_text, robot_names
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
+
+if TYPE_CHECKING:
+    from sagline.interference.pairs import Obstacle
 
 
 def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
@@ -206,4 +207,6 @@ def _obstacle(place: ObstacleEntry, item: str, path: Path) -> Obstacle:
         raise FileError.of(path, error) from None
     if solid is not None:
         return solid
+    from sagline.files.mesh_file import load_mesh
+
     return load_mesh(path.parent / str(place.mesh), place.unit, place.name).placed(place.pose(item))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import reprlib
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from pydantic import Field, create_model, model_validator
@@ -14,15 +14,16 @@ from sagline.core.arguments import label
 from sagline.core.arrays import Array, checked, exactly, number
 from sagline.core.errors import InvalidValueError
 from sagline.core.fields import units
-from sagline.files.mesh_file import meters
 from sagline.files.quantity import in_si, plain_number
 from sagline.files.yaml_text import YamlEntry
-from sagline.interference.obstacles import Box, Capsule, Sphere
 from sagline.robot.inertia import box_inertia, cylinder_inertia
 from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 from sagline.robot.tolerances import UNCERTAIN, Provenance, of_share, value_of
 from sagline.robot.winch import Winch
+
+if TYPE_CHECKING:
+    from sagline.interference.obstacles import Box, Capsule, Sphere
 
 _KINDS: Final = {  # and the keys that may stand beside each
     "box": ("center", "turned"),
@@ -92,6 +93,9 @@ class ObstacleEntry(YamlEntry):
 
     def solid(self, item: str) -> Box | Capsule | Sphere | None:
         """Box, capsule or sphere of the entry; None for a mesh, whose values are checked but not its file."""
+        from sagline.files.mesh_file import meters  # here: most robot files have no scene
+        from sagline.interference.obstacles import Box, Capsule, Sphere
+
         kind = self._kind(item)
         if kind == "mesh":
             self.pose(item)
