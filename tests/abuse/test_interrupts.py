@@ -49,7 +49,7 @@ COMMANDS: tuple[tuple[str, ...], ...] = (  # the last three test_killed_commands
     ("convert", "cogiro", "--format", "mjcf", "--out", "out.xml"),
     TRACK,
 )
-INTERRUPTED = "Interrupted. What has been written is whole.\n"
+INTERRUPTED = "Interrupted. All written files are complete.\n"
 
 # Ctrl-C comes from a thread of the process itself, so that the moment is counted from where the command begins
 TIMED = """

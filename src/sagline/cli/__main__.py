@@ -1,4 +1,4 @@
-"""Entry point of the shell and of `python -m sagline.cli`; it handles Ctrl-C before it loads anything."""
+"""Entry point of the shell and of `python -m sagline.cli`; it handles Ctrl-C before any import."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from sagline.cli.ending import INTERRUPTED, exit_code_of
 
 def app_entry() -> None:
     """Run the command and end the process."""
-    for descriptor in range(3):  # one that the caller closed would be taken by the first file that is opened
+    for descriptor in range(3):  # the first opened file would get the number of a closed one
         try:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDONLY if descriptor == 1 else os.O_RDWR)
-            if descriptor == 1:  # refuses whatever is written, so that nothing is lost without a word
+            if descriptor == 1:  # every write fails, so that no output is lost silently
                 sys.stdout = os.fdopen(1, "w", encoding="utf-8", closefd=False)
     debug = "--debug" in sys.argv
     code = exit_code_of(lambda: _command(debug), debug=debug, last=True)
@@ -32,7 +32,7 @@ def _command(debug: bool) -> object:
     from sagline.cli.ending import report_thread
     from sagline.cli.main import app
 
-    if not debug:  # what libraries have to say is for developers
+    if not debug:  # warnings of libraries are for developers
         warnings.simplefilter("ignore")
         logging.getLogger().addHandler(logging.NullHandler())
         threading.excepthook = report_thread

@@ -137,7 +137,7 @@ def compile_all(names: Sequence[str], report: Callable[[Stage], None]) -> None:
         for name in here:
             ENTRIES[name].compile()
         while listener.is_alive():
-            listener.join(0.1)  # an interrupt is compilation_events in between
+            listener.join(0.1)  # an interrupt is handled in between
         side.move_kernels()
     for name in not_compiled(waiting):  # the other process failed
         ENTRIES[name].compile()
@@ -166,7 +166,7 @@ class CompilerProcess:
         return subprocess.Popen(
             [sys.executable, "-m", "sagline.cli.compilation", *names],
             env={**os.environ, "NUMBA_CACHE_DIR": str(self._folder)},
-            stdin=subprocess.PIPE,  # its end of file tells that this process has ended
+            stdin=subprocess.PIPE,  # its end of file is the end of this process
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
@@ -245,9 +245,9 @@ def _print_stage(stage: Stage) -> None:
 def _end_with_parent() -> None:
     from sagline.kernels.jit import FOLDER
 
-    os.read(0, 1)  # nothing is ever written: it returns when the other process has ended
+    os.read(0, 1)  # nothing is written: this returns when the other process has ended
     if FOLDER.parent.name.startswith(PREFIX):
-        # another program in this process: nothing compiles on and writes a file behind what is removed
+        # another program in this process: no compilation continues and writes into the removed folder
         os.execv(sys.executable, [sys.executable, "-c", REMOVE, str(FOLDER.parent)])
     os._exit(1)
 

@@ -48,19 +48,19 @@ def design(
     from sagline.optimization.front import FRONT
     from sagline.optimization.request import MOST_EVALUATIONS
 
-    first, asked = load_robot(robot), load_design(file)
+    first, request = load_robot(robot), load_design(file)
     if evaluations is not None:
-        asked["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
+        request["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
     output = Output(out, [FRONT], [FIGURE] * figures)
     rated = [0]
-    with working(f"{first.name}: evaluating robots", *_needed(asked["goals"])) as line:
+    with working(f"{first.name}: evaluating robots", *_needed(request["goals"])) as line:
 
         def show_progress(done: int, total: int) -> None:
             rated[0] = done
             line.progress(done, total)
 
         try:
-            front = search(first, **asked, folder=out, progress=show_progress)
+            front = search(first, **request, folder=out, progress=show_progress)
         except KeyboardInterrupt:
             show_note("", f"{rated[0]:,} evaluated robots are in {out}: the same command continues.")
             raise

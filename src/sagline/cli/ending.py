@@ -58,7 +58,7 @@ def report_thread(failed: ExceptHookArgs) -> None:
 def _finished(command: Callable[[], object]) -> int:
     code = command()
     if sys.stdout is not None:
-        sys.stdout.flush()  # what cannot be written is an error of this command, not of Python's last moments
+        sys.stdout.flush()  # a write error belongs to this command, not to the end of Python
     return code if isinstance(code, int) else 0
 
 
@@ -95,7 +95,7 @@ def _message(error: BaseException) -> tuple[str, str, int]:
     if isinstance(error, SaglineError):
         return HEAD, str(error), BAD_INPUT
     if isinstance(error, Abort):
-        return HEAD, "the input ended before all was answered. Answer, or give the options.", BAD_INPUT
+        return HEAD, "the input ended before all questions were answered. Answer them, or give the options.", BAD_INPUT
     if hasattr(error, "format_message"):  # of the command line itself
         return HEAD, _usage(error), BAD_INPUT
     if isinstance(error, MemoryError):
@@ -111,8 +111,8 @@ def _message(error: BaseException) -> tuple[str, str, int]:
         return HEAD, f"{what}: {error.strerror or error}. {step}", BAD_INPUT
     what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     (what,) = shortened((what,), 120)
-    told = f"{what}. This is a mistake in sagline: please report it to {REPORT}, with the command"
-    return "Unexpected error: ", f"{told} and its files; the option --debug shows where it happened.", UNEXPECTED
+    text = f"{what}. This is a mistake in sagline: please report it to {REPORT}, with the command"
+    return "Unexpected error: ", f"{text} and its files; the option --debug shows the traceback.", UNEXPECTED
 
 
 def _usage(error: BaseException) -> str:
@@ -130,16 +130,16 @@ def _usage(error: BaseException) -> str:
 
 def _interrupted() -> int:
     _give_up_unwritable()
-    # forgets an interrupt inside another exec, for which Python would end itself by the signal, whatever we say
+    # clears an interrupt inside another exec, after which Python would end itself by the signal
     exec("")
-    with suppress(OSError, ValueError, AttributeError):  # plain: the library that writes may be half loaded
-        sys.stderr.write("Interrupted. What has been written is whole.\n")
+    with suppress(OSError, ValueError, AttributeError):  # plain: the output library may be partly loaded
+        sys.stderr.write("Interrupted. All written files are complete.\n")
         sys.stderr.flush()
     return INTERRUPTED
 
 
 def _give_up_unwritable() -> None:
-    """Drop the buffer of a stdout that cannot be written: Python would try again at its end, and complain."""
+    """Drop the buffer of a stdout that cannot be written; else Python would try again at its end."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -165,7 +165,7 @@ class _Interrupts:
 
     def _receive(self, number: int, frame: FrameType | None) -> None:
         self.received = True
-        sys.unraisablehook = lambda _: None  # what half-made objects say when they are thrown away helps nobody
+        sys.unraisablehook = lambda _: None  # messages of unfinished objects are not useful
         signal.default_int_handler(number, frame)
 
     def ignore(self) -> None:

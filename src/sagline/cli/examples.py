@@ -32,9 +32,9 @@ def examples(
     """
     sources = example_files()
     check_folder(folder)
-    taken = [file.name for file in sources if (folder / file.name).exists()]
-    if taken and not force:
-        raise FileError(folder / taken[0], "exists", "Choose another folder with --out, or replace it with --force.")
+    existing = [file.name for file in sources if (folder / file.name).exists()]
+    if existing and not force:
+        raise FileError(folder / existing[0], "exists", "Choose another folder with --out, or replace it with --force.")
     create_folder(folder)
     for file in sources:
         with atomic_file(folder / file.name) as partial:

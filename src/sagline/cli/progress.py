@@ -47,7 +47,7 @@ class ProgressLine:
         """Compile entries of the kernels."""
         if entries:
             compile_all(entries, self.show_compilation)
-            self.stage(self._what)  # the time left does not count what was compiled
+            self.stage(self._what)  # the time left does not include the compilation
 
     def show_compilation(self, stage: Stage) -> None:
         """Show a stage of a compilation; from any thread."""

@@ -1,4 +1,4 @@
-"""Output of the commands: results on stdout, all else on stderr, without control characters for the terminal."""
+"""Output of the commands: results on stdout, notes on stderr, without control characters for the terminal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FREE = 1 << 16  # columns of a file or a pipe
 
 _out = Console(highlight=False, markup=False, emoji=False)
-_wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # where nobody looks through a window
+_wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # of files and pipes
 _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
@@ -76,7 +76,7 @@ def notices() -> Iterator[None]:
 
 def show_note(head: str, text: str, style: str = "") -> None:
     """Print one line on stderr; paths in it are not broken into lines."""
-    with suppress(OSError):  # where nobody can be told, nothing is said
+    with suppress(OSError):  # without stderr there is no message
         _err.print(Text.assemble((printable(head), style), printable(text).replace(SPACE, " ")), soft_wrap=True)
 
 
@@ -126,7 +126,7 @@ def _emit(what: RenderableType, width: int | None = None) -> None:
     console = _out if _out.is_terminal else _wide
     with _refused(), console.capture() as captured:
         console.print(what, width=width, soft_wrap=width is None, crop=False)
-    _write(captured.get().replace(SPACE, " "))  # what people search for in a pipe
+    _write(captured.get().replace(SPACE, " "))  # so that text can be searched in a pipe
 
 
 def _write(text: str) -> None:

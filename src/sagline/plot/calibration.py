@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
 PARTS: Final = ("all", "residuals", "correlation", "errors")
 BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # standard deviations, and how dense
-REACH: Final = 5.0  # standard deviations: what is farther out stands at the edge, with its number
-MOST_POSES: Final = 1500  # whose residuals are drawn; of more every so-manieth, and all that do not fit
+REACH: Final = 5.0  # standard deviations; larger residuals are drawn at the edge
+MOST_POSES: Final = 1500  # whose residuals are drawn; of more poses evenly chosen ones and all outliers
 MOST_NAMED: Final = 8  # outliers that are named
 POINTS: Final = 25  # of a map, along each side
 MARKS: Final = ("o", "s", "^", "D")
@@ -55,11 +55,10 @@ class _Kind(NamedTuple):
 def calibration(found: Calibration, part: str = "all", *, height: float | None = None) -> Figure:
     """Residuals, correlations and expected errors of a calibration.
 
-    Residuals are in standard deviations of their sensors, by rows of the log; the bands are one and two of them, what
-    does not fit has a ring, and what is off the scale is a triangle at its edge. The correlations are those of all
-    numbers that were found, by kinds. The maps show how far the platform is to be expected from where it is commanded,
-    on a level slice, before (as the priors say) and after; where the readings leave shifts and turns of the world open,
-    but for those.
+    Residuals are in standard deviations of their sensors, by rows of the log; the bands are one and two standard
+    deviations, outliers have a ring, and values off the scale are triangles at the edge. The correlations are those of
+    all estimated parameters, by kinds. The maps show the expected position error on a level slice, before (from the
+    priors) and after the calibration; without shifts and turns of the world if the readings do not observe them.
 
     Args:
         found: From `calibrate`.
@@ -99,7 +98,7 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
 
 
 def _kinds(found: Calibration) -> list[_Kind]:
-    """The residuals of what was read."""
+    """The residuals of the readings, by kinds."""
     sensors, m = found.sensors, found.robot.cable_count
     cables, axes = tuple(f"cable {k}" for k in range(m)), ("$x$", "$y$", "$z$")
     spans = (
@@ -151,7 +150,7 @@ def _residuals(figure: SubFigure, found: Calibration) -> None:
 
 
 def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
-    """A ring around what does not fit, and what it is."""
+    """Mark outliers by a ring, with cable and size."""
     named = 0
     for outlier in found.outliers:
         if outlier.quantity != kind.quantity:
@@ -171,7 +170,7 @@ def _mark_outliers(ax: Axes, found: Calibration, kind: _Kind) -> None:
 
 
 def _correlation(figure: SubFigure, found: Calibration) -> None:
-    """The matrix, kinds apart and named."""
+    """The correlation matrix with lines between kinds, and their names."""
     ax = figure.subplots()
     ax.set_facecolor(GAP_COLOR)
     image = ax.imshow(found.correlation, vmin=-1.0, vmax=1.0, cmap="PuOr_r", interpolation="nearest", rasterized=True)
@@ -193,7 +192,7 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
 
 
 def _apart(places: Array, least: float, end: float) -> Array:
-    """Rising places on a line from 0 to an end, moved so that none is nearer than that to the one before."""
+    """Ascending places between 0 and an end, moved apart to a least distance."""
     moved = np.array(places)
     for k in range(1, len(moved)):
         moved[k] = max(moved[k], moved[k - 1] + least)
@@ -204,7 +203,7 @@ def _apart(places: Array, least: float, end: float) -> Array:
 
 
 def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
-    """Maps before and after."""
+    """Maps of the expected errors before and after."""
     x, y, z = _slice(found, at)
     grid = np.stack(np.meshgrid(x, y, [z], indexing="ij"), axis=-1).reshape(-1, 3)
     poses = Pose(grid, np.eye(3))
@@ -234,14 +233,14 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
 
 
 def _height_of_maps(found: Calibration) -> float:
-    """Of two maps beside each other [in]."""
+    """Height of two maps side by side [in]."""
     x, y, _ = _slice(found, None)
     high = BESIDE + MAP * float(np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.3, 1.3))
     return 2.0 * high if current().narrow else high
 
 
 def _before(found: Calibration) -> Calibration:
-    """The robot as it was, known as the priors say."""
+    """The robot before the calibration, with its priors."""
     numbers = found.parameters
     return replace(
         found, robot=found.before, values=numbers.prior, covariance=locked(np.diag(numbers.prior_deviation**2))
@@ -256,5 +255,7 @@ def _slice(found: Calibration, at: float | None) -> tuple[Array, Array, float]:
         low, high = np.minimum(low, box.low), np.maximum(high, box.high)
     z = 0.5 * float(found.poses.position[:, 2].min() + found.poses.position[:, 2].max()) if at is None else at
     if not low[2] <= z <= high[2]:
-        raise InvalidValueError("height", f"{z:g} m", f"{low[2]:g} to {high[2]:g} m, where it works", "Give another.")
+        raise InvalidValueError(
+            "height", f"{z:g} m", f"{low[2]:g} to {high[2]:g} m, the range of its poses", "Give another."
+        )
     return np.linspace(low[0], high[0], POINTS), np.linspace(low[1], high[1], POINTS), z

@@ -73,12 +73,11 @@ def drawing(
     elevation: float = float(ELEVATION),
     ax: Axes | None = None,
 ) -> Axes:
-    """The robot at rest as a drawing for print: lines alone, and nothing seen that lies behind something else.
+    """The robot at rest as a line drawing for print, with hidden lines removed.
 
-    What is hidden is computed, not painted over: a cable that passes behind another, the frame or the platform is
-    interrupted there, so that it is clear which is in front. Every cable has its number on itself, and the color of its
-    chord tension. The platform is drawn as `sl.plot.robot` draws it, and seen from infinitely far away, so that
-    parallel lines are parallel; the three axes at the ground have one length, which is written there.
+    Hidden parts are computed, not painted over: a cable that passes behind another one, the frame or the platform is
+    interrupted there. Every cable has its number and the color of its chord tension. The projection is parallel; the
+    three axes at the ground have one length, which is written there.
 
     Args:
         robot: The robot.
@@ -110,7 +109,7 @@ def drawing(
 
 
 def draw_at_rest(robot: Robot, where: Pose, plan: Plan | None, view: Array = USUAL, ax: Axes | None = None) -> Axes:
-    """The robot at a pose, with what is known of its tensions."""
+    """The robot at a pose, with its tensions if they are known."""
     held, scale = plan is not None and bool(plan.feasible), TensionScale.of(robot)
     tension = plan.chord_tension if plan is not None else np.full(len(robot.frame_anchors), np.nan)
     courses = catenary_points(robot, where, plan) if plan is not None and held else straight_points(robot, where)
@@ -157,7 +156,7 @@ class _Scene(NamedTuple):
 
 
 def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
-    """Axes whose limits hold the picture, at one scale, and no more."""
+    """Axes with one scale whose limits fit the picture."""
     low, high = (end(scene.points @ view[:2].T, axis=0) for end in (np.min, np.max))
     spare = SPARE * float((high - low).max())
     low, high = low - spare, high + spare
@@ -174,7 +173,7 @@ def _axes(ax: Axes | None, scene: _Scene, view: Array, *, bar: bool) -> Axes:
 
 
 def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
-    """Everything, with its lines cut to what is seen of them; it is known now how large the picture is on paper."""
+    """Draw everything with the visible parts of its lines, at the size on paper."""
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()
     point = float(np.ptp(ax.get_xlim())) / (ax.bbox.width / figure.dpi * 72.0)  # m
@@ -202,8 +201,8 @@ def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
             ax.scatter(parts[0][0, 0], parts[0][0, 1], color="black", s=5.0, linewidths=0.0, zorder=3.0)
     for k, place in enumerate(numbers):
         ax.text(place[0], place[1], str(k), fontsize=look.tick, ha="center", va="center", zorder=4.0)
-    taken = np.concatenate([*courses, *(each @ view[:2].T for each in scene.flat)])
-    _draw_axes(ax, *_free_axes(taken, view, np.array([ax.get_xlim(), ax.get_ylim()]), look.tick * point), look)
+    occupied = np.concatenate([*courses, *(each @ view[:2].T for each in scene.flat)])
+    _draw_axes(ax, *_free_axes(occupied, view, np.array([ax.get_xlim(), ax.get_ylim()]), look.tick * point), look)
 
 
 def _length(part: Array) -> float:
@@ -232,8 +231,8 @@ def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: f
         candidates = np.concatenate((on, on + across, on - across))
         other = owners != k
         beside = np.arange(len(candidates)) >= len(on)
-        room = np.where(beside, CLEAR, ROOM) * size  # so that it is nearer to its own cable than to any other
-        free = np.minimum(_distances(candidates, starts[other], steps[other]) / room, 1.0)
+        space = np.where(beside, CLEAR, ROOM) * size  # so that it is nearer to its own cable than to any other
+        free = np.minimum(_distances(candidates, starts[other], steps[other]) / space, 1.0)
         free = np.minimum(free, np.linalg.norm(candidates - cable[0], axis=1) / (FROM_ANCHOR * size))
         for place in chosen:
             free += 2.0 * np.minimum(np.linalg.norm(candidates - place, axis=1) / (1.6 * size), 1.0) - 2.0
@@ -257,7 +256,7 @@ def _label_boxes(places: Sequence[Array], size: float) -> list[Array]:
     return [place + corners * (0.35 * size * len(str(k)) + 0.1 * size, 0.55 * size) for k, place in enumerate(places)]
 
 
-def _free_axes(taken: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
+def _free_axes(occupied: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
     """The world's axes in the corner of the picture that is farthest from everything; their place means nothing."""
     width = float(np.ptp(limits[0]))
     decade = 10.0 ** floor(log10(ARROW * width))
@@ -267,7 +266,7 @@ def _free_axes(taken: Array, view: Array, limits: Array, size: float) -> tuple[A
     corners = [np.array([x, y]) for y in (limits[1, 0] - low[1], limits[1, 1] - high[1])
                for x in (limits[0, 0] - low[0], limits[0, 1] - high[0])]  # fmt: skip
     middle = 0.5 * (low + high)
-    start = max(corners, key=lambda corner: float(np.linalg.norm(taken - corner - middle, axis=1).min()))
+    start = max(corners, key=lambda corner: float(np.linalg.norm(occupied - corner - middle, axis=1).min()))
     return start, start + ends, n(length, unit="m")
 
 

@@ -1,4 +1,4 @@
-"""A mode that moves, as a film: platform and cables, exaggerated, with what it is and by how much."""
+"""Film of a mode: exaggerated motion of platform and cables."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from sagline.viewer.swing import PERIOD, Swing
 if TYPE_CHECKING:
     from sagline.core.progress import Progress
 
-SECONDS = 10.0  # of the film: so many swings that the last picture leads to the first
+SECONDS = 10.0  # of the film: whole periods, so that it repeats without a jump
 PICTURES = 25  # of one swing
 WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # in, in, dots an inch
 COLORS = 48
@@ -37,7 +37,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
         vibration: From `vibration`.
         number: Of the mode, 1 for the lowest.
         file: The file, "mode.gif" for instance; one that exists is replaced.
-        progress: Told how many pictures are drawn, of how many.
+        progress: Function of the number of pictures drawn and their total.
 
     Raises:
         InvalidValueError: If there is no such mode.

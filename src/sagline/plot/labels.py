@@ -70,7 +70,7 @@ def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any, narrow
 
 
 def legend_above(ax: Axes, labels: Sequence[str], title: str = "") -> dict[str, Any]:
-    """Arguments for a legend above the axes, in as many columns as there is room for."""
+    """Arguments for a legend above the axes, in as many columns as fit."""
     look = current()
     width = cast(Figure, ax.get_figure(root=True)).get_figwidth()
     columns = _legend_columns([*labels, title], 0.85 * width, look.tick)
@@ -95,7 +95,7 @@ def set_heading(target: FigureBase | Axes, text: str) -> None:
 
 
 def wrap_heading(text: str, size: float) -> str:
-    """A heading in as many lines as the width of figures in the style in use asks for."""
+    """A heading in as many lines as the width of figures of the current style needs."""
     look = current()
     return text if look.width is None else fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
 
@@ -104,8 +104,8 @@ def break_labels(figure: Figure) -> None:
     """Break the upright labels of axes in two where they are longer than their axes."""
     for ax in figure.axes:
         words = ax.yaxis.get_label_text().split(" ")
-        taken, room = ax.yaxis.label.get_window_extent().height, ax.bbox.height
-        if taken > room and len(words) > 2 and "\n" not in ax.yaxis.get_label_text():
+        length, height = ax.yaxis.label.get_window_extent().height, ax.bbox.height
+        if length > height and len(words) > 2 and "\n" not in ax.yaxis.get_label_text():
             lines = [(" ".join(words[:k]), " ".join(words[k:])) for k in range(1, len(words))]
             whole = [pair for pair in lines if all(line.count("$") % 2 == 0 for line in pair)]  # no broken formula
             if whole:

@@ -38,14 +38,14 @@ if TYPE_CHECKING:
 
 OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"
-LEAST_ERROR = 1e-3  # mm: rounding errors are drawn as the flat line that they are, and told
-FLAT = 0.01  # of the axis: below it a course is a flat line to the eye
-UNCONFIRMED = "not confirmed"  # planned, but the lengths lead to no stable equilibrium that is found
+LEAST_ERROR = 1e-3  # mm: rounding errors are drawn as a flat line
+FLAT = 0.01  # of the axis: smaller errors look like a flat line
+UNCONFIRMED = "not confirmed"  # planned lengths without a stable equilibrium
 OTHER_CABLES = "0.82"  # color of the other cables behind each
 ROW_HEIGHT = 1.45  # in, that a row of panels is tall
 LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
 START_COLOR = "#A84300"  # vermillion, dark enough for text
-MOST_ARROWS = 100  # arrows along a path: more are a blur, and each takes its time
+MOST_ARROWS = 100  # arrows along a path
 LEVEL = 1e-9  # m: a path that rises less lies in a plane
 
 
@@ -160,13 +160,13 @@ def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str
 
 
 def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
-    """Position error along x, y and z over time: where the platform really is, less where it was planned.
+    """Position error along x, y and z over time: confirmed position minus planned position.
 
     Poses without a plan, and poses whose lengths lead to no stable equilibrium that was found, are shaded. Errors too
-    small for the axis are told in numbers.
+    small for the axis are written as numbers.
 
     Args:
-        confirmation: A plan and what its lengths lead to.
+        confirmation: A confirmed plan.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
@@ -181,7 +181,7 @@ def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     """
     ax = axes_or_new(ax, height=2.6)
     _draw_errors(ax, confirmation)
-    _tell_flat(ax, confirmation)
+    _write_flat_error(ax, confirmation)
     name_lines(ax)
     return ax
 
@@ -190,7 +190,7 @@ def errors(*confirmations: Confirmation) -> Figure:
     """Position errors of several plans side by side, on one scale: the article's figure 22.
 
     Args:
-        confirmations: Plans and what their lengths lead to.
+        confirmations: Confirmed plans.
 
     Returns:
         A figure of one panel each, titled with the robot.
@@ -217,7 +217,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
         ax.label_outer()
     for ax, confirmation in zip(panels, confirmations, strict=True):
-        _tell_flat(ax, confirmation)  # on the scale that they have found together
+        _write_flat_error(ax, confirmation)  # on the scale that they have found together
     figure_legend(figure, panels, "outside right upper")
     return figure
 
@@ -233,8 +233,8 @@ def _draw_errors(ax: Axes, confirmation: Confirmation) -> None:
     ax.set_ylim(min(low, -LEAST_ERROR), max(high, LEAST_ERROR))
 
 
-def _tell_flat(ax: Axes, confirmation: Confirmation) -> None:
-    """Say how large errors are that the scale of the axis makes a flat line."""
+def _write_flat_error(ax: Axes, confirmation: Confirmation) -> None:
+    """Write the largest error if the axis shows a flat line."""
     errors = np.abs(1e3 * confirmation.position_error)
     known = errors[np.isfinite(errors)]
     if known.size and known.max() < FLAT * max(map(abs, ax.get_ylim())):
@@ -246,12 +246,12 @@ def _tell_flat(ax: Axes, confirmation: Confirmation) -> None:
 def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
     """One quantity over time, a panel for each cable on one scale, before all others in gray.
 
-    Where lines are many and cross, this is easier to read than one panel of all, on paper without color too. Limits of
-    the robot are dotted where they are of this quantity and in sight.
+    This is easier to read than one panel with many crossing lines, also without color. The robot's limits of this
+    quantity are dotted if they are in the range of the axis.
 
     Args:
         plan: The plan; over the number of the pose where it follows no path.
-        quantity: What `sl.plot.tensions` or `sl.plot.lengths` draw: "chord_tension", "horizontal_tension",
+        quantity: A quantity of `sl.plot.tensions` or `sl.plot.lengths`: "chord_tension", "horizontal_tension",
             "vertical_force", "frame_end_tension" and "platform_end_tension" [N], "unstrained_length" [m] and
             "adjusting_length" [mm].
 
@@ -296,7 +296,7 @@ def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
 
 
 def path(path: Path, ax: Axes | None = None) -> Axes:
-    """The way of the platform's origin seen from above, with its start and direction.
+    """Top view of a path, with its start and direction.
 
     Args:
         path: The path.

@@ -130,9 +130,8 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     """The robot in space at rest: frame, platform, and its cables as exact catenaries that carry it.
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
-    numbers at the frame. Pulleys stand as the platform has turned them, cables lie on them; of dead cable behind them
-    its rise is drawn, dotted where its length does not say that it is upright. The platform stands over its shadow on
-    the ground, which is at z = 0 or lower.
+    numbers at the frame. Pulleys are turned into the planes of their cables. Dead cable is drawn as a vertical line of
+    its rise, dotted if its length is another one. The ground with the platform's shadow is at z = 0 or lower.
 
     Args:
         robot: The robot.
@@ -257,4 +256,4 @@ def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
         axis.set_major_locator(MaxNLocator(max(1, round(4.5 * share)), steps=[1, 2, 5, 10], prune="both"))
         axis.set_pane_color((1.0, 1.0, 1.0, 0.0))
     ax.grid(visible=False)
-    ax.set_box_aspect(size, zoom=0.84 - 0.1 * float(size[2] / size.max()))  # what is tall needs room for its labels
+    ax.set_box_aspect(size, zoom=0.84 - 0.1 * float(size[2] / size.max()))  # tall robots need space for their labels

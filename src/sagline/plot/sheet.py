@@ -66,7 +66,7 @@ class Sheet(Figure):
         self._fitted = not self.style.name
 
     def draw(self, renderer: Any) -> None:
-        """Draw in the style of the figure: what Matplotlib makes at the last moment, such as numbers of ticks, too."""
+        """Draw in the style of the figure, also objects that Matplotlib makes when drawing, such as tick labels."""
         with Using(self.style):
             if not self._fitted:
                 self._fitted = True  # before it is drawn for the first time
@@ -87,12 +87,12 @@ class Sheet(Figure):
 
 
 def sheet(height: float, width: float = WIDTH) -> Sheet:
-    """An empty figure that leaves room for what stands outside its axes, in the style that is in use."""
+    """An empty figure in the current style, with space for labels outside its axes."""
     return Sheet(figsize=current().size(width, height), layout="constrained")
 
 
 def _thicken(figure: Figure, factor: float) -> None:
-    """Make what is drawn on axes so many times as thick; their frames and ticks are so already."""
+    """Multiply line widths and marker sizes by a factor, except those of frames and ticks."""
     owners: list[Any] = [*figure.axes, *figure.legends, *(ax.get_legend() for ax in figure.axes if ax.get_legend())]
     for line in (line for owner in owners for line in owner.get_lines()):
         line.set_linewidth(factor * line.get_linewidth())
@@ -114,7 +114,7 @@ def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> A
 
 
 def format_axes(ax: Axes, x: str, y: str) -> None:
-    """Labels, a light grid, and no more lines around it than needed."""
+    """Labels, a light grid, and lines at the left and below only."""
     look = current()
     ax.set_xlabel(x, fontsize=look.label)
     ax.set_ylabel(y, fontsize=look.label)

@@ -93,17 +93,17 @@ def current() -> Style:
 
 
 def style(name: str, columns: int = 1) -> Using:
-    """Make figures for a journal or a slide: what is drawn inside a `with` statement of it has its look, and keeps it.
+    """Style of figures for a journal or a slide: figures that are made inside its `with` statement keep it.
 
     Figures have the width of the column, fonts that come with Matplotlib and so are the same on any machine, sizes that
-    are read on paper at that width, and lines carry their names at their ends where there is room for them. Figures of
+    are read on paper at that width, and names stand at the ends of lines if there is space. Figures of
     your own that are made inside, by Matplotlib alone, have its fonts and sizes as well. In PDF and SVG text stays text
     and its fonts are in the file.
 
     Args:
         name: "ieee" for 3.5 in or 7.16 in, "mdpi" for 5.45 in or 7.27 in, "slides" for half a slide or a whole one of
             13.33 in by 7.5 in.
-        columns: How much of the page a figure takes: 1 for a column, 2 for all of its width.
+        columns: Width of the figure: 1 for a column, 2 for the width of the page.
 
     Returns:
         What goes into a `with` statement, and decorates functions; of it comes the `Style` with width and sizes.
@@ -122,7 +122,7 @@ def style(name: str, columns: int = 1) -> Using:
 
 
 class Using(ContextDecorator):
-    """Draw in a style; one object can be used many times, also inside itself."""
+    """Context manager of a style; it can be used repeatedly and nested."""
 
     def __init__(self, chosen: Style) -> None:
         """Nothing changes before the `with` statement begins."""

@@ -52,9 +52,9 @@ REST: Final = "others"
 def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes | None = None) -> Axes:
     """A slice through a workspace, at right angles to an axis of the world.
 
-    The bold line is the boundary, as exact as the slice is fine; the workspace's own criteria count. Inside, thin lines
-    say what further load in any direction the robot can bear [N], and colors which limit is the first to be in the way:
-    of the margin the cable, of other criteria their names.
+    The bold line is the boundary by the criteria of the workspace, at the resolution of the slice. Inside, thin lines
+    are contours of the margin [N], and colors show the limit that is reached first: the cable of the margin, or the
+    name of another criterion.
 
     Args:
         space: The workspace; its robot, loads, orientations and criteria are those of the slice.
@@ -91,9 +91,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     ax.set(xlim=(low[first], high[first]), ylim=(low[second], high[second]))
     if not (cut.level >= 0.0).any():
         ax.set_facecolor(OUTSIDE)
-        ax.text(
-            0.5, 0.5, "nothing of the workspace is here", transform=ax.transAxes, ha="center", fontsize=current().label
-        )
+        ax.text(0.5, 0.5, "outside the workspace", transform=ax.transAxes, ha="center", fontsize=current().label)
     else:
         levels = round_levels(float(cut.margin[(cut.level >= 0.0) & np.isfinite(cut.margin)].max(initial=0.0)))
         _draw_regions(ax, cut, space, levels)
@@ -171,14 +169,14 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
 
 
 def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) -> None:
-    """Its name in the middle of each part that has room for it, between lines if there is room."""
+    """Write the name into the middle of each part that is large enough, between lines if possible."""
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
     figure.draw_without_rendering()  # now it is known how large the slice is on the sheet
     points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size
     for part in range(1, count + 1):
-        for room in ((parts == part) & free, parts == part):
-            depth = distance_transform_edt(np.pad(room, 1))[1:-1, 1:-1]
+        for area in ((parts == part) & free, parts == part):
+            depth = distance_transform_edt(np.pad(area, 1))[1:-1, 1:-1]
             row, column = np.unravel_index(int(np.argmax(depth)), depth.shape)
             if points * depth[row, column] >= ROOM:
                 place = cut.across[column], cut.up[row]
@@ -211,9 +209,8 @@ def round_levels(largest: float) -> Array:
 def workspace(space: Workspace) -> Figure:
     """The hull of a workspace around its robot, and what limits it.
 
-    Faces have the color of the limit that is in the way there, of the margin its cable, of other criteria their names;
-    they are gray where the box of the workspace cuts it off. The bars beside are shares of the surface. In a plane the
-    slice is drawn: it is all there is.
+    Faces have the color of the limit there: the cable of the margin, or another criterion; they are gray at the box of
+    the workspace. The bars are shares of the surface. Of a plane workspace the slice is drawn.
 
     Args:
         space: The workspace.

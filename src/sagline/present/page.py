@@ -97,7 +97,7 @@ class Chapter:
     """A part of the report.
 
     Attributes:
-        key: Name by which it can be asked for.
+        key: Name of the chapter.
         title: Its heading.
         lead: What it is about.
         findings: What was found.
@@ -109,7 +109,7 @@ class Chapter:
     findings: tuple[Finding, ...]
 
 
-MANY = {  # verdicts as they are told of more than one finding
+MANY = {  # verdicts of more than one finding
     Verdict.HOLDS: "hold",
     Verdict.HOLDS_WITHIN: "hold within limits",
     Verdict.FAILS: "do not hold",

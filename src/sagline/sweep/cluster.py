@@ -19,7 +19,7 @@ from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.sweep.folder import is_installed
 from sagline.sweep.work import task
 
-HERE: Final = "127.0.0.1"  # nobody else is served
+HERE: Final = "127.0.0.1"  # not reachable from other machines
 DASHBOARD: Final = 8787
 PATIENCE: Final = 15.0  # s, for a scheduler to answer and a worker to be there
 AHEAD: Final = 2  # tasks a worker: it has the next when it has done one

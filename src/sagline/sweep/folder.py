@@ -42,8 +42,8 @@ CONTENT: Final = Content(
     version=1,
 )
 DIMENSIONS: Final = ("robot", "pose", "wrench")
-GROUP: Final = "numbers.zarr"  # in the folder, beside what is no matter of Zarr
-UNASKED: Final = -1  # status of what has not been asked yet
+GROUP: Final = "numbers.zarr"  # in the folder
+UNASKED: Final = -1  # status of requests that are not computed yet
 GIVEN: Final = {  # arrays of the request: their dimensions and units
     "position": ("pose", "axis", "m"),
     "quaternion": ("pose", "quaternion_part", "1"),
@@ -57,7 +57,7 @@ SHAPES: Final = {  # of the parts of a set of loads
     "sizes": (-1,),
     "accelerations": (2,),
 }
-STEP: Final = "Free some space or correct the permissions, and run the same again: it goes on where it stopped."
+STEP: Final = "Free some space or correct the permissions, and run the same sweep again: it continues."
 
 
 class TaskSize(NamedTuple):
@@ -102,7 +102,7 @@ class SweepFolder(NamedTuple):
         try:
             for name, values in numbers.items():
                 array: Any = self.group[name]
-                # a chunk of nothing but what stands where nothing was written is written too
+                # chunks of fill values are written too
                 array.with_config({"write_empty_chunks": True})[robot, rows, columns] = values
         except OSError as error:
             raise FileError(self.path, f"cannot be written ({error.strerror or error})", STEP) from None

@@ -1,4 +1,4 @@
-"""Requests of sweeps: robots x poses x wrenches, and the quantities asked of each."""
+"""Requests of sweeps: robots x poses x wrenches, and the quantities of each."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ _MINIMUM_NORM: Final = MinimumNorm()
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Request(Result):
-    """Every robot at every pose under every wrench, and the quantities asked of each.
+    """Every robot at every pose under every wrench, and the quantities of each.
 
     Attributes:
         robots: R of them.
@@ -153,11 +153,11 @@ class Request(Result):
         if loads.ndim > 2:
             raise InvalidValueError("wrenches", f"of shape {loads.shape}", "shape (6,) or (W, 6)", "Flatten the axes.")
         words = (quantities,) if isinstance(quantities, str) else _sequence(quantities, "quantities", "a list of words")
-        asked = {choice(word, f"quantities[{k}]", QUANTITIES) for k, word in enumerate(words)}
-        if len(asked) < len(words):
+        chosen = {choice(word, f"quantities[{k}]", QUANTITIES) for k, word in enumerate(words)}
+        if len(chosen) < len(words):
             raise InvalidValueError("quantities", brief(list(words)), "each once", "Leave out what is there twice.")
-        given: dict[str, Sized] = {"robots": machines, "poses": batch, "wrenches": loads, "quantities": asked}
-        for item, some in given.items():
+        parts: dict[str, Sized] = {"robots": machines, "poses": batch, "wrenches": loads, "quantities": chosen}
+        for item, some in parts.items():
             if not len(some):
                 raise InvalidValueError(item, "empty", "one or more", f"Give {item}.")
         if (count := len(machines) * len(batch) * len(loads)) > MOST:
@@ -172,7 +172,7 @@ class Request(Result):
             robots=machines,
             poses=batch,
             wrenches=locked(np.ascontiguousarray(loads)),
-            quantities=tuple(name for name in QUANTITIES if name in asked),
+            quantities=tuple(name for name in QUANTITIES if name in chosen),
             model=model,
             tension=method,
             around=load_of(around),

@@ -43,27 +43,27 @@ def run(
 ) -> Sweep:
     """Run a sweep into a folder, or continue it.
 
-    The folder has partial results from the first minute, and a file `done` with a line for each task that is done. It
-    is taken up again by the same call: what is done, and whole on the disk, is not done again. Ctrl-C stops when the
-    tasks that run are done. A worker that is killed is replaced, and its task done again.
+    The folder has partial results from the first minute, and a file `done` with a line for each finished task. The same
+    call continues a stopped sweep; complete chunks are not computed again. Ctrl-C stops after the running tasks. A
+    killed worker is replaced, and its task repeated.
 
     Args:
         request: The request.
-        folder: Path of the folder; made if missing. It may hold the same sweep, and nothing else.
-        workers: Processes of this machine; None for one a processor. With 1, without Dask, and where four tasks or
-            fewer are left, these are done in this process, one after the other.
+        folder: Path of the folder; made if missing. It may have the same sweep, but no other files.
+        workers: Processes of this machine; None for one per processor. With 1, without Dask, and for four tasks or
+            fewer, this process computes the tasks one after the other.
         scheduler: Address of Dask's scheduler of a cluster, "tcp://10.0.0.1:8786", in place of workers; all its workers
             must see the folder under the same name.
-        progress: Called after each task: how many are done, of how many.
-        tell: Called with what a person may want to know: where the dashboard is, why there is none.
+        progress: Function of the number of finished tasks and of all tasks.
+        tell: Function of messages, such as the address of the dashboard.
 
     Returns:
         The sweep, as `load` reads it.
 
     Raises:
         InvalidValueError: If an argument is none of its kind, or Zarr is not installed.
-        FileError: If the folder holds something else or cannot be written; what was done is kept.
-        SaglineError: If the workers or the scheduler fail; what was done is kept.
+        FileError: If the folder has something else or cannot be written; finished tasks are kept.
+        SaglineError: If the workers or the scheduler fail; finished tasks are kept.
 
     Examples:
         >>> import sagline as sl

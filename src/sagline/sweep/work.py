@@ -28,18 +28,18 @@ from sagline.workspaces.margin_rows import MarginRows
 # statuses of what is feasible, infeasible, open and lost
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
 MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # none is lost
-ROWS: Final = 1 << 14  # requests solved at once: what they take stays in the cache of the processor
+ROWS: Final = 1 << 14  # requests solved at once; their arrays fit the cache of the processor
 
 
 class Counts(NamedTuple):
     """Numbers of requests by outcome.
 
     Attributes:
-        feasible: With tensions within their limits.
-        infeasible: With a proof that there are none.
-        unable: With another reason why there is no answer, as the status says.
-        open: With neither, so near the border are they.
-        lost: Without a verdict.
+        feasible: Tensions within their limits.
+        infeasible: Proof that there are no such tensions.
+        unable: No result for another reason; see the status.
+        open: Too close to the boundary for a verdict.
+        lost: No verdict.
     """
 
     feasible: int
@@ -51,9 +51,9 @@ class Counts(NamedTuple):
 
 def compute_variables(request: Request, part: RequestBox) -> dict[str, NDArray[np.generic]]:
     """All variables of a part by name, (poses, wrenches[, cables]): NaN for missing cables and results."""
-    asked = variables_of(request.quantities)
+    variables = variables_of(request.quantities)
     shape = part.shape
-    filled: dict[str, NDArray[np.generic]] = {each.name: _empty(each, shape, request.cable_count) for each in asked}
+    filled: dict[str, NDArray[np.generic]] = {each.name: _empty(each, shape, request.cable_count) for each in variables}
     robot = request.robots[part.robot]
     solvers = [kind(request, robot) for kind, names in SOLVERS.items() if names.intersection(request.quantities)]
     for piece in part.pieces(ROWS):
@@ -137,7 +137,7 @@ def _empty(variable: SweepArray, shape: tuple[int, int], cables: int) -> NDArray
     return np.full(whole, -1 if variable.type == "int8" else np.nan, dtype=variable.type)
 
 
-# what each quantity is from
+# solvers and their quantities
 SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
     _Inverse: frozenset({"tension", "length", "shortfall"}),
     _Margins: frozenset({"margin"}),
@@ -149,7 +149,7 @@ LONGEST: Final = 10.0  # s, of a task of a sweep that takes days
 TASKS: Final = 4000  # at most, until tasks are as long as that
 LARGEST: Final = 1 << 26  # bytes that a task may write
 SAMPLES, SAMPLE = 16, 4096  # parts that are timed, and requests in each
-TIMED: Final = 0.5  # s: what has been timed for so long is known well enough
+TIMED: Final = 0.5  # s: enough for a time per request
 
 
 def task(folder: str, digest: str, number: int) -> tuple[float, tuple[int, ...]]:
