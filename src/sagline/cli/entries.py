@@ -219,16 +219,21 @@ def _unknown_state(sl: Any, name: str = ROBOT) -> Equilibrium:
     return made
 
 
-INVERSE, SHARING, VERDICTS = "inverse kinematics", "further ways of sharing", "verdicts of infeasible poses"
+INVERSE, SHARING, VERDICTS = (
+    "inverse kinematics",
+    "other tension distribution methods",
+    "infeasibility proofs",
+)
 FORWARD, FIT = "forward kinematics", "fit of straight cables"
 MARGINS, POLYGON, VIBRATION = "margins", "tension polygon", "stiffness and vibration"
 SIGNED_MARGINS, PROOFS = "signed margins", "proofs for boxes of poses"
-MODES, SIMULATION, CHAINS = "modes with cable mass", "motion in time", "motion of cables with mass"
-LOSSES, ANSWERS, PERIODS = "losses in the cables' stretch", "answers with losses", "motion from period to period"
+MODES, SIMULATION, CHAINS = "modes with cable mass", "simulation", "simulation with cable mass"
+LOSSES, ANSWERS = "losses in the cables' stretch", "frequency response with losses"
+PERIODS = "simulation by control periods"
 FORWARD_OVER_PULLEYS, VIBRATION_OVER_PULLEYS = f"{FORWARD} over pulleys", f"{VIBRATION} over pulleys"
 SIMULATION_OVER_PULLEYS = f"{SIMULATION} over pulleys"
 CLEARANCES = "least distances"
-READINGS, STARTING_LENGTHS = "readings at equilibria", "lengths at tensions that were read"
+READINGS, STARTING_LENGTHS = "readings at equilibria", "lengths from measured tensions"
 READINGS_OVER_PULLEYS = f"{READINGS} over pulleys"
 DESCRIBE = "forward.sensitivity.describe_states"
 

@@ -62,32 +62,34 @@ BREAK = re.compile(r"([0-9]{1,3})@([^@]+)")
 STEP = "Give the cable and the time of the break: --break 3@2.5s."
 
 
+_PathOption = Annotated[
+    Path | None,
+    argument("PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box."),
+]
+_BreaksOption = Annotated[
+    list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. The option can be repeated.", "--break")
+]
+_StepOption = Annotated[
+    float | None,
+    quantity_option("TIME", "Time step of the integrator [s]. Default: chosen for the robot.", "s", above=0.0),
+]
+_OutOption = Annotated[Path | None, option("FILE", "File to write. Default: ROBOT-simulation.nc in output.", "--out")]
+
+
 def simulate(
     name: RobotArgument,
-    path: Annotated[
-        Path | None,
-        argument(
-            "PATH", "Waypoints in .yaml, or time and pose in .csv. Default: at rest in the middle of the test box."
-        ),
-    ] = None,
+    path: _PathOption = None,
     shaper: Annotated[_ShaperKind, choice_option("SHAPER", "Input shaper of the path", _ShaperKind)] = _ShaperKind.NONE,
     cable_mass: Annotated[_CableMass, choice_option("KIND", "Model of the cable mass", _CableMass)] = _CableMass.NONE,
-    breaks: Annotated[
-        list[str] | None, option("CABLE@TIME", "A cable breaks: 3@2.5s. The option can be repeated.", "--break")
-    ] = None,
+    breaks: _BreaksOption = None,
     after: Annotated[float, quantity_option("TIME", "Simulated time after the end of the path [s].", "s", low=0.0)] = 3,
-    step: Annotated[
-        float | None,
-        quantity_option("TIME", "Time step of the integrator [s]. Default: chosen for the robot.", "s", above=0.0),
-    ] = None,
+    step: _StepOption = None,
     tension: TensionOption = Tension.CLOSEST,
     loss_time: LossTimeOption = 0,
     air_damping: AirDampingOption = 0,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
-    out: Annotated[
-        Path | None, option("FILE", "File to write. Default: ROBOT-simulation.nc in output.", "--out")
-    ] = None,
+    out: _OutOption = None,
     figures: Annotated[bool, figures_flag("Draw the energy balance, as PNG and SVG.")] = True,
     as_json: JsonOption = False,
 ) -> int:

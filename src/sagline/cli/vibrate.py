@@ -58,23 +58,27 @@ LOWEST = 3  # modes that are shown in any case
 FIGURES = ("frequency", "peak")  # of a map
 
 
+_PointsOption = Annotated[
+    Any,
+    converted_option(
+        "NXxNYxNZ",
+        "Map lowest frequency and largest response at so many poses of the test box, instead of one pose.",
+        "points_of",
+        "--map",
+    ),
+]
+_DampingOption = Annotated[
+    float,
+    converted_option("RATIO", "Damping ratio of every mode, 0.01 or '1 %', besides that of the cables.", "ratio"),
+]
+
+
 def vibrate(
     name: RobotArgument,
     pose: PoseOption = None,
-    points: Annotated[
-        Any,
-        converted_option(
-            "NXxNYxNZ",
-            "Map lowest frequency and largest response at so many poses of the test box, instead of one pose.",
-            "points_of",
-            "--map",
-        ),
-    ] = None,
+    points: _PointsOption = None,
     up_to: Annotated[float, quantity_option("HZ", "All modes below this frequency are found.", "Hz", above=0.0)] = 20,
-    damping: Annotated[
-        float,
-        converted_option("RATIO", "Damping ratio of every mode, 0.01 or '1 %', besides that of the cables.", "ratio"),
-    ] = 0.01,
+    damping: _DampingOption = 0.01,
     loss_time: LossTimeOption = 0,
     air_damping: AirDampingOption = 0,
     force: Annotated[_Direction, choice_option("AXIS", "Force of the response figure", _Direction)] = _Direction.X,

@@ -35,38 +35,45 @@ LOG: Final = ".mcap"
 LOOK: Final = 0.5  # s, between two looks at a file that grows
 
 
+_RobotOption = Annotated[
+    str,
+    argument(
+        "ROBOT",
+        "A preset (see sagline robots) or a robot file, robot.yaml; a log of the controller, run.mcap; or a "
+        "calibration, found.nc.",
+        robot_completions,
+    ),
+]
+_RunOption = Annotated[
+    Path | None,
+    argument(
+        "RUN",
+        "A run of this robot by sagline track, a simulation or a log of the controller, which is played; or a "
+        "calibration, which is shown.",
+    ),
+]
+_BesideOption = Annotated[
+    Path | None, option("RUN", "Another run of the same robot, shown as a ghost with the same clock.")
+]
+_TruthOption = Annotated[
+    Path | None, option("TWIN.mcap", "With a log: the log of the twin, with the true pose of the platform.")
+]
+_HostOption = Annotated[
+    str, option("ADDRESS", "Address to listen on; 0.0.0.0 is all of this machine, so that others can look.")
+]
+
+
 def view(
-    robot: Annotated[
-        str,
-        argument(
-            "ROBOT",
-            "A preset (see sagline robots) or a robot file, robot.yaml; a log of the controller, run.mcap; or a "
-            "calibration, found.nc.",
-            robot_completions,
-        ),
-    ],
-    run: Annotated[
-        Path | None,
-        argument(
-            "RUN",
-            "A run of this robot by sagline track, a simulation or a log of the controller, which is played; or a "
-            "calibration, which is shown.",
-        ),
-    ] = None,
-    beside: Annotated[
-        Path | None, option("RUN", "Another run of the same robot, shown as a ghost with the same clock.")
-    ] = None,
+    robot: _RobotOption,
+    run: _RunOption = None,
+    beside: _BesideOption = None,
     live: Annotated[bool, flag("Follow a log that is still being written.", "--live")] = False,
-    truth: Annotated[
-        Path | None, option("TWIN.mcap", "With a log: the log of the twin, with the true pose of the platform.")
-    ] = None,
+    truth: _TruthOption = None,
     pose: PoseOption = None,
     mode: Annotated[str | None, option("NUMBER", "Natural mode that moves at first: 1, 2, ...; 'massless 1'.")] = None,
     wrench: WrenchOption = None,
     payload: PayloadOption = None,
-    host: Annotated[
-        str, option("ADDRESS", "Address to listen on; 0.0.0.0 is all of this machine, so that others can look.")
-    ] = "127.0.0.1",
+    host: _HostOption = "127.0.0.1",
     port: Annotated[int, converted_option("NUMBER", "Port to listen on; 0 takes any free one.", "port_of")] = 8080,
     browser: Annotated[bool, flag("Open it in a browser here.", "--browser/--no-browser")] = True,
 ) -> int:

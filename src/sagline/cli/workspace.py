@@ -81,44 +81,53 @@ def _obstacles(name: str) -> tuple[Obstacle, ...]:
     return (load_mesh(path),) if path.suffix else ()
 
 
+_TiltOption = Annotated[
+    float,
+    quantity_option(
+        "ANGLE", "The platform has to tilt by this angle about any axis, '10deg'. Default: level.", "rad", low=0.0
+    ),
+]
+_BoxOption = Annotated[
+    Any,
+    converted_option("BOX", "Box of positions: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.", "box_of"),
+]
+_ReserveOption = Annotated[
+    float | None, quantity_option("FORCE", "Least capacity margin at all poses [N].", "N", low=0.0)
+]
+_MaxSagOption = Annotated[float | None, quantity_option("LENGTH", "Largest sag of a cable, '5 cm'.", "m", above=0.0)]
+_MinStiffnessOption = Annotated[
+    float | None, quantity_option("NUMBER", "Least translational stiffness [N/m].", "N/m", above=0.0)
+]
+_MinFrequencyOption = Annotated[
+    float | None, quantity_option("HZ", "Least natural frequency with massless cables.", "Hz", above=0.0)
+]
+_ClearanceOption = Annotated[
+    float | None,
+    quantity_option("LENGTH", "Least distance of cables, platform and obstacles, '3 cm'.", "m", above=0.0),
+]
+_SceneOption = Annotated[
+    str | None,
+    option("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
+]
+_ToProveOption = Annotated[
+    Any, converted_option("BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove")
+]
+
+
 def workspace(
     name: RobotArgument,
     wrench: LoadsOption = None,
     payload: PayloadOption = None,
-    tilt: Annotated[
-        float,
-        quantity_option(
-            "ANGLE", "The platform has to tilt by this angle about any axis, '10deg'. Default: level.", "rad", low=0.0
-        ),
-    ] = 0,
-    box: Annotated[
-        Any,
-        converted_option("BOX", "Box of positions: '-2..2, -1..1, 1..3 m'. Default: the robot's frame.", "box_of"),
-    ] = None,
-    reserve: Annotated[
-        float | None, quantity_option("FORCE", "Least capacity margin at all poses [N].", "N", low=0.0)
-    ] = None,
-    max_sag: Annotated[
-        float | None, quantity_option("LENGTH", "Largest sag of a cable, '5 cm'.", "m", above=0.0)
-    ] = None,
-    min_stiffness: Annotated[
-        float | None, quantity_option("NUMBER", "Least translational stiffness [N/m].", "N/m", above=0.0)
-    ] = None,
-    min_frequency: Annotated[
-        float | None, quantity_option("HZ", "Least natural frequency with massless cables.", "Hz", above=0.0)
-    ] = None,
-    clearance: Annotated[
-        float | None,
-        quantity_option("LENGTH", "Least distance of cables, platform and obstacles, '3 cm'.", "m", above=0.0),
-    ] = None,
-    scene: Annotated[
-        str | None,
-        option("FILE", "With --clearance: a robot file with a scene, or a mesh in meters. Default: the robot's scene."),
-    ] = None,
+    tilt: _TiltOption = 0,
+    box: _BoxOption = None,
+    reserve: _ReserveOption = None,
+    max_sag: _MaxSagOption = None,
+    min_stiffness: _MinStiffnessOption = None,
+    min_frequency: _MinFrequencyOption = None,
+    clearance: _ClearanceOption = None,
+    scene: _SceneOption = None,
     in_frame: Annotated[bool, flag("The whole platform stays within the frame.", "--in-frame")] = False,
-    to_prove: Annotated[
-        Any, converted_option("BOX", "Prove that all poses of this box are feasible.", "box_of", "--prove")
-    ] = None,
+    to_prove: _ToProveOption = None,
     budget: Annotated[float, quantity_option("TIME", "Time for the proof [s].", "s", above=0.0)] = 10,
     cells: Annotated[int, option("NUMBER", "Cells of the grid along the longest edge of the box.")] = 32,
     model: ModelOption = ModelName.CATENARY,
