@@ -94,8 +94,8 @@ def on_platform(forces: Array, levers: Array) -> Array:
 def motions_of_ends(levers: Array) -> Array:
     """Matrices from a motion of the platform (..., 6) [m, rad] to those of the platform ends, (..., m, 3, 6)."""
     motion = np.eye(6)
-    ends: Array = np.swapaxes(motion[:, :3] + np.cross(motion[:, 3:], levers[..., None, :]), -1, -2)
-    return ends
+    ends = np.swapaxes(motion[:, :3] + np.cross(motion[:, 3:], levers[..., None, :]), -1, -2)
+    return np.ascontiguousarray(ends)
 
 
 def platform_end_forces(state: Equilibrium) -> Array:
