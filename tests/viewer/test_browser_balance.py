@@ -71,7 +71,7 @@ def test_the_dot_is_dragged_stepped_and_put_back(browser: Browser, name: str, sc
     with opened(browser, sl.load_robot(name), width=screen[0]) as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
         if name == "fast":
-            page.get_by_text("the balance leaves nothing to choose").wait_for()
+            page.get_by_text("the force balance determines the tensions").wait_for()
             return
         brought_into_sight(page)
         given = tension(viewer)
@@ -146,7 +146,7 @@ def test_the_proof_is_read_and_drawn(browser: Browser, name: str, screen: tuple[
     with opened(browser, sl.load_robot(name), width=screen[0], theme="dark") as (page, viewer):
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
         page.get_by_role("tab", name="Proof").click()
-        page.get_by_text("close up to").wait_for()
+        page.get_by_text("sum to zero up to").wait_for()
         assert page.locator("svg.forces").count() == 2
         assert page.locator("table.forces tr").count() == sl.load_robot(name).cable_count + 3
         least_contrast(page)

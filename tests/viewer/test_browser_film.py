@@ -114,7 +114,7 @@ def test_a_film_shows_the_run_with_clock_and_legend(
         assert download.value.suggested_filename == f"{name}-run.mp4"
         download.value.save_as(tmp_path / "film.mp4")
         page.locator("#sagline-film").wait_for(state="detached")
-        assert any(note.startswith("Filming") for note in page.evaluate("[...window.notes]"))
+        assert any(note.startswith("Recording") for note in page.evaluate("[...window.notes]"))
         assert viewer.player.following
         assert not client.scene._handle_from_node_name
         length, (first, last) = played(page, tmp_path / "film.mp4")

@@ -81,7 +81,7 @@ def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, sc
         page.get_by_text("Nothing is computed until something is asked for.").wait_for()
         empty = scene(page)
         page.get_by_label("Region", exact=True).click()
-        page.get_by_text("Its wall by what limits").wait_for()
+        page.get_by_text("Boundary by limiting cable").wait_for()
         await_that(page, lambda: in_full(show))
         before, mass = show._hull_html.content, viewer.view.snapshot.robot.mass  # type: ignore[union-attr]
         slide(page, "Platform + load", 8.0)

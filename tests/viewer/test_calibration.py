@@ -170,7 +170,7 @@ def test_errors_are_drawn_as_large_as_is_told(page: Shown, client: Client) -> No
     centered = calibrated().robot.frame_anchors - calibrated().robot.frame_anchors.mean(axis=0)
     assert abs(np.cross(centered, left)[:, 2].sum()) < 1e-5 < abs(np.cross(centered, away)[:, 2].sum())
     assert np.linalg.norm(left) < np.linalg.norm(away)
-    assert "together" in page.text
+    assert "common motion" in page.text
     choose(page, client, "Errors of the anchors", False)
     assert page.node("/errors") is page.node("/platform/errors") is None
     choose(page, client, "Relative to one another", False)
@@ -184,7 +184,7 @@ def test_factors_that_are_none_are_refused(page: Shown, client: Client, factor: 
     client.set(handle(page, "Drawn ×"), factor)
     await_that(lambda: "Type a factor" in page.text)
     choose(page, client, "Drawn ×", 10.0)
-    assert "drawn 10 times" in page.text
+    assert "enlarged 10 times" in page.text
 
 
 def test_a_row_that_is_chosen_is_gone_to(page: Shown, client: Client) -> None:

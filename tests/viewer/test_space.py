@@ -95,7 +95,7 @@ def test_nothing_is_computed_until_it_is_asked_for(page: Shown, client: Client) 
     await_that(lambda: page.position[0] == 0.5)
     assert not show_of(page).waiting
     assert all(page.node(name) is None for name in ("/slice/picture", "/hull/0", "/travel"))
-    assert "Nothing is" in page.text
+    assert "Choose one" in page.text
 
 
 def test_the_slice_follows_the_platform_and_ends_where_the_margin_does(page: Shown, client: Client) -> None:
