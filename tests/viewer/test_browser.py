@@ -227,7 +227,7 @@ def test_every_text_can_be_read(browser: Browser, theme: Literal["light", "dark"
         least_contrast(page)
         page.locator(".tabler-icon-arrow-back").first.click()
         stop_server(viewer.server)
-        page.get_by_text("Disconnected: is sagline view still running?").wait_for()
+        page.get_by_text("Disconnected. Is sagline view still running?").wait_for()
         least_contrast(page)
 
 
@@ -280,7 +280,7 @@ def test_a_frequency_that_is_clicked_moves(browser: Browser) -> None:
         assert swing is not None
         found = sl.vibration(swing.state, up_to=20.0)
         page.get_by_text(f"{found.frequency[1]:.3f} Hz, with cable mass", exact=True).wait_for()
-        page.get_by_text(f"drawn {swing.factor:.2g} times as large as a vibration of 1 J is").wait_for()
+        page.get_by_text(f"drawn {swing.factor:.2g} times as large as a vibration of 1 J").wait_for()
         before = page.locator("canvas[data-engine]").screenshot()
         await_that(page, lambda: page.locator("canvas[data-engine]").screenshot() != before)  # without anybody's doing
         await_that(page, lambda: page.locator("tr.chosen").count() == 1)

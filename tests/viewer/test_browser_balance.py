@@ -94,7 +94,7 @@ def test_the_dot_is_dragged_stepped_and_put_back(browser: Browser, name: str, sc
         stepped = tension(viewer)
         page.keyboard.press("ArrowLeft")  # the dot has kept the focus
         await_that(page, lambda: not np.array_equal(tension(viewer), stepped))
-        assert page.get_by_role("slider", name="Tensions, in the field").is_visible()
+        assert page.get_by_role("slider", name="Tensions in the set").is_visible()
         page.get_by_text("Chosen by hand", exact=True).first.wait_for()
         assert page.evaluate(OVERFLOWING) == []
         page.get_by_role("button", name="Back to MinimumNorm").click()

@@ -78,7 +78,7 @@ def test_a_region_follows_a_slider_and_lights_up(browser: Browser, name: str, sc
         page.set_viewport_size({"width": screen[0], "height": screen[1]})
         show = viewer.feature(RegionFeature)
         page.get_by_role("tab", name="Workspace").click()
-        page.get_by_text("Nothing is computed until something is asked for.").wait_for()
+        page.get_by_text("Choose one or several of these.").wait_for()
         empty = scene(page)
         page.get_by_label("Region", exact=True).click()
         page.get_by_text("Boundary by limiting cable").wait_for()
