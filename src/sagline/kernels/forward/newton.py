@@ -292,7 +292,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
                 platform_stiffness(model, cables, rows, space.stiffness)
                 symmetric_part(free, space.stiffness, matrix)
             components_along(free, gradient, part)
-        shift = trust_step(matrix, part, radius, space.factor, motion, step)
+        shift = trust_step(matrix, part, radius, space.factor, motion[: part.shape[0]], step)
         length = norm(step)
         promised = _promised_gain(matrix, part, step)
         step_pose(free, body, pose, step, motion, trial)

@@ -1,0 +1,28 @@
+"""Forward kernels as plain Python, where an index outside an array raises IndexError: machine code reads on."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.tiers import extended
+
+SOLVE = """
+import sagline as sl
+robot = sl.load_robot({name!r})
+plan = sl.inverse(robot, sl.Pose.from_euler([0.2, -0.4, 2.4], 0, 0, 0))
+found = sl.forward(robot, plan.unstrained_length)
+print(*found.pose.position.ravel())
+"""
+
+
+@extended
+@pytest.mark.parametrize("name", ["cogiro"])
+def test_a_forward_solve_from_afar_reads_inside_its_arrays(name: str) -> None:
+    plain = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", SOLVE.format(name=name)], env=plain, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert [float(word) for word in done.stdout.split()] == pytest.approx([0.2, -0.4, 2.4], abs=1e-9)
