@@ -11,7 +11,7 @@ PYTHON ?= $(FOUND)
 
 .DEFAULT_GOAL := help
 unexport PYTHONDONTWRITEBYTECODE # else each of a hundred processes compiles anew all that it imports
-.PHONY: help env run article test test-all test-extended coverage check format messages record mutants size bench soak docs dist clean
+.PHONY: help env run article test test-all test-extended coverage check format messages record mutants size bench soak c docs dist clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{ printf "  make %-13s %s\n", $$1, $$2 }'
@@ -76,6 +76,9 @@ bench: env ## one table of times and ratios, on one core
 soak: env ## the long tests that test-all leaves out, then all others in a random order
 	$(BIN)/python -m pytest -m soak
 	$(PYTEST) --random-order=$(SEED) $(PARALLEL)
+
+c: env ## C99 of all kernels, as OUT/kernels.c
+	$(BIN)/python -m tools.translate $(OUT)/kernels.c
 
 docs: env ## the documentation site, into build/site; warnings are errors
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -1,0 +1,141 @@
+"""All entries of the package translate and compile, and give the numbers of the compiled Python."""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import sagline as sl
+from sagline.kernels.inverse.poses import inverse_poses
+from tests.tiers import extended
+from tests.translate import inputs
+from tests.translate.library import Entry, compiled_c, copied, library_of
+from tests.translate.recorded import recorded, repeat
+from tools.translate import __main__ as command
+from tools.translate.program import definition
+from tools.translate.signatures import MEMORY, SIGNATURES, functions
+from tools.translate.types import ArrayType, Element, Scalar, Type
+
+KINDS = {"Array": Element.FLOAT, "Indices": Element.INT, "Codes": Element.BYTE, "Flags": Element.FLAG}
+SCALARS = {"int": Scalar.INT, "float": Scalar.FLOAT, "bool": Scalar.BOOL}
+LIMIT = 1e-11  # relative, for numbers that are not equal to the last bit
+
+
+def test_every_entry_is_declared_and_every_declared_one_is_an_entry() -> None:
+    assert set(SIGNATURES) == set(functions()), "renew tools/translate/signatures.py"
+
+
+@pytest.mark.parametrize("name", sorted(SIGNATURES))
+def test_declared_types_agree_with_the_annotations(name: str) -> None:
+    parameters = definition(functions()[name]).args.args
+    for types in SIGNATURES[name].values():
+        for parameter, type_ in zip(parameters, types, strict=True):
+            assert parameter.annotation is not None
+            assert agrees(parameter.annotation, type_), parameter.arg
+
+
+def agrees(annotation: ast.expr, type_: Type) -> bool:
+    """Whether a type is what an annotation of a number or an array says; of tuples, how many items they have."""
+    text = ast.unparse(annotation)
+    if text in KINDS:
+        return isinstance(type_, ArrayType) and type_.element is KINDS[text]
+    if text in SCALARS:
+        return type_ is SCALARS[text]
+    if text.startswith("tuple["):
+        assert isinstance(annotation, ast.Subscript)
+        inner = annotation.slice.elts if isinstance(annotation.slice, ast.Tuple) else [annotation.slice]
+        return len(inner) == len(getattr(type_, "types", ()))
+    return True
+
+
+@pytest.fixture(scope="module")
+def text(tmp_path_factory: pytest.TempPathFactory) -> str:
+    out = tmp_path_factory.mktemp("text") / "kernels.c"
+    assert command.main([str(out)]) == 0
+    return out.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def library(text: str, tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    return compiled_c(text, tmp_path_factory.mktemp("library"))
+
+
+@extended
+def test_translating_again_gives_the_same_text(text: str, tmp_path: Path) -> None:
+    assert command.main([str(tmp_path / "again.c")]) == 0
+    assert (tmp_path / "again.c").read_text(encoding="utf-8") == text
+
+
+def compare(calls: list[Any], library: ctypes.CDLL) -> set[str]:
+    """Repeat calls in C; returns the names of the entries."""
+    for call in calls:
+        found = repeat(call, library)
+        assert found.largest <= LIMIT, call.symbol
+        assert found.different <= 0.01 * found.compared, call.symbol
+    return {call.symbol for call in calls}
+
+
+@extended
+@pytest.mark.parametrize("name", sl.robot_names())
+def test_inverse_and_forward_of_every_preset_are_equal(name: str, library: ctypes.CDLL) -> None:
+    with recorded() as calls:
+        plan = inputs.there_and_back(sl.load_robot(name), 60, 3)
+    assert plan.feasible.sum() > 10
+    reached = compare(calls, library)
+    assert "sagline_inverse_poses" in reached
+    assert {"sagline_forward_poses", "sagline_forward_poses_pulleys"} & reached
+
+
+@extended
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-3-pulleys"])
+def test_all_models_and_methods_are_equal(name: str, library: ctypes.CDLL) -> None:
+    with recorded() as calls:
+        inputs.models_and_methods(sl.load_robot(name), 12)
+    assert "sagline_inverse_poses_methods" in compare(calls, library)
+
+
+@extended
+@pytest.mark.parametrize("name", ["cogiro", "ipanema-3-pulleys"])
+def test_margins_and_states_are_equal(name: str, library: ctypes.CDLL) -> None:
+    with recorded() as calls:
+        inputs.statics(sl.load_robot(name), 12)
+    assert len(compare(calls, library)) >= 4
+
+
+@extended
+def test_too_little_memory_is_an_error_of_numba_and_a_code_of_c(library: ctypes.CDLL) -> None:
+    with recorded() as calls:
+        sl.inverse(sl.load_robot("cogiro"), sl.Pose.from_euler([0.2, -0.4, 2.4], 0, 0, 0))
+    call = calls[0]
+    place = call.types.index(MEMORY)
+    numbers, counters = call.before[place]
+    small = (*call.before[:place], (numbers[:50].copy(), counters), *call.before[place + 1 :])
+    with pytest.raises(ValueError, match="size"):
+        inverse_poses(*copied(small))
+    assert Entry(library, call.symbol, call.types).code(*copied(small)) == (1, None)
+
+
+@extended
+def test_no_sanitizer_finds_a_fault(text: str, tmp_path: Path) -> None:
+    source, pickled = tmp_path / "kernels.c", tmp_path / "calls"
+    source.write_text(text, encoding="utf-8")
+    with recorded() as calls:
+        for name in ("cogiro", "article-mixed", "ipanema-3-pulleys"):
+            inputs.there_and_back(sl.load_robot(name), 20, 4)
+            inputs.models_and_methods(sl.load_robot(name), 4)
+            inputs.statics(sl.load_robot(name), 6)
+    pickled.write_bytes(pickle.dumps([(call.symbol, call.types, call.returned, call.before) for call in calls]))
+    library = library_of(source, "-O1", "-g", "-DSL_CHECK", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+    runtime = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
+    environment = {**os.environ, "LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
+    command = [sys.executable, "-m", "tests.translate.replay", str(library), str(pickled)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr[-3000:]
