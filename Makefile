@@ -57,9 +57,10 @@ record: env ## renew the record of behavior in tests/record; read the diff befor
 mutants: env ## apply plausible mistakes one by one and list which tests catch them
 	$(BIN)/python -m tests.mutants $(FOLDER)
 
-check: env ## style, types and the direction of imports
+check: env ## style, language, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python tools/prose.py
 	$(BIN)/mypy --num-workers 2 src $(wildcard tests examples benchmarks tools)
 	$(BIN)/lint-imports
 

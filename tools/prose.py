@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 
 ROOT: Final = Path(__file__).parents[1]
 PLACES: Final = ("README.md", "CONTRIBUTING.md", "docs", "src", "examples", "benchmarks", "tools")
-KINDS: Final = (".md", ".py", ".ipynb")
+KINDS: Final = (".md", ".py", ".ipynb", ".toml")
 OPENINGS: Final = {  # first words of a docstring -> suggestion
     r"What|How|Whether|Where|Which|Who|Whose|Whatever|When|Why": "a noun phrase or an imperative verb",
     r"Told|Given|Found|Taken|Held|Asked|Refused|Shown|Drawn|Carried|Said|Left|Kept": "a noun phrase",
@@ -118,7 +118,7 @@ def prose(file: Path) -> Iterator[Text]:
     if file.suffix == ".ipynb":
         cells = json.loads(text)["cells"]
         return page("\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown"))
-    return page(text) if file.suffix == ".md" else python(text)
+    return python(text) if file.suffix == ".py" else page(text)
 
 
 def faults(text: Text) -> Iterator[tuple[int, str, str]]:

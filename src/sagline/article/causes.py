@@ -20,7 +20,7 @@ COUNTS = ("one parameter", "two parameters", "three parameters")
 SHOWN = 8  # explanations by two, and by three parameters, in the table
 FEW = 6e-3  # m, what a good explanation leaves
 PRINTING = 1e-3 / np.sqrt(12.0)  # m: scatter of positions printed in whole millimeters
-NOTHING = 0.95  # of what was measured: what leaves more explains nothing
+NOTHING = 0.95  # of the measured error: models with a larger remainder explain nothing
 ALIKE = 0.2  # of the measured slope over height: less is the same everywhere
 AS_MEASURED = 0.15  # of it: nearer is the measured one
 LOWEST, HIGHEST = "P8", "P7"
@@ -65,7 +65,7 @@ def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
 
 
 def limits_of_ten_points(study: TenPoses) -> Finding:
-    """Limits of ten points: parameters that they cannot tell apart."""
+    """Limits of ten points: parameters that they cannot separate."""
     few = [found for found in study.explanations[1] if found.rms < FEW]
     named = all(found.names & {PULLEY, ANCHORS} for found in few)
     zeros = 1e3 * study.single_zero
@@ -83,7 +83,7 @@ def limits_of_ten_points(study: TenPoses) -> Finding:
         },
         data=(
             Table(
-                "How well ten points would tell the zero of each cable, standard deviation",
+                "Accuracy of the zero of each cable from ten points, standard deviation",
                 ("", *(f"cable {i}" for i in range(zeros.size))),
                 [("its own zero [mm]", *(n(x, ".0f") for x in zeros))],
             ),

@@ -47,7 +47,7 @@ class Drawings:
         self._names = (f"{page}-{k}-" for k in count(1))
 
     def panel(self, figure: Sheet, caption: str) -> Panel:
-        """The figure as a drawing inside the page; the caption is its text for those who do not see it."""
+        """The figure as a drawing inside the page; the caption is its text for screen readers."""
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
         svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # as large as its place in the page
         return Panel(unique_names(svg.replace("<svg ", '<svg role="img" ', 1), next(self._names)), caption)
@@ -176,7 +176,7 @@ def error_panels(
 
 
 class Courses(NamedTuple):
-    """Several courses with their fits."""
+    """Several curves with their fits."""
 
     x: Array  # where they are sampled, shape (n,)
     rows: Array  # the samples, shape (k, n)

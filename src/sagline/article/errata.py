@@ -28,7 +28,7 @@ TAUTER = 20.0  # times the sampled tensions: so that only the leading terms are 
 NEARLY = 1e-6  # rad from vertical or level
 TURN = (0.3, 0.2, 0.1)  # rad, about z, y, x
 
-# label, value, unit; the size of what it is a difference of, which tells rounding from a small number
+# label, value, unit; for differences the size of the terms, to detect rounding errors
 Number: TypeAlias = tuple[str, float, str] | tuple[str, float, str, float]
 
 

@@ -30,7 +30,7 @@ SPEED: Final = 0.06  # m/s of the platform at most: the fastest winch then has 6
 STOP: Final = 14.0  # s at each point, home twice among them: the whole takes 13.9 minutes
 LOOK: Final = 1.0  # s at the end of a stop, whose mean is taken for what is measured there
 BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
-NEXT: Final = "Mend that, and begin anew."
+NEXT: Final = "Correct that, and start again."
 EVERY: Final = 10  # cycles between two points of a course: drawn, not filed
 
 Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
@@ -109,7 +109,7 @@ class Experiment:
     estimated: Array  # where the encoders put it [m], shape (10, 3)
     tension: Array  # what the load cells read there, mean of a second [N], shape (10, m)
     planned_tension: Array  # what was planned there [N], shape (10, m)
-    # what of their error lengths can mend that do not move the platform: largest of a cable [N], (10,)
+    # what of their error lengths can correct that do not move the platform: largest of a cable [N], (10,)
     null_error: Array
     correction: Array  # what the tension loop had in the lengths there [m], shape (10, m)
     back: Array  # where the platform was at home in the end, less where it began [m], shape (3,)

@@ -64,8 +64,8 @@ def _stops(result: Experiment) -> Finding:
         },
         data=(
             table_of(
-                "The ten points; null-space error: what of the load cells' error lengths could mend without moving the "
-                "platform, largest of a cable",
+                "The ten points; null-space error: part of the load cells' error in the null space of the structure "
+                "matrix, largest of a cable",
                 ("point", [*table.points, "mean"], ""),
                 ("desired x, y, z [m]", [*(_joined(place, ".2f") for place in table.desired), ""], ""),
                 ("article: error x, y, z [mm]", [*(_joined(1e3 * error, ".0f") for error in table.error), ""], ""),

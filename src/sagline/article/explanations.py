@@ -26,7 +26,7 @@ class Explanation(NamedTuple):
 
     parameters: Model  # the parameters, k of them
     values: Array  # their errors, each in its unit, shape (k,)
-    deviation: Array  # their standard deviations, each in its unit, shape (k,); NaN for one that stands at a limit
+    deviation: Array  # their standard deviations, each in its unit, shape (k,); NaN for one at a limit
     at_limit: Flags  # whether each has run into the limit of what is plausible, shape (k,)
     predicted: Array  # actual less desired position with these errors [m], shape (N, 3)
     rms: float  # root mean square of measured less predicted position, over all coordinates [m]

@@ -1,4 +1,4 @@
-"""Figures 3 to 5: tensions and lengths that put the end of a cable where it is wanted."""
+"""Figures 3 to 5: tensions and lengths for a given position of a cable's end."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from sagline.core.results import Result
 from sagline.kernels.cable.batch import batch_end
 
 CONFIDENCE = 0.95
-POINT_BYTES = 400.0  # what each combination of span, rise and tension takes while it is fitted
+POINT_BYTES = 400.0  # memory of each combination of span, rise and tension during the fit
 
 
 class Estimate(NamedTuple):

@@ -20,7 +20,7 @@ from sagline.core.results import Result
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
 TOO_LOOSE = 0.5  # relative standard error from which on a value is not determined
-TOO_CLOSE = 0.95  # correlation from which on two values are not told apart
+TOO_CLOSE = 0.95  # correlation above which two values are not separated
 ITERATIONS = 30  # of the tension at the chord from that at an end
 WEIGHTINGS = 3  # the weights depend on the answer, but little
 _ADVICE = {
@@ -35,9 +35,9 @@ class CableFit(Result):
 
     Attributes:
         cable: The cable to use.
-        names: What was sought, in the order of the arrays below: "linear_density" [kg/m], "axial_stiffness" [N],
+        names: Unknowns, in the order of the arrays below: "linear_density" [kg/m], "axial_stiffness" [N],
             "length_offset" [m], by which the measured lengths are too long.
-        values: What was found, shape (k,).
+        values: Estimates, shape (k,).
         covariance: Of the values, shape (k, k), from the given measuring errors.
         residuals: Measured less predicted length [m], shape (n,).
         chi_squared: Sum of squares of the residuals in units of their standard errors, per degree of freedom;
@@ -65,7 +65,7 @@ class CableFit(Result):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Values that the data do not determine or cannot tell apart; empty if all are determined."""
+        """Values that the data do not determine or cannot separate; empty if all are determined."""
         found = []
         for name, value, error in zip(self.names, self.values, self.standard_error, strict=True):
             if name != "length_offset" and error > TOO_LOOSE * value:
@@ -77,7 +77,7 @@ class CableFit(Result):
             for j, second in enumerate(self.names[:i]):
                 if abs(correlation[i, j]) > TOO_CLOSE:
                     found.append(
-                        f"{second} and {first} cannot be told apart (correlation {correlation[i, j]:+.3f}); "
+                        f"{second} and {first} cannot be separated (correlation {correlation[i, j]:+.3f}); "
                         "measure over a wider range of tensions"
                     )
         return tuple(found)
@@ -108,9 +108,9 @@ def identify_cable(
         tension: Measured tension [N], shape (n,), > 0.
         length_error: Standard error of a length [m], > 0.
         tension_error: Standard error of a tension [N], > 0.
-        tension_at: Where it is measured: "frame_end" (a load cell at the winch), "platform_end" or "chord".
-        unknowns: What to find: any of "linear_density", "axial_stiffness", "length_offset".
-        start: What is known of the cable, and where the search starts; None for 0.1 kg/m and 100 kN.
+        tension_at: Place of the measurement: "frame_end" (a load cell at the winch), "platform_end" or "chord".
+        unknowns: Unknowns: any of "linear_density", "axial_stiffness", "length_offset".
+        start: Initial values, and values of known parameters; None for 0.1 kg/m and 100 kN.
         gravity: [m/s^2], > 0.
 
     Returns:
@@ -210,7 +210,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
         higher, lower = (data.predicted(cable, f * data.tension) for f in (1.0 + 1e-4, 1.0 - 1e-4))
         slope = (higher - lower) / (2e-4 * data.tension)
         spread = np.hypot(length_error, slope * tension_error)
-    # the covariance with the weights of the last round
+    # the covariance with the weights of the last iteration
     jacobian = found.jac
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
     values = np.array([offset if name == "length_offset" else float(getattr(cable, name)) for name in names])

@@ -24,8 +24,8 @@ class Parameter(NamedTuple):
     """Parameter of the prototype that may deviate from Table 1, for all cables alike."""
 
     name: str
-    unit: str  # unit in which its error is told
-    typical: float  # an error that is told as an example, in that unit
+    unit: str  # unit of its error
+    typical: float  # typical error, in that unit
     plausible: float  # the largest error we think possible, in that unit; ours, the article says nothing of it
     positive: bool = False  # whether it can only be larger than planned
 
@@ -48,7 +48,7 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
     """Robot with errors of some parameters: anchors, cables, routing and load."""
     off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
     cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
-    changes: dict[str, Any] = {}  # what is as planned is not made again: a fit makes a thousand robots
+    changes: dict[str, Any] = {}  # unchanged parts are not made again: a fit makes a thousand robots
     if off[MODULUS] or off[DENSITY]:
         changes["cables"] = cables.replace(
             axial_stiffness=cables.axial_stiffness * (1.0 + 0.01 * off[MODULUS]),
@@ -75,7 +75,7 @@ def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
     """Equilibria of robots with errors, whose winches wind the lengths of a plan of the robot without."""
-    # Encoders are set while the platform rests in its home pose, held as planned: what pulleys and dead cable add to
+    # Encoders are set while the platform rests in its home pose, held as planned: what pulleys and dead length add to
     # the lengths there is not counted
     robots = [robot_with_errors(robot, one) for one in errors]
     off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
@@ -94,7 +94,7 @@ def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequen
 
 
 def _not_counted(robots: Sequence[sl.Robot], home: sl.Plan) -> Array:
-    """By how much pulleys and dead cable lengthen the cables that hold the platform at home [m], shape (K, m)."""
+    """By how much pulleys and dead length lengthen the cables that hold the platform at home [m], shape (K, m)."""
     added = np.zeros((len(robots), home.unstrained_length.shape[-1]))
     behind = [index for index, robot in enumerate(robots) if has_routing(robot)]
     if behind:

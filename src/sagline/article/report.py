@@ -30,7 +30,7 @@ LEAD = (
 )
 NOTATION = (
     "Notation: z up, T acts on the cable at its platform end, φ is the article's β. Every number on the computed side "
-    "was computed when this page was made; one that is rounding of the arithmetic alone is told as such."
+    "was computed when this page was made; rounding errors are marked."
 )
 
 Progress = Callable[[int, int, str], None]

@@ -261,7 +261,7 @@ def _low_tension(low: LowTension, draw: Drawings) -> Finding:
             "bound_54_mm": [1e3 * f.axis_error_max for f in bound],
             "bound_54_lowest_N": [f.tension_min for f in bound],
         },
-        panels=(draw.panel(figure, "Empirical model, over the lowest tension that the load sharing may use."),),
+        panels=(draw.panel(figure, "Empirical model, over the lowest tension limit."),),
         good_from=good.min(),
     )
 

@@ -56,7 +56,7 @@ class TenPoses:
     # together: length of the projection over length of the whole
     imitated: float
     single_zero: Array  # standard deviation of the zero of each cable if every cable had its own [m], shape (m,)
-    dead_meter: Array  # predicted actual less desired position with 1 m of dead cable [m], shape (10, 3)
+    dead_meter: Array  # predicted actual less desired position with 1 m of dead length [m], shape (10, 3)
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
     def best(self, count: int) -> Explanation:

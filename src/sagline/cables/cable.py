@@ -111,7 +111,7 @@ class Cable:
             A new cable; this one stays as it is.
 
         Raises:
-            InvalidValueError: If there is no such field, or the new values are none the constructor accepts.
+            InvalidValueError: If there is no such field, or the constructor does not accept the new values.
 
         Examples:
             >>> import sagline as sl

@@ -71,7 +71,7 @@ class Creep:
         Args:
             time: Of the samples [s], rising, shape (N,).
             tension: [N], shape (N,) or (N, m); NaN at a sample without an answer.
-            settled: Whether the first tension has been there for long; if not, the strain begins at zero.
+            settled: Whether the first tension has acted for long; if not, the strain begins at zero.
 
         Returns:
             Strain, of the shape of tension; NaN where that is.

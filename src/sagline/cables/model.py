@@ -57,7 +57,7 @@ class CableModel:
     """A cable model: a code and two parameters that the kernels understand.
 
     Attributes:
-        code: Which equations the kernels use (`sagline.kernels.codes`).
+        code: Code of the equations in the kernels (`sagline.kernels.codes`).
         weightless: Whether the model ignores the cable's weight.
     """
 
@@ -197,7 +197,7 @@ class CableModel:
         Args:
             cable: Material.
             state: Ends, length and forces of the cable, shape (...).
-            points: How many, at equal steps of unstrained length, >= 2.
+            points: Number of points at equal steps of unstrained length, >= 2.
 
         Returns:
             Horizontal and vertical coordinates from the frame end on [m], shape (..., points, 2).
@@ -312,7 +312,7 @@ class CableState(Result):
         """Points along the cable in its own vertical plane.
 
         Args:
-            count: How many, at equal steps of unstrained length, >= 2.
+            count: Number of points at equal steps of unstrained length, >= 2.
 
         Returns:
             Horizontal and vertical coordinates [m], frame end first, shape (..., count, 2).

@@ -17,13 +17,13 @@ class Rope:
     """A kind of rope whose numbers go with the square of its diameter.
 
     Attributes:
-        name: What it is called here.
-        description: What it is.
+        name: Name in the catalogue.
+        description: Description of the rope.
         density_factor: Linear density over the diameter squared [kg/m^3].
         stiffness_factor: Axial stiffness over the diameter squared [Pa].
         strength_factor: Breaking force over the diameter squared [Pa].
-        source: Where the numbers were read.
-        assumed: Which of them are ours, and why.
+        source: Source of the numbers.
+        assumed: Assumed values with the reason.
     """
 
     name: str

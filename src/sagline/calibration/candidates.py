@@ -23,7 +23,7 @@ MOST_SETS: Final = 5  # of tensions at a pose
 ROUNDS: Final = 6  # of drawing poses, where much of the box is not feasible
 KEPT: Final = 0.02  # of the range between the limits: what is to be calibrated does not have the tensions it is sent
 GROUP: Final = 20  # poses whose sets of tensions are near to the same corners
-UNLIMITED: Final = 3.0  # times the largest tension of least norm: what stands in for an upper limit that is infinite
+UNLIMITED: Final = 3.0  # times the largest tension of least norm: replaces an infinite upper limit
 SAME: Final = 1e-6  # of the largest tension: sets nearer than this are one
 
 

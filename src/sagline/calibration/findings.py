@@ -30,7 +30,7 @@ class CalibrationStatus(Status):
 
 
 class Omission(Status):
-    """Why a row of a log was left out; `text` says it of one row."""
+    """Reason for the omission of a row of a log; `text` describes one row."""
 
     NOT_A_NUMBER = 0, "a reading is missing that the rest of the log has"
     REPEATED = 1, "the readings of an earlier row again"

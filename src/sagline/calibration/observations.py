@@ -154,7 +154,7 @@ def machine_of(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
 ) -> MachineTerms:
     """A robot and its sensors as the kernel takes them; refused if counts are read and drum data are missing."""
-    # pulleys and dead cable that are unknown have slopes, even where the robot has none yet
+    # pulleys and dead length that are unknown have slopes, even where the robot has none yet
     routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     return MachineTerms(
         robot,

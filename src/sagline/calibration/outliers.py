@@ -24,7 +24,7 @@ _MOST: Final = 3  # errors at one pose; with more the pose as a whole is the out
 _CLEAR: Final = 3.0  # of the logarithm of the probability: closer explanations are not distinguished
 _REST: Final = 0.1  # of the squares that one thing explains: what the rest of the calibration may be wrong by
 _WORTH: Final = 20.0  # of the same, to first order: how much worse an explanation may be to be looked at closely
-_NONLINEAR: Final = 0.6  # of the same: of what is off by far, the slopes need explain no more to be looked at closely
+_NONLINEAR: Final = 0.6  # of the same: of what is off by far, this share of the slopes is sufficient for a closer look
 _DROP: Final = 500.0  # of chi squared
 _ITERATIONS: Final = 10
 _QUANTITIES: Final = ("length", "load cell", "position", "rotation")
@@ -207,7 +207,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         limit = _limit(case.read, (*taken, close[best]), count)
         enough = fits[best].squares <= max(limit, 0.0 if taken else _REST * whole.squares)
         if not alone:
-            if enough and not taken and len(near) == 1:  # which of the cables it was, nothing tells
+            if enough and not taken and len(near) == 1:  # the readings do not identify the cable
                 return [Outlier(row, None, near.pop(), abs(fits[best].sizes[0]), fits[best].deviations[0])]
             break
         taken.append(close[best])

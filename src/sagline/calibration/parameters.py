@@ -71,7 +71,7 @@ KINDS: Final[dict[str, _Kind]] = {
 class Unknown:
     """One kind of unknown parameter, and its prior.
 
-    Pulley radii and dead cable have zero as a lower bound.
+    Pulley radii and dead length have zero as a lower bound.
 
     Attributes:
         name: Of `KINDS`.

@@ -121,7 +121,7 @@ class Normal(NamedTuple):
         matrix: J^T W J of all poses, without the prior, (P, P).
         gradient: J^T W y, (P,).
         squares: Sum of squares of each pose, infinite where the platform finds no equilibrium, (N,).
-        readings: How many readings each pose has, (N,).
+        readings: Number of readings at each pose, (N,).
         weights: With which the poses count, (N,).
         rows: Whitened readings of a log of one block; None of a longer one, where they are computed again.
     """
@@ -141,7 +141,7 @@ class Fit(NamedTuple):
         state: The last one.
         normal: Normal equations there.
         converged: Whether it met the tolerance.
-        iterations: How many steps were taken.
+        iterations: Number of steps.
     """
 
     state: SearchState

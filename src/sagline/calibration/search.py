@@ -109,7 +109,7 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses, among few ones, that fit but for single cables: outliers of little weight."""
+    """Flags of the poses, among few ones, that fit except for single cables: outliers of little weight."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))

@@ -34,7 +34,7 @@ class Generator(NamedTuple):
     """A change of all parameters that no reading observes if all may change.
 
     Attributes:
-        name: What it is.
+        name: Name of the quantity.
         step: Measurement that removes it.
         change: Of every number of `kernels.calibration.kinds`, (KIND_ROWS, m), logarithms where these are looked for.
         lengths: Relative change of the lengths off the drums.

@@ -100,7 +100,7 @@ def _read(source: str, cables: Cable | None, cable_set: str | None) -> Imported:
     path = Path(source)
     is_caspr = path.suffix.lower() == ".xml" or path.is_dir()
     if cable_set is not None and not is_caspr:
-        raise InvalidValueError("--cable-set", repr(cable_set), "none but for CASPR", "Leave it out.")
+        raise InvalidValueError("--cable-set", repr(cable_set), "none except for CASPR", "Leave it out.")
     if path.suffix.lower() == ".wcrfx":
         from sagline.files.wirex import load_wirex
 

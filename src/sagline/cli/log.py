@@ -46,7 +46,7 @@ def log(
 
         sagline log run.mcap
         sagline log run.mcap --to run.nc
-        sagline log killed.mcap --to mended.mcap
+        sagline log killed.mcap --to corrected.mcap
     """
     from sagline.cli.values import whole_of
     from sagline.files.execution_file import load_execution, save

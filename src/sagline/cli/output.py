@@ -53,7 +53,7 @@ class TextTable:
         """The fewest pieces that fit a width, with about the same number of columns, each with its least width."""
         full = self._filled(console, width)
         even = list(_split(range(self.keys, len(self.heads)), len(full)))
-        for parts in (even, full):  # evenly, if that needs no more pieces
+        for parts in (even, full):  # evenly, if the number of pieces stays the same
             tables = [self._table([*range(self.keys), *part], first=part[0] == self.keys) for part in parts]
             pieces = [(table, _least(console, table)) for table in tables]
             if all(least <= width for _, least in pieces):

@@ -97,7 +97,7 @@ def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, 
 
 
 def show_json(what: Any) -> None:
-    """Print the result for a program: one JSON document; null stands for what is not finite."""
+    """Print the result for a program: one JSON document; null means not finite."""
     _write("".join(c if _fits(c) else json.dumps(c)[1:-1] for c in json_text(what)) + "\n")
 
 

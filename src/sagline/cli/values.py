@@ -127,7 +127,7 @@ def points_of(text: str, item: str) -> tuple[int, ...]:
 
 
 def box_of(text: str, item: str) -> PoseBox:
-    """A box of level poses from "-2..2, -1..1, 1..3 m"; one number stands for a plane."""
+    """A box of level poses from "-2..2, -1..1, 1..3 m"; one number means a plane."""
     step = f'Give x, y and z, each from..to: {item} "-2..2, -1..1, 1..3 m".'
     parts = text.replace("−", "-").split(",")
     if len(parts) != 3 or len(text) > _LONGEST:

@@ -289,7 +289,7 @@ class Following(ActiveState):
                 c.end_run(ExecutionStatus.DONE, "the end of the plan")
                 c.previous_plan = source.motion.plan
             else:
-                c.end_run(ExecutionStatus.PAUSED, "paused; resume goes on")
+                c.end_run(ExecutionStatus.PAUSED, "paused; resume continues")
                 c.run.paused = source
             return Following(c, State.IDLE, c.run.reason, point, Standing(point, source.pose))
         after = self.settle(point.length, ExecutionStatus.DONE, "the jog ended")

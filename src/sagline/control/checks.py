@@ -40,7 +40,7 @@ class Motion:
         length: Unstrained lengths off the drums [m], shape (N, m).
         rate: Their rates [m/s], shape (N, m); zero in the last row.
         tension: T_A, at the frame ends [N], shape (N, m).
-        drum_tension: Where the cables leave the drums [N], shape (N, m).
+        drum_tension: Tension at the drums [N], shape (N, m).
         wrench: External plus inertial, on the platform [N, N m], shape (N, 6).
         gains: Of the tension loop; None for a robot without redundancy.
     """

@@ -83,7 +83,7 @@ class _Run:
     Attributes:
         motion: As planned; None for a platform jog, or before the first.
         paused: Path that can be resumed.
-        status: How it ended; RUNNING before its end.
+        status: Final status; RUNNING before its end.
         reason: One line on that.
         first_event: Number of events before its beginning.
         tape: Its cycles.

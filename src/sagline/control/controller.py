@@ -269,7 +269,7 @@ class Controller(Preparation):
         return done
 
     def pause(self) -> None:
-        """Slow down on the path, and stand; `resume` goes on.
+        """Slow down on the path and stop; `resume` continues.
 
         Raises:
             RefusedError: If no path is being followed.
@@ -296,7 +296,7 @@ class Controller(Preparation):
         check_start(self.robot, self.estimate, run.paused.pose)
         source, run.paused = run.paused, None
         source.resume()
-        self._follow(State.MOVING, source, f"goes on at {source.clock:.2f} s of the path")
+        self._follow(State.MOVING, source, f"continues at {source.clock:.2f} s of the path")
 
     # shared by the methods above
 

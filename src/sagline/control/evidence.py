@@ -29,7 +29,7 @@ class Cycle(NamedTuple):
         gains: Row of the plan's gains at this time; None where there is none.
         correction: Of the lengths of the plan by the tension loop [m], shape (m,).
         late: Delay of the beginning of the cycle [s]; 0 on the clock of an in-process machine.
-        recording: Reason why recording has stopped; "" while it goes on, or where nothing is recorded.
+        recording: Reason why recording has stopped; "" while it continues, or where nothing is recorded.
     """
 
     sample: Sample
@@ -237,7 +237,7 @@ class Reaction(IntEnum):
     """Reaction to a fault; of several at a time the largest counts."""
 
     EVENT = 0  # it is reported and recorded
-    DEGRADED = 1  # the tension loop keeps what it has added; the motion goes on
+    DEGRADED = 1  # the tension loop keeps its correction; the motion continues
     STOPPING = 2  # the ramp, then FAULT
     EMERGENCY = 3  # drums locked, no motion offered
 
@@ -285,7 +285,7 @@ class Fault(ABC):
             Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
             while it lasts, and while another fault stops the motion: it is reported when the winches stand.
         """
-        if cycle is not self.seen.cycle:  # what the first rule lets be worked out serves them all
+        if cycle is not self.seen.cycle:  # computed by the first rule for all others
             self.seen.at(cycle)
         # a fault after a stop is mostly its consequence; one that makes a length unreliable is reported all the same
         stops, waits = self.reaction >= Reaction.STOPPING, False

@@ -34,7 +34,7 @@ class ExecutionStatus(Status):
     """End of the execution of a plan."""
 
     DONE = 0, "the plan was executed to its end"
-    PAUSED = 1, "the platform stands on the path; resume() continues"
+    PAUSED = 1, "the platform is on the path; resume() continues"
     STOPPED = 2, "the operator stopped it; plan again from the pose of the platform"
     FAULT = 3, "a fault stopped it: read the events, repair it, acknowledge"
     EMERGENCY = 4, "the drums are locked: read the events, unlock them at the machine, connect and home again"
@@ -94,7 +94,7 @@ class Samples(Result):
         """One sample, with arrays of its own.
 
         Args:
-            index: Which, from 0.
+            index: Number, from 0.
 
         Raises:
             InvalidValueError: If there is none.
@@ -107,7 +107,7 @@ class Samples(Result):
 class Execution(Result, Saved):
     """Execution of a plan on a machine, in N cycles of m winches.
 
-    The command of a cycle is what was sent in it; the sample came back in the same cycle, so that it knows nothing of
+    The command of a cycle is what was sent in it; the sample came back in the same cycle, so it does not contain
     that command yet.
 
     Attributes:

@@ -228,7 +228,7 @@ class CycleLost(Fault):
 
 
 class RecordingStopped(Fault):
-    """Recording stopped; the motion goes on."""
+    """Recording stopped; the motion continues."""
 
     name = "recording stopped"
     rule = "a write fails, for instance because the disk is full, or the queue to the writer is full"

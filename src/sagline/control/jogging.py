@@ -63,7 +63,7 @@ def winch_jog(
         ("tension_min", robot.tension_min, tension < robot.tension_min),
         ("tension_max", robot.tension_max, tension > robot.tension_max),
     ):
-        leaves = wrong & ~wrong[0]  # what is beyond it already may be jogged back
+        leaves = wrong & ~wrong[0]  # a winch beyond the limit may be jogged back
         if leaves.any():
             k, i = (int(index) for index in np.argwhere(leaves)[0])
             reason = f"cable {i} would have {tension[k, i]:.3g} N; allowed: its {name}, {limit[i]:.3g} N"
@@ -125,7 +125,7 @@ class PlatformJog:
         left = self._fade.step()
         length = found.unstrained_length if left is None else found.unstrained_length + left[0]
         rate = (length - self._point.length) / self._period
-        hanging = found.vertical_force - self._weight * found.unstrained_length  # pulleys and dead cable left out
+        hanging = found.vertical_force - self._weight * found.unstrained_length  # pulleys and dead length left out
         tension = np.hypot(found.horizontal_tension, hanging)
         done = self._cycle == self._count and left is None
         self._point = self._point._replace(

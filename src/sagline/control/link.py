@@ -82,7 +82,7 @@ class Command(NamedTuple):
         valid_for: Time for which a PLC may use it [s].
         length: Set points of the unstrained lengths off the drums at the end of the cycle [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
-        tension: Expected at the drums, which the motors hold beforehand [N], shape (m,).
+        tension: Expected at the drums, feedforward of the motors [N], shape (m,).
         enable: Drives that may move, shape (m,).
         claims: Whether grants that are not ours are claimed; a command to leave never does so.
     """
@@ -106,7 +106,7 @@ class Sample(NamedTuple):
         age: Time since the newest valid block of each group arrived [s], shape (G,).
         counter: Of each group's blocks, shape (G,).
         plc_time: Time of writing, on the clock of each PLC [s], shape (G,).
-        owner: Owner of each grant, 0 for nobody, shape (G,).
+        owner: Owner of each grant, 0 for none, shape (G,).
         echo: Counter of the last command each PLC took, shape (G,).
         status: Bits of `GroupStatus`, shape (G,).
         fault: Codes of `GroupFault`, shape (G,).
@@ -158,7 +158,7 @@ class Link(Protocol):
     """Connection to a machine.
 
     What it hands over is never older than what it handed over before: a block that is torn, foreign, repeated or out of
-    order is discarded, and the group's age goes on.
+    order is discarded, and the group's age increases.
     """
 
     @property
@@ -175,7 +175,7 @@ class Link(Protocol):
         What each group is sent, `sent_to` says: the command only where its owner has the grant.
 
         Args:
-            command: What is asked for; None: nothing is sent, for those who only read.
+            command: Command to send; None only reads.
         """
 
     def close(self) -> None:
@@ -191,14 +191,14 @@ class Sent(Enum):
 
 
 def sent_to(owner: int, command: Command) -> Sent:
-    """Message to a group, by the owner of its grant; 0 for nobody."""
+    """Message to a group, by the owner of its grant; 0 for none."""
     if owner == command.owner:
         return Sent.COMMAND
     return Sent.CLAIM if command.claims and command.mode != Mode.LEAVE else Sent.NOTHING
 
 
 def newer(counter: int, known: int) -> bool:
-    """True if a counter is ahead of another, by less than half of all there are."""
+    """True if a counter is ahead of another, by less than half of the range."""
     return 0 < (counter - known) % COUNTERS < COUNTERS // 2
 
 

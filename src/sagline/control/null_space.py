@@ -18,7 +18,7 @@ from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes, on_platform, tension_slopes
 from sagline.statics.stiffness import stiffness
 
-SIGMAS: Final = 5.0  # by which a reading may be off before it means something
+SIGMAS: Final = 5.0  # tolerance of a reading
 OWN_DEVIATION: Final = 1.0  # N, of a cell that does not say
 BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
 _LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
@@ -48,7 +48,7 @@ def balance_slope(state: Equilibrium) -> Array:
 def parity(state: Equilibrium) -> Array:
     """Parity matrix for fault detection of load cells, independent of the weight of the load.
 
-    Where the platform rests, tensions other than planned must leave the wrench as it is, but for a load that is not the
+    Where the platform rests, tension errors must not change the wrench, except for a load that is not the
     planned one. With V the projection on all that they must not do, less the direction of the load, row i is
     V_i/sqrt(V_ii): times the tensions less the plan it is the error of cell i alone that is most like what is seen, as
     far as it is visible. The cell with the largest is named. Without the load's direction taken out, a load of another
@@ -151,7 +151,7 @@ class Gains:
 
     time: Array
     rows: tuple[NullSpace, ...]
-    _changes: tuple[float, ...]  # where the next row is as near, R - 1 of them
+    _changes: tuple[float, ...]  # points with equal distances to two rows, R - 1 of them
 
     def at(self, time: float) -> NullSpace:
         """Matrices of the nearest pose in time.

@@ -1,4 +1,4 @@
-"""Real time: ticks, planning in the background, garbage collection, Ctrl-C, and loading kernels beforehand."""
+"""Real time: ticks, planning in the background, garbage collection, Ctrl-C, and loading of kernels in advance."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Pace:
     """Waits for the next tick of a clock that does not drift: ticks are a period apart, whatever a cycle takes.
 
     It sleeps and does not spin: threads of the link need the time. Where a cycle is late by more than a period, the
-    ticks begin anew there: set points that were missed are not sent in a burst.
+    ticks start again there: set points that were missed are not sent in a burst.
     """
 
     def __init__(self, period: float = PERIOD) -> None:

@@ -45,7 +45,7 @@ class Event(NamedTuple):
     text: str
 
 
-# what a cycle leaves, of m winches and G groups: real numbers, and whole ones
+# record of a cycle with m winches and G groups: real numbers, and whole ones
 REAL_OWN: Final = ("time", "late", "clock")
 PLACE: Final = (("position", 3), ("quaternion", 4))
 REAL_OF_GROUPS: Final = ("age", "plc_time")
@@ -128,7 +128,7 @@ class Recorder(Protocol):
 
 
 class Tape:
-    """Table of cycles, in memory that is allocated beforehand."""
+    """Table of cycles, in preallocated memory."""
 
     def __init__(self, cable_count: int, group_count: int, expected: int) -> None:
         """Allocate memory."""

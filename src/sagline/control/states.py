@@ -18,7 +18,7 @@ class State(Status):
     IDLE = 4, "the platform stands and its pose is known; a path, a pose or a jog may begin"
     MOVING = 5, "set points follow the plan"
     JOGGING = 6, "set points follow the operator"
-    PAUSING = 7, "the path's clock slows down; resume() goes on from there"
+    PAUSING = 7, "the path's clock slows down; resume() continues from there"
     STOPPING = 8, "all rates go to zero together"
     FAULT = 9, "the drives hold; the operator reads the reason, repairs it and acknowledges"
     EMERGENCY = 10, "drums locked; the operator unlocks them at the machine, then connects and homes again"
@@ -86,7 +86,7 @@ HOLDS_GRANT: Final = frozenset(State) - {State.OFF, State.CONNECTING}
 
 
 class RefusedError(SaglineError):
-    """Refused request, with the reason; nothing was sent.
+    """Rejected request with the reason; nothing was sent.
 
     Attributes:
         what: The request.

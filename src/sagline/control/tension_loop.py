@@ -66,7 +66,7 @@ class TensionLoop:
 
         Args:
             cable_count: Number of cables m.
-            settings: How it works; by default those of the docs.
+            settings: Settings of the loop; by default those of the docs.
             period: Of a cycle [s], > 0.
 
         Raises:
@@ -98,13 +98,13 @@ class TensionLoop:
             tension: T_A, as the load cells read it [N], shape (m,).
             planned: The plan's, at the same time [N], shape (m,).
             row: Of the plan's gains at this time.
-            frozen: Whether the tensions are old or not to be believed: nothing is learned from them. What was added is
+            frozen: Whether the tensions are old or doubtful: they are then not used. What was added is
                 still fitted to the pose.
 
         Returns:
             What to add to the lengths of the plan [m], shape (m,), the caller's own.
         """
-        if row is not self._row:  # what leaves the platform alone at one pose moves it at the next
+        if row is not self._row:  # lengths in the null space at one pose move the platform at the next
             if self._row is not None:
                 np.matmul(row.projection, self._correction, out=self._change)
                 self._correction[:] = self._change
@@ -127,5 +127,5 @@ class TensionLoop:
         row.correction.dot(self._filtered, change)
         change *= settings.gain
         self._correction -= change
-        if (most := largest(self._correction)) > settings.largest:  # a fault tells of it
+        if (most := largest(self._correction)) > settings.largest:  # a fault reports it
             self._correction *= settings.largest / most  # as a whole: each for itself would move the platform

@@ -112,7 +112,7 @@ def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def spread(array: Array, shape: tuple[int, ...]) -> Array:
-    """An array of `checked` as it is where it has a shape, else its values spread over that, write-locked."""
+    """A write-locked array of `checked`, broadcast to the shape if it has another."""
     return array if array.shape == shape else locked(np.array(np.broadcast_to(array, shape), order="C"))
 
 

@@ -10,7 +10,7 @@ from typing import Final
 
 _WORD: Final = 60  # letters of what was given that are looked at for a word that was meant
 LONGEST: Final = 299  # characters of a line on a terminal; more is not read, and floods it
-HEAD: Final = "Error: "  # what a command writes before a message
+HEAD: Final = "Error: "  # prefix of a message
 MOST: Final = LONGEST - len(HEAD)  # characters of a message
 LEAST: Final = 30  # of each of its parts that are kept, whatever the others take
 
@@ -27,10 +27,10 @@ class InvalidValueError(SaglineError, ValueError):
     """A value that cannot be worked with.
 
     Attributes:
-        item: What the value belongs to, in the reader's words ("cable 3: linear_density").
+        item: Item of the value, in the user's words ("cable 3: linear_density").
         value: The offending value, as text, with its unit.
         allowed: The range or the kind of value that would do.
-        next_step: What to do about it.
+        next_step: Next step for the user.
     """
 
     def __init__(self, item: str, value: object, allowed: str, next_step: str) -> None:
@@ -136,7 +136,7 @@ def printable(text: str, kept: str = "") -> str:
 def is_seen(character: str) -> bool:
     """True for a character that is visible, or a space of any width.
 
-    Marks that only steer how others are read, such as U+200E and U+200B, do not show.
+    Invisible formatting marks, such as U+200E and U+200B, are not printed.
     """
     return character.isprintable() or unicodedata.category(character) == "Zs"
 

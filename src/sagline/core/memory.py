@@ -10,7 +10,7 @@ from typing import Final
 from sagline.core.errors import InvalidValueError
 
 UNASKED: Final = 1 << 26  # bytes: less is not worth asking how much is free
-_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # what a pose takes while it is solved, and each of its cables: as measured
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory of a pose during its solution, and of each of its cables
 _BEHIND_BYTES = 72.0  # and what is behind each of them
 _GROUPS: Final = (  # limit and use of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),

@@ -10,7 +10,7 @@ class Status(IntEnum):
     """End of a calculation; a member is written as its code and its sentence.
 
     Attributes:
-        text: What it means and what to do, one sentence for a person.
+        text: Meaning and next step, one sentence.
     """
 
     text: str

@@ -50,7 +50,7 @@ PARAMETERS: Final = (
     Quantity("parameter_unit", P, "", "unit of each number, 1 for none", "units", values=str),
     Quantity("parameter_cable", P, "", "cable of each number, -1 for one of all", "cables", values=int),
     Quantity("parameter_place", ("kind_row", "cable"), "", "number of each row of kinds, -1", "where", values=int),
-    Quantity("prior", P, "", "what was known beforehand, in the units of the numbers"),
+    Quantity("prior", P, "", "prior values, in the units of the numbers"),
     Quantity("prior_deviation", P, "", "its standard deviation", infinite=True),
     Quantity("prior_stated", P, "", "whether tolerances or the caller said so", "stated", values=bool),
     Quantity("logarithmic", P, "", "whether the logarithm was looked for", values=bool),

@@ -1,4 +1,4 @@
-"""Files of poses to calibrate by: a path that rests at each, with the tensions and lengths to stand there with."""
+"""Files of poses to calibrate by: a path that rests at each, with the tensions and lengths of the rest."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 HEAD: Final = """\
 # Poses to calibrate {robot} by, in an order that is short to drive. It is a path from rest to rest as well: load_path
-# reads it, and `sagline track` plans it. At each pose stands with which tensions to read there: frame_end_tension [N],
+# reads it, and `sagline track` plans it. Each pose contains the tensions to read there: frame_end_tension [N],
 # reached by unstrained_length [m], all cable off the drums{counts}.
 """
 SPEED: Final = 0.2  # m/s, at most, on the way from pose to pose
@@ -34,7 +34,7 @@ _DIGITS: Final = 4  # of an error: more is not known of one
 
 
 def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
-    """Write poses, tensions and lengths, and the errors to expect, to a YAML file, whole or not at all."""
+    """Write poses, tensions and lengths, and the errors to expect, to a YAML file atomically."""
     rows = {
         "position": plan.poses.position,
         "quaternion": plan.poses.quaternion,

@@ -31,7 +31,7 @@ from sagline.robot.robot import Robot
 from sagline.twin.plc_program import FOLLOWING, TINY
 from sagline.twin.start import plc_limits
 
-REDUNDANT: Final = 2  # cables more than freedoms: what sagline.c shares the load among
+REDUNDANT: Final = 2  # cables more than freedoms: of the tension distribution in sagline.c
 _PRECISIONS = {
     np.float64: "typedef double sagline_real;",
     np.float32: "#define SAGLINE_FLOAT /* single precision */\ntypedef float sagline_real;",
@@ -58,7 +58,7 @@ def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
 
     Args:
         robot: The robot as it is planned for; its winches need drum_radius and counts_per_turn.
-        file: Where to write it, plc.scl for instance. A file that exists is replaced.
+        file: Path of the output, plc.scl for instance. A file that exists is replaced.
 
     Returns:
         The path.
@@ -151,14 +151,14 @@ def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bo
     """Write C99 that finds a robot's tensions and lengths on a microcontroller, and what a PLC can take of it.
 
     Three files of one name: NAME.c is the same for every robot: one cable in both directions (P2 and P3 of "The
-    model"), the structure matrix and the inverse kinematics of a pose, sharing the load as `Closest` or `MinimumNorm`;
-    no heap, no recursion, bounded loops, a status for each answer. NAME.h holds the robot's constants. NAME.scl is P3
-    in SCL for a Siemens PLC; no compiler has seen that one.
+    model"), the structure matrix and the inverse kinematics of a pose, with the tension distribution of `Closest` or
+    `MinimumNorm`; no heap, no recursion, bounded loops, a status for each answer. NAME.h holds the robot's constants.
+    NAME.scl is P3 in SCL for a Siemens PLC; no compiler has seen that one.
 
     Args:
         robot: The robot, with two more cables than degrees of freedom, nothing behind its frame anchors, and limits of
             its chord tensions.
-        file: Where to write the source, sagline.c; the others stand beside it. Files that exist are replaced.
+        file: Path of the source, sagline.c; the others are beside it. Files that exist are replaced.
         single_precision: Whether numbers are `float`, for controllers that compute no others in hardware.
 
     Returns:

@@ -42,7 +42,7 @@ def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Exe
 
     Args:
         file: The log.
-        plan: Which of its plans, from 0; -1 is the last. None: all cycles, with the plan if the log has one alone.
+        plan: Number of the plan, from 0; -1 is the last. None: all cycles, with the plan if the log has one alone.
 
     Returns:
         The execution; one whose end is not in the log is UNKNOWN.
@@ -187,7 +187,7 @@ def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a NetCDF file, whole or not at all; its plan is the group `plan`."""
+    """Write an execution to a NetCDF file atomically; its plan is the group `plan`."""
     plan = instance(execution, Execution, "execution").plan
     groups = {} if plan is None else {PLAN_GROUP: plan_dataset(plan)}
     write_dataset(to_dataset(execution), file_path(file), groups)

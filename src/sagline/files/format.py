@@ -30,7 +30,7 @@ class Format(Content, Generic[T]):
     sealed_from: int = 1  # first version whose files end with a digest
 
     def save(self, result: T, file: os.PathLike[str] | str) -> None:
-        """Write a result to a file, whole or not at all, with a digest at its end."""
+        """Write a result to a file atomically, with a digest at its end."""
         write_dataset(self.pack(instance(result, self.kind, self.name)), file_path(file))
 
     def load(self, file: os.PathLike[str] | str, unsealed: Callable[[Path], None] | None = None) -> T:
@@ -68,5 +68,5 @@ def module_of(result: object) -> Any:
 
 
 def save(result: object, file: os.PathLike[str] | str) -> None:
-    """Write a result to a file of the format of its type, whole or not at all."""
+    """Write a result to a file of the format of its type atomically."""
     module_of(result).save(result, file)

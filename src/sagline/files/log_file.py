@@ -38,7 +38,7 @@ COMMANDED: Final = "_commanded"
 _MOST: Final = 1000  # cables
 _OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # and their units
 _NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:\[.*\])?\s*")
-USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # what a sensor may be off
+USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # standard deviations of the sensors
 
 
 class _Sensors(YamlEntry):
@@ -53,7 +53,7 @@ class _Sensors(YamlEntry):
 
 
 def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
-    """The sensors that the comments above the columns of a log tell of."""
+    """The sensors in the comments above the columns of a log."""
     lines = text.split("\n")
     count = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
@@ -134,7 +134,7 @@ def _names(kind: str, cables: int) -> list[str]:
 
 
 def _fields(table: CsvTable, cables: int) -> dict[str, Any]:
-    """Fields of the log but for its sensors."""
+    """Fields of the log except for its sensors."""
     columns = table.columns
     for name in _names("length", cables):
         if name in columns:
@@ -242,7 +242,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
       that was commanded, level where only its position is given.
     - `time`.
 
-    Units stand in brackets; without, they are s, m, N and rad. Cells are blank where nothing was read, but for times
+    Units are in brackets; without, they are s, m, N and rad. Cells are blank without a reading, except for times
     and commanded poses. Comments above the names of the columns say how far sensors are to be trusted, one number or
     one for each cable or axis, and where the measuring system stands: `# frame: {position: [1, 0, 0.5], euler: {alpha:
     90 deg}}` and `# target: [0, 0, 0.1]`, as of `Sensors`. Quaternions have length 1 to the 1e-3 of few printed
@@ -288,7 +288,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
 
 
 def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
-    """Write a log to a CSV file, whole or not at all; `load_log` reads the same numbers, to the last bit."""
+    """Write a log to a CSV file atomically; `load_log` reads the same numbers, to the last bit."""
     write_text(file_path(file), dump_log(log))
 
 

@@ -59,7 +59,7 @@ CYCLES: Final = (
     _real("age", GROUP, "s", "since the newest good block came in", "samples.age"),
     _integer("counter", GROUP, "of the blocks", "samples.counter"),
     _real("plc_time", GROUP, "s", "when the PLC wrote its block, on its own clock", "samples.plc_time"),
-    _integer("owner", GROUP, "who has the grant; 0: nobody", "samples.owner"),
+    _integer("owner", GROUP, "who has the grant; 0: none", "samples.owner"),
     _integer("echo", GROUP, "counter of the last command that the PLC took", "samples.echo"),
     _integer("group_status", GROUP, "bits of the PLC's status", "samples.status"),
     _integer("group_fault", GROUP, "code of why the PLC acts by itself; 0: it does not", "samples.fault"),
@@ -89,7 +89,7 @@ EVENTS: Final = {  # of what happened
     "kind": "state, fault or note",
     "name": "the state that was entered, or the fault",
     "state": "of the controller after it",
-    "text": "what the operator was told",
+    "text": "message to the operator",
 }
 
 
@@ -247,7 +247,7 @@ class Scene:
         return scene
 
     def _cables(self, ends: Array, tension: Array) -> Array:
-        """Points along the cables (m, POINTS, 3): parabolas, which no eye tells from what they are."""
+        """Points along the cables (m, POINTS, 3): parabolas, visually identical to the cables."""
         robot, share = self._robot, np.linspace(0.0, 1.0, POINTS)[:, None]
         start = robot.frame_anchors[:, None]
         run = ends[:, None] - start

@@ -71,7 +71,7 @@ class LogReader:
     """Reader of a log that may still grow.
 
     Attributes:
-        log: What has been read so far.
+        log: Content read so far.
     """
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
@@ -104,7 +104,7 @@ class LogReader:
             status = path.stat()
             check_regular(path, status.st_mode)
             if status.st_size < self._offset:
-                raise FileError(path, "has become shorter while it was read", "Read it again; it was started anew.")
+                raise FileError(path, "has become shorter while it was read", "Read it again; it was started again.")
             check_memory(f"{path.name}", 2.0 * (status.st_size - self._offset), "Take a shorter log.")
             with path.open("rb") as file:
                 file.seek(self._offset)

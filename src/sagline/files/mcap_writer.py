@@ -1,6 +1,6 @@
 """Logs in MCAP as they are written, by chunk: complete chunks survive the end of the process.
 
-All numbers stand in `/record`, one message a chunk with the numbers of its cycles packed; attachments hold the robot
+All numbers are in `/record`, one message a chunk with the numbers of its cycles packed; attachments hold the robot
 and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and `/scene` as Foxglove
 draws them.
 """
@@ -73,7 +73,7 @@ class McapFile:
 
     def __init__(self, file: RawIOBase, robot: Robot, period: float, epoch: int = 0) -> None:
         """Begin a log."""
-        # file: where to; opened unbuffered, closed by whoever opened it
+        # file: where to; opened unbuffered, closed by the caller
         # period: of a cycle [s]
         # epoch: what is added to times for the log's own [ns]
         import xarray  # noqa: F401 — whatever is loaded is loaded here, before anything moves
@@ -176,7 +176,7 @@ class Recorder:
     """A log that is written beside a controller, or a twin, by a thread of its own.
 
     Whatever is handed over is put into a queue and left there: nothing here waits for a disk. Where the queue is full
-    or the disk takes no more, recording stops for good, `stopped` says why, and what is in the file stays. Numbers are
+    or the disk is full, recording stops for good, `stopped` says why, and what is in the file stays. Numbers are
     kept to the digits of `DECIMALS`.
     """
 
@@ -197,9 +197,9 @@ class Recorder:
             robot: The robot as the controller knows it.
             period: Of a cycle [s].
             group_count: Number of groups G; None: two winches are a group.
-            epoch: What is added to times of the link's clock for those of the log [ns]; None: what makes the first of
+            epoch: Offset from times of the link's clock to those of the log [ns]; None: what makes the first of
                 them the time of day.
-            stream: Where to write in place of the file, unbuffered.
+            stream: Output instead of the file, unbuffered.
         """
         self.file = check_file(file_path(file))
         check_packages()
@@ -221,7 +221,7 @@ class Recorder:
 
     @property
     def stopped(self) -> str:
-        """Reason why recording has stopped; "" while it goes on."""
+        """Reason why recording has stopped; "" while it continues."""
         return self._why
 
     def begins(self, plan: Plan) -> None:
@@ -275,7 +275,7 @@ class Recorder:
         try:
             self._queue.put_nowait(task)
         except Full:
-            self._why = f"{self.file}: {ROOM} entries wait to be written, and no more fit; the disk is too slow"
+            self._why = f"{self.file}: {ROOM} entries wait to be written, and the queue is full; the disk is too slow"
 
     def _date(self, time_of_link: float) -> None:
         """Date the log: from here on its times are times of day."""
@@ -292,7 +292,7 @@ class Recorder:
                 self._mcap.finish()
         except OSError as error:
             self._why = f"{self.file}: cannot be written ({_reason(error)})"
-        except Exception as error:  # whatever it is, the loop goes on and the operator is told
+        except Exception as error:  # for any error, the loop continues and the operator gets a message
             self._why = f"{self.file}: {type(error).__name__}: {error}; a mistake in sagline"
 
     def _write(self) -> None:

@@ -34,7 +34,7 @@ class CountSamples(NamedTuple):
 
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> LengthSamples:
     """Read a CSV file with a column for each cable, L0, L1, ..., and perhaps the time."""
-    # Units stand in brackets, `time [s],L0 [mm],L1 [mm]`; without, they are s and m
+    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; without, they are s and m
     # cable_count: number of cables m of the robot
     # size: largest extent of the robot [m]; lengths a hundred times longer must have another unit
     table, names = _read(file, "L", "m", cable_count)
@@ -87,7 +87,7 @@ class Measurements(NamedTuple):
 def load_measurements(file: os.PathLike[str] | str) -> Measurements:
     """Read a CSV file with the columns span, rise, length and tension, in any order.
 
-    Units stand in brackets, `span [m],rise [mm],length [m],tension [kN]`; without, they are m and N.
+    Units are in brackets, `span [m],rise [mm],length [m],tension [kN]`; without, they are m and N.
 
     Args:
         file: The file.

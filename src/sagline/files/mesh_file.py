@@ -36,7 +36,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
         file: STL, PLY, OBJ or GLB, at most 200 MB and a million triangles. z points up; of a GLB, whose y does by its
             standard, z does after it is read.
         unit: Unit of its coordinates, "mm" for instance; files of these kinds do not say it.
-        name: What it is called; None: as the file is.
+        name: Name; None: that of the file.
 
     Returns:
         Mesh, in meters.
@@ -133,8 +133,8 @@ def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
 
 
 def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
-    """Write a surface to a file, whole or not at all, in meters."""
-    # file: the file; its ending says what it becomes: .stl, .glb (y up, as that format wants it), .ply, .vtk or .vtu
+    """Write a surface to a file atomically, in meters."""
+    # file: the file; its ending says what it becomes: .stl, .glb (y up, as that format requires), .ply, .vtk or .vtu
     # (meshio or PyVista writes these). One that exists is replaced
     # colors: red, green, blue of each vertex, 0 to 255, shape (V, 3); GLB and PLY have them
     target = file_path(file)

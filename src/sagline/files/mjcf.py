@@ -33,9 +33,9 @@ from sagline.statics.tables import refuse_missing_chords, touching_angle
 NOTE = (
     "Its pulleys are cylinders that stand as the platform has turned them at the pose it starts from, and do not "
     "swivel: forces and stiffness are the robot's there; elsewhere lengths are right in the planes of the pulleys "
-    "alone, and off by an amount that grows with the cube of the way there. What of a cable is not in its tendon (dead "
-    "cable, and some of what lies on the pulley) counts in its stiffness and is taken off its springlength. Nothing "
-    "rubs on the pulleys, and there are no drums. "
+    "alone, and off by an amount that grows with the cube of the way there. The cable outside its "
+    "tendon (dead length, and a part of the wrap) counts in its stiffness and is subtracted from its springlength. "
+    "The model has no friction on the pulleys and no drums. "
 )
 _OFF = 0.05  # of the radius: a tendon that begins nearer to its cylinder would not be laid on it
 _WIDTH = 0.2  # of a pulley as it is drawn, to its radius
@@ -43,7 +43,7 @@ _BESIDE = 2.0  # radii from the middle of a pulley, on the side on which the cab
 _LONGEST = 1e3  # radii: of a tendon before its cylinder
 _NOTE = (
     " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
-    "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is none of the "
+    "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is not the "
     "robot's: it lets the platform come to rest, and acts on slack cables too. "
 )
 _RADIUS = 0.002  # of ends of cables, which are only drawn, to the size of the robot
@@ -51,7 +51,7 @@ _DRAWN = {"contype": "0", "conaffinity": "0"}  # touches nothing
 _THINNEST = 0.02  # of a box that is only drawn, to its longest edge
 _STEPS = 20.0  # in a period of the fastest motion
 _LONGEST_STEP = 0.002  # MuJoCo's own [s]
-_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # how a step is written: it becomes no longer
+_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # format of a step: rounded down
 _STRETCH_DAMPING = 4.0  # half the bound of the frequencies, about the fastest there is, is damped critically
 _SWING_DAMPING = 0.4  # a fifth of critical
 _ROUNDING = 1e-12
@@ -129,7 +129,7 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
         The XML text.
 
     Raises:
-        InvalidValueError: If the pose is a batch, a length is below 1e-6 m or no longer than the dead cable, or no
+        InvalidValueError: If the pose is a batch, a length is below 1e-6 m or no longer than the dead length, or no
             tensions within the robot's limits hold the platform there.
         CableGeometryError: If a platform end is inside its pulley.
 
@@ -257,7 +257,7 @@ def _inertia(robot: Robot, pose: Pose) -> Array:
     missing = most - (least + middle) + _ROUNDING * most  # of two moments to reach the third, as those of a body do
     if least > 0.0 and missing <= 0.0:
         return robot.inertia
-    if robot.motion_pattern == "3R3T":  # a flat plate but for rounding; or what no body has, and MuJoCo says so
+    if robot.motion_pattern == "3R3T":  # a flat plate up to rounding; or an impossible inertia, which MuJoCo reports
         return robot.inertia + missing * np.eye(3) if missing < 2.0 * _ROUNDING * most else robot.inertia
     axes = robot.freedom[:, 3:] @ pose.matrix  # the normal of a plane in the platform's axes, if it turns at all
     moment = np.einsum("ij,jk,ik->", axes, robot.inertia, axes)

@@ -1,6 +1,6 @@
 """NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only.
 
-HDF5 states its own length and ignores what follows, so the digest stands behind it. It is checked before anything else
+HDF5 states its own length and ignores what follows, so the digest is behind it. It is checked before anything else
 is read: a library that reads a damaged file may ask for any amount of memory and time.
 """
 
@@ -41,7 +41,7 @@ _KINDS: Final = {
     **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
-INFLATION = 1000  # times the size of a file that its numbers may take in memory: nobody packs them so well
+INFLATION = 1000  # times the size of a file that its numbers may take in memory: no real file is packed better
 HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside texts, such as the robot
 _HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
 _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
@@ -119,7 +119,7 @@ class Content:
 def labeled_dataset(
     variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
 ) -> Dataset:
-    """Make a data set whose dimensions carry labels, without indexes: whoever reads the file builds those needed."""
+    """Make a data set whose dimensions carry labels, without indexes: the reader builds those needed."""
     from xarray import Coordinates, Dataset
 
     parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
@@ -145,7 +145,7 @@ def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | Non
                 mode: Literal["w", "a"] = "w" if group is None else "a"
                 # absolute: xarray takes ~ for the home
                 part.to_netcdf(partial.absolute(), mode, group=group, engine="h5netcdf", encoding=encoding)
-        except RuntimeError as error:  # what h5py makes of a disk that fills up meanwhile
+        except RuntimeError as error:  # error of h5py on a full disk
             raise OSError(str(error)) from error
         seal(partial)
 

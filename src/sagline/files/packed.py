@@ -26,7 +26,7 @@ MOST_ORDER: Final = 5
 LEVEL: Final = 9  # of zstandard: above it takes much longer and saves little
 TYPES: Final = ("float64", "int64", "int8", "bool")
 _EXACT: Final = 2.0**53  # whole numbers that floats have all of
-_GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # what stands for NaN, infinite and -infinite among decimals
+_GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinite and -infinite among decimals
 _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 
 
@@ -119,7 +119,7 @@ def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]
     if decimals < 0:
         return bits, -1
     gaps = ~np.isfinite(values)
-    with np.errstate(over="ignore"):  # what is infinite then is kept bit by bit
+    with np.errstate(over="ignore"):  # infinite values are stored bit by bit
         scaled = np.rint(np.where(gaps, 0.0, values) * 10.0**decimals)
     if not (np.abs(scaled) < _EXACT).all():
         return bits, -1

@@ -24,7 +24,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
-_LEAST_STEP = 1e-12  # s; over less, differences of positions tell no velocity
+_LEAST_STEP = 1e-12  # s; over less, differences of positions give no velocity
 TIMING_UNITS = {
     "rate": "1/s",
     "durations": "s",
@@ -92,7 +92,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
     Poses to calibrate by, as their `save` writes them, are such a file, with the tensions and lengths of each waypoint.
 
     A CSV file has one row for each sample, below a header `time,x,y,z`, followed by `alpha,beta,gamma`, by
-    `qx,qy,qz,qw`, or by nothing for a constant orientation. Units stand in brackets, `time [s],x [mm],...,alpha [deg]`;
+    `qx,qy,qz,qw`, or by nothing for a constant orientation. Units are in brackets, `time [s],x [mm],...,alpha [deg]`;
     without, they are s, m and rad. Velocity and acceleration are those of a spline (see `path_from_samples`).
 
     Quaternions in either file have length 1 to the 1e-3 of few printed decimals, and are normalized.
@@ -141,7 +141,7 @@ class _Waypoints(YamlEntry):
     angular_acceleration: Any = None
     profile: Literal["quintic", "septic"] = "quintic"
     waypoints: list[_Waypoint]
-    calibration: dict[str, Any] | None = None  # what poses to calibrate by are for
+    calibration: dict[str, Any] | None = None  # content of a file of calibration poses
 
 
 def _path_from_yaml(path: FilePath, text: str) -> Path:

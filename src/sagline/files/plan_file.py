@@ -72,7 +72,7 @@ QUANTITIES = (
         known=SOLVED,
         low=0.0,
     ),
-    Quantity("blocking", CABLE, "", "whether the cable's limits stand against the needed wrench", values=bool),
+    Quantity("blocking", CABLE, "", "whether the cable's limits oppose the needed wrench", values=bool),
     Quantity(
         "wrench",
         ("wrench_part",),
@@ -88,12 +88,12 @@ QUANTITIES = (
 
 # of a plan whose cables have something behind them
 MACHINE = (
-    Quantity("free_length", CABLE, "m", "unstrained length of the hanging cable", known=SOLVED, low=0.0),
+    Quantity("free_length", CABLE, "m", "unstrained length of the free cable", known=SOLVED, low=0.0),
     Quantity(
         "free_chord_tension",
         CABLE,
         "N",
-        "tension along the chord of the hanging cable, from where it leaves its pulley",
+        "tension along the chord of the free cable, from where it leaves its pulley",
         "state.cables.chord_tension",
         SOLVED,
         0.0,
@@ -151,7 +151,7 @@ PROOF = (
         "at_border",
         (),
         "",
-        "whether the tensions were searched for at the border of feasibility, where the way of sharing had no say",
+        "whether the tensions were searched for at the border of feasibility, not by the tension method",
         values=bool,
     ),
 )
@@ -188,18 +188,18 @@ def _check_plan(data: Dataset, cables: int) -> None:
 
 
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
-    """Write a plan to a NetCDF file, whole or not at all.
+    """Write a plan to a NetCDF file atomically.
 
     Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Poses without
     an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces. A digest
-    over all values and attributes stands at the end, behind what NetCDF reads, and shows when anything has changed.
+    over all values and attributes is at the end, behind the data of NetCDF, and detects changes.
 
     Args:
         plan: The plan, of one robot.
         file: The file, "run.nc" for instance; a regular file that exists is replaced, anything else is refused.
 
     Raises:
-        InvalidValueError: If the plan is of several robots, one a pose; of a cable model or a way of sharing that is
+        InvalidValueError: If the plan is of several robots, one a pose; of a cable model or a tension method that is
             none of sagline's; or if its values are none that `inverse` gives.
         FileError: If the file cannot be written; what was there before is untouched.
 

@@ -40,11 +40,11 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
         tension_min: 20 N
         assumed: {tension_min: the winch's data sheet gives none}
         tolerances: {frame_anchors: 5 mm, axial_stiffness: 20 %, mass: 0.5 kg}
-            # standard deviations of what stands above, for `calibrate`: one number for all, [x, y, z], or a list of
+            # standard deviations of the values above, for `calibrate`: one number for all, [x, y, z], or a list of
             # one a cable; shares for drum_radius, linear_density, axial_stiffness, load_cell_gain and mass alone
         calibration: {log: winches.csv, date: 2026-03-01, standard_error: {frame_anchors: 1 mm, mass: 80 g}}
-            # what `calibrate` found of the above; it writes this itself
-        scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # what stands around: `load_scene`
+            # estimates of the above, written by `calibrate`
+        scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # obstacles: `load_scene`
 
     A file may begin with a preset and say what is other, `base: cogiro` beside its own name: what it does not say is
     the preset's, and so is what is assumed of that.
@@ -152,7 +152,7 @@ def _winches(winches: Winch) -> dict[str, Any]:
         for key, field in winches.known().items()
         if key == "pulley_radius" or key not in plain or field.tobytes() != plain[key].tobytes()
     }
-    if "guides" in data:  # dead cable follows from them
+    if "guides" in data:  # dead length follows from them
         data = {key: value for key, value in data.items() if key not in ("dead_cable", "dead_rise")}
     if "swivel_axis" in data:
         words = {tuple(axis): word for word, axis in SWIVEL_AXES.items()}

@@ -25,14 +25,14 @@ from sagline.robot.winch import Winch
 if TYPE_CHECKING:
     from sagline.interference.obstacles import Box, Capsule, Sphere
 
-_KINDS: Final = {  # and the keys that may stand beside each
+_KINDS: Final = {  # and the keys allowed beside each
     "box": ("center", "turned"),
     "capsule": ("radius",),
     "sphere": ("radius",),
     "mesh": ("unit", "position", "turned"),
 }
 _EITHER: Final = "one of box, capsule, sphere, mesh"
-_ERROR: Final = "calibration.standard_error."  # where those of a robot's numbers are
+_ERROR: Final = "calibration.standard_error."  # place of a robot's tolerances
 _UNITS: Final = {
     "frame_anchors": "m",
     "platform_anchors": "m",
@@ -130,7 +130,7 @@ class _RobotPart(YamlEntry):
         return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """The one of several sets of keys that is there, whole and alone but for the keys `beside` them."""
+        """The one of several sets of keys that is there, whole and alone except for the keys `beside` them."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):

@@ -44,7 +44,7 @@ def read_xml(path: Path) -> Element:
     parser.XmlDeclHandler = _check_encoding
     try:
         parser.Parse(data, True)
-    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two: an encoding that is none of this file
+    except (expat.ExpatError, LookupError, ValueError) as error:  # the last two: an encoding that does not fit
         raise error_at_line(path, *_cause(error, data)) from None
     except _RefusedError as error:
         raise FileError(path, *error.args) from None
@@ -139,7 +139,7 @@ class Imported:
     Attributes:
         robot: The robot; `robot.assumed` holds what the file does not give, field by field, with the reason, and
             `robot.notes` what was lost.
-        lost: What the file gives and the robot does not hold, one sentence each.
+        lost: Data of the file that the robot does not contain, one sentence each.
     """
 
     robot: Robot

@@ -74,7 +74,7 @@ WINCHES: Final = ("ideal", "robot", LAGGING)
 # attributes that are numbers, and their units
 LAG: Final = {"bandwidth": "Hz", "damping_ratio": "1"}
 LOSSES: Final = {"loss_time": "s", "air_damping": "N s/m^2", "modal_damping": "1"}
-# what happens to a cable or winch, to the platform, and to either
+# events of a cable or winch, of the platform, and of either
 OF_CABLES: Final = ("break", "stall", "saturate", "slack")
 OF_PLATFORM: Final = ("drop", "pick up")
 OF_EITHER: Final = ("brake",)

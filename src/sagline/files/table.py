@@ -69,7 +69,7 @@ class CsvTable:
             raise FileError(path, reason, step, item="columns")
         values = np.array(numbers).reshape(len(lines), len(found))
         factors = [1.0 if factor is None else factor for factor in found.values()]
-        with np.errstate(over="ignore"):  # what is too large is told below
+        with np.errstate(over="ignore"):  # too large values are reported below
             columns = {name: values[:, k] * factor for k, (name, factor) in enumerate(zip(found, factors, strict=True))}
         plain = frozenset(name for name, factor in found.items() if factor is None)
         table = cls(path, columns, lines, header, plain)
@@ -148,7 +148,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
     if gaps:
         row = [cell if name not in gaps or cell.strip() else "nan" for name, cell in zip(names, row, strict=True)]
     if _PLAIN_ROW.fullmatch(",".join(row) + ","):
-        with contextlib.suppress(ValueError):  # which cell it is, the slow way tells
+        with contextlib.suppress(ValueError):  # the slow way finds the cell
             return [float(cell) for cell in row]
     numbers = [plain_number(cell) for cell in row]
     if None in numbers:

@@ -256,7 +256,7 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
     why = ["taken about the center of mass; the WireX format does not say about which point"]
     missing = [(i, j) for i, j in combinations_with_replacement(range(3), 2) if np.isnan(matrix[i, j])]
     products = [pair for pair in missing if pair[0] != pair[1]]
-    if len(products) not in (0, 3):  # who gives two of them has lost the third
+    if len(products) not in (0, 3):  # a file with two of them lacks the third
         key = "I" + "".join(_AXES[k] for k in products[0])
         raise InvalidValueError(f"inertiatensor: {key}", "missing", "a number in kg m^2", f"Add {key} to the file.")
     if missing:

@@ -47,7 +47,7 @@ CRITERIA: Final[dict[str, type[Criterion]]] = {
     for kind in (LeastMargin, MaximumSag, PositionError, LeastStiffness, LeastFrequency, Clearance, InFrame)
 }
 NODES: Final = ("x", "y", "z")  # of the grid
-FINE: Final = ("fine_x", "fine_y", "fine_z")  # of the grid that tells components apart
+FINE: Final = ("fine_x", "fine_y", "fine_z")  # of the grid that separates components
 
 QUANTITIES: Final = (
     *(Quantity(name, (name,), "m", f"{name} of the nodes of the grid") for name in NODES),

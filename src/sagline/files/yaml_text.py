@@ -45,7 +45,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
         return schema.model_validate(data)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
-    # a misspelt key explains the missing one beside it, so it is told first
+    # a misspelt key explains the missing one beside it, so it is reported first
     first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
     key, found, allowed, next_step = _explain(first, schema)
     refused = FileError(origin, f"{key} is {found}{allowed and f'; allowed: {allowed}'}", next_step, item=key)
@@ -86,8 +86,8 @@ def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry
 
 def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
     """A YAML text whose top level is a mapping, no key given twice."""
-    # Text stays text but for plain decimal numbers, true, false and null: no yes that becomes true, no 1:30 that
-    # becomes 90, no dates, no tags. Aliases may be used as long as what they stand for is not too much.
+    # Text stays text except for plain decimal numbers, true, false and null: no yes that becomes true, no 1:30 that
+    # becomes 90, no dates, no tags. Aliases may be used as long as their expansion is not too large.
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
@@ -144,7 +144,7 @@ def _reason(error: Exception, text: str) -> str:
 
 
 class _PlainLoader(yaml.SafeLoader):
-    """Text, plain numbers, null, lists and mappings; unique keys; no more levels and values than a person writes."""
+    """Text, plain numbers, null, lists and mappings; unique keys; a bounded number of levels and values."""
 
     yaml_constructors: ClassVar[dict[Any, Any]] = {}
 
@@ -212,7 +212,7 @@ def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[
     if id(node) in known:
         found = known[id(node)]
         if found is None:
-            raise yaml.YAMLError(f"line {node.start_mark.line + 1}: an alias that stands for itself")
+            raise yaml.YAMLError(f"line {node.start_mark.line + 1}: an alias of itself")
         return found
     known[id(node)] = None
     inside = node.value if isinstance(node, yaml.CollectionNode) else []

@@ -253,7 +253,7 @@ def clearance(
         Clearances.
 
     Raises:
-        InvalidValueError: If an argument is none of its kind, or a mesh is 100 times as large as the robot.
+        InvalidValueError: If an argument is of the wrong kind, or a mesh is 100 times as large as the robot.
         SaglineError: If a mesh is among them and python-fcl is missing.
 
     Examples:

@@ -22,7 +22,7 @@ _AT_ONCE: Final = 1 << 19  # triangles times points
 
 
 def _as_faces(value: ArrayLike) -> Indices:
-    """Faces as given: a converter that tells type checkers what the constructor takes."""
+    """Faces as given: a converter that gives type checkers the type of the argument."""
     return value  # type: ignore[return-value]
 
 

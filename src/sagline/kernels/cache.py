@@ -59,7 +59,7 @@ class KernelCache:
         try:
             content = file.read_bytes()
         except OSError:
-            return None  # nothing there, or no way to it: saving says which
+            return None  # no such file, or no access: saving reports which
         if hashlib.sha256(content[DIGEST:]).digest() != content[:DIGEST]:
             say_once(f"sagline: {file} is damaged; its kernel is compiled again")
             return None

@@ -22,7 +22,7 @@ class Memory(NamedTuple):
 
 
 def memory_for(cables: int) -> tuple[Array, Indices]:
-    """Memory for whatever a kernel does with one pose of so many cables; a kernel that wants more raises ValueError."""
+    """Work arrays of a kernel for one pose of `m` cables; a kernel that needs more raises ValueError."""
     return np.empty(12 * cables * cables + 320 * cables + 400), np.empty(10 * cables + 40, dtype=np.int64)
 
 

@@ -12,7 +12,7 @@ PLATFORM_X, PLATFORM_Y, PLATFORM_Z = 3, 4, 5  # platform anchor, platform frame 
 DENSITY = 6  # [kg/m]
 STIFFNESS = 7  # [N]
 TENSION_MIN, TENSION_MAX = 8, 9  # [N]
-# the pulley at the frame anchor, and the dead cable behind it; all zero where there is neither
+# the pulley at the frame anchor, and the dead length behind it; all zero where there is neither
 PULLEY_RADIUS = 10  # R [m]
 ENTRY = 11  # s: +1 where the cable comes to the pulley from below, -1 from above
 DEAD_CABLE, DEAD_RISE = 12, 13  # length from drum to pulley, height of the pulley's entry above the drum [m]
@@ -32,4 +32,4 @@ SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
 WRAP, WRAPPED, DEAD = 6, 7, 8  # wrap angle [rad], unstrained length on the pulley and behind it [m]
 SINE = 9  # sin phi of the chord that touches the pulley
 RESULT_ROWS = 10
-BARE_ROWS = WRAP  # where nothing is
+BARE_ROWS = WRAP  # without winches

@@ -31,7 +31,7 @@ class Confirmation(Result):
 
     Attributes:
         plan: The plan, of any cable model.
-        pose: Where the platform rests on exact cables of the planned lengths; NaN where the plan has no solution.
+        pose: Equilibrium on exact cables of the planned lengths; NaN where the plan has no solution.
         status: Codes of `ForwardStatus`, shape () or (N,).
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] there, shape (2,) or (N, 2).
     """

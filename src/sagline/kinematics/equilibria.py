@@ -24,7 +24,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 
-START_BYTES = 250.0  # what each cable of a start takes while it is solved
+START_BYTES = 250.0  # memory of each cable of a start during the solution
 _SAME = 1e-6  # relative to the mean length, and in radians: closer poses are one
 _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
@@ -36,8 +36,8 @@ class Equilibria(Result):
 
     Attributes:
         solutions: The equilibria, a batch of K.
-        reached: How many starts ended in each, shape (K,): a share of the orientations, not a probability.
-        starts: How many starts were tried; those that reached none of the K ended unstable or not at all.
+        reached: Number of starts that ended in each, shape (K,): a share of the orientations, not a probability.
+        starts: Number of starts; those that reached none of the K were unstable or did not converge.
     """
 
     solutions: ForwardSolution
@@ -69,7 +69,7 @@ def equilibria(
         model: Cable model. The shallow ones have no energy: theirs are sorted by the number of starts. For straight
             cables: the local least-squares fits, sorted by misfit.
         wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for none.
-        starts: How many orientations to start from, >= 1.
+        starts: Number of initial orientations, >= 1.
         seed: Of the random orientations.
 
     Returns:

@@ -43,7 +43,7 @@ from sagline.statics.tables import pose_rows
 _TILTS = (25.0, 60.0)  # degrees, tried where the level platform leads nowhere
 _DEPTH = 0.1  # of the mean length
 _LIMIT_SLACK = 0.01  # a measured tension may miss its limit by this share
-_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # how little each status is worth; fitted is as good as solved
+_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; fitted ranks like solved
 
 
 def search(
@@ -195,7 +195,7 @@ def forward(
             cables, motion pattern with its plane, kind of tension limits and gravity.
         unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN, as a plan has it at an
             infeasible pose, is answered by the status NO_LENGTHS.
-        start: Where to begin. A batch of N poses: one a sample. A single pose with N samples: a trajectory, the
+        start: Initial pose. A batch of N poses: one a sample. A single pose with N samples: a trajectory, the
             first sample begins there and each other where the last one ended. None: every sample is searched for
             by itself, from the level platform; of several equilibria the one is taken that keeps the robot's tension
             limits and is found first (see `equilibria` for the others).
@@ -204,7 +204,7 @@ def forward(
             gravity: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         tension_measured: Readings of load cells: then lengths count as measured too, both are corrected within their
             deviations to fit each other, and the answer carries the covariance of the pose.
-        winding: Which way the drums turned last, for the friction of pulleys and guides: +1 winding in, -1 paying out,
+        winding: Last direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out,
             0 standing, shape (m,) or (N, m). None: nothing rubs. Friction and guides change the lengths by
             iteration; with load cells, that change stays as it is at the measured lengths. Much friction on
             soft cables lets the platform rest at more than one pose near by.

@@ -34,7 +34,7 @@ class ForwardStep(NamedTuple):
         position: Of the platform origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
         chord_tension: tau of the cables [N], shape (m,).
-        status: What kind of equilibrium it is, or why there is none.
+        status: Kind of equilibrium, or reason of the failure.
         stiffness_min: Smallest stiffness [N/m], as in `ForwardSolution`.
         force_residual: Norm of the unbalanced force [N].
         moment_residual: Norm of the unbalanced moment [N m].
@@ -62,7 +62,7 @@ class ForwardSolver:
         Args:
             robot: The robot.
             model: Cable model with forces; the default is the exact one.
-            start: Where the first step begins; None: it searches, which takes some hundred microseconds.
+            start: Initial pose of the first step; None: a search, which takes some hundred microseconds.
 
         Raises:
             InvalidValueError: If the model is Straight, which has no forces, start is a batch, the robot's winches have
@@ -108,7 +108,7 @@ class ForwardSolver:
         """Forget the last pose: the next step begins at a start, or searches.
 
         Args:
-            start: Where the next step begins; None: it searches.
+            start: Initial pose of the next step; None: a search.
 
         Raises:
             InvalidValueError: If start is a batch, or no pose.

@@ -42,11 +42,11 @@ def home(
 
     Args:
         robot: A robot with winches.
-        pose: Where the platform is held, a single pose.
-        frame_end_tension: What the load cells at the frame ends read there [N], a number or shape (m,). Tensions are
+        pose: Pose of the platform, a single one.
+        frame_end_tension: Readings of the load cells at the frame ends there [N], a number or shape (m,). Tensions are
             these less the winches' load_cell_bias, over load_cell_gain. They need not balance the platform exactly:
             each cable is taken by itself.
-        counts: What the encoders read there, a number or shape (m,).
+        counts: Encoder counts there, a number or shape (m,).
         model: Cable model; the default is exact.
         temperature: By how much the cables are warmer there than where the lengths are to hold [K].
 

@@ -61,7 +61,7 @@ def inverse(
             inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
         previous: A plan that this one continues: `Closest` starts from its last feasible tensions. Or such tensions,
             in the variable of the tension distribution [N], shape (m,).
-        winding: Which way the drums turn, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0
+        winding: Direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0
             standing, shape (m,) or (N, m); or "path", the way the lengths go along the path without friction. It
             changes lengths behind the pulleys alone. None: nothing rubs.
         progress: Called every few hundredths of a second: how many poses are solved, or known not to be feasible and

@@ -16,7 +16,7 @@ from sagline.robot.batch import Robots, first_of, has_routing
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options, TensionMethod, takes_default_kernel
 
-UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # what the iterations leave open
+UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # poses left open by the iterations
 BLOCK = 1 << 12  # poses solved at once: a tenth of a second at most, after which an interrupt is heard
 DECIDED = 1 << 10  # and poses decided at once, which take longer
 
@@ -93,7 +93,7 @@ def solve_inverse_rows(
 class Verdicts(NamedTuple):
     """Proofs of infeasible poses; arrays lead with the N poses."""
 
-    # what is proved, and what suffices, of the smallest change of the force [N], (N, 2): 0 where a pose is solved, NaN
+    # proved and sufficient value of the smallest change of the force [N], (N, 2): 0 where a pose is solved, NaN
     # where the load is not the reason that it is not
     brackets: Array
     reliefs: Array  # the force that suffices [N], along the free motions, (N, n), NaN where none is needed or known

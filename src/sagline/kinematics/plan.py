@@ -68,7 +68,7 @@ class Plan(Result, Saved):
         needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
             the cables' sag forces T_z - tau sin phi; without a solution, at the tensions that leave least of it.
             None as above.
-        bracket: What is proved, and what suffices, of the shortfall [N], shape (2,) or (N, 2); infinite where nothing
+        bracket: Proved and sufficient value of the shortfall [N], shape (2,) or (N, 2); infinite where nothing
             was found that does. None as above.
         relief: The force of that size [N], in world axes: added to the wrench it makes the pose feasible, shape (3,) or
             (N, 3); NaN where none is needed or known. None as above.

@@ -27,7 +27,7 @@ class PoseStatus(Status):
     NOT_CONVERGED = codes.POSE_NOT_CONVERGED, "the tensions did not converge; please report this robot and pose"
     NO_CHORD = (
         codes.POSE_NO_CHORD,
-        "both ends of a cable coincide, or its platform end is inside its pulley or hangs from it nearer to the swivel "
+        "both ends of a cable coincide, or its platform end is inside its pulley or below it, nearer to the swivel "
         "axis than the pulley's diameter; move the platform away from the anchor",
     )
     NOT_COVERED = (

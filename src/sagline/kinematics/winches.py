@@ -29,12 +29,12 @@ def encoder_counts(
 
     Args:
         plan: A plan of a robot whose winches have a drum, counts and the zeros of both.
-        winding: What lies on the drum. "constant": cable wound at the winches' winding_tension. "remembered": cable
-            wound along the plan too, each meter at the tension it had at the drum when it was wound in; below it, what
-            was never off the drum since the first sample, at winding_tension.
+        winding: State of the cable on the drum. "constant": cable wound at the winches' winding_tension. "remembered":
+            cable wound along the plan too, each meter at the tension it had at the drum when it was wound in; below it,
+            what was never off the drum since the first sample, at winding_tension.
         temperature: By how much the cables are warmer than where the lengths of the winches hold [K], a number or one
             a cable.
-        creep: How cables become longer along the plan's path, from nothing at its first sample, under the plan's
+        creep: Creep of the cables along the plan's path, zero at its first sample, under the plan's
             `chord_tension`; None for not at all.
 
     Returns:
@@ -200,8 +200,8 @@ class WinchRates(Result):
             the gear, plus the drive's friction against the motion; at rest without friction. None where the inertia
             of the winches is not known.
         count_rate: Of the encoder [1/s]; None where counts_per_turn is not known.
-        too_fast: Where motor_speed is beyond the winches' speed_limit; None where that is not known.
-        too_strong: Where motor_torque is beyond their torque_limit; None where one of the two is not known.
+        too_fast: True where motor_speed is beyond the winches' speed_limit; None if that is unknown.
+        too_strong: True where motor_torque is beyond their torque_limit; None if one of the two is unknown.
     """
 
     drum_speed: Array

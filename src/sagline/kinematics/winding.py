@@ -78,7 +78,7 @@ def iterate_routing(
     catenary between its guides.
     """
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
-    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # what was taken, and what it missed
+    past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # input and residual
     still = np.flatnonzero(~np.isin(found.pose_status, _OPEN))
     for _ in range(ITERATIONS):
         if not still.size:

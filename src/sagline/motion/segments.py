@@ -85,7 +85,7 @@ class Segments:
     """S straight moves with a turn about a fixed axis.
 
     Attributes:
-        profile: How each of them gets from rest to rest.
+        profile: Profile from rest to rest.
         start: Position at the beginning [m], shape (S, 3).
         move: Displacement to the end [m], shape (S, 3).
         turn: Rotation vector to the end in world axes [rad], shape (S, 3).

@@ -28,7 +28,7 @@ WAYS: Final = ("goal", "maximize", "minimize")
 
 
 def load_design(file: str | os.PathLike[str]) -> dict[str, Any]:
-    r"""Read a design file: the arguments of `design` but for the robot.
+    r"""Read a design file: the arguments of `design` except for the robot.
 
     A quantity is a number in SI or a text with its unit:
 

@@ -94,7 +94,7 @@ _AXES: Final = "xyz"
 class FreeAnchors(Free):
     """Anchors that may be shifted from where the robot has them: in a box, along lines, symmetrically.
 
-    Dead cable behind guides follows in the robots that are found, and stays as it is while they are searched.
+    The dead length behind guides follows in the resulting robots, and is constant during the search.
 
     Attributes:
         end: "frame" or "platform".

@@ -83,7 +83,7 @@ KINDS: Final = MappingProxyType(
         "cable_cost": _Kind("", False, "cost", lambda cost: cost, "cost of the cables"),
     }
 )
-AT_POSES: Final = ("tension", "sag", "stiffness")  # which need the load shared
+AT_POSES: Final = ("tension", "sag", "stiffness")  # which need a tension distribution
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ MOST: Final = 100_000  # poses
 
 
 def poses_of(robot: Robot, poses: Pose | None, box: PoseBox | None, grid: Sequence[int]) -> Pose:
-    """Given poses as a batch, or a grid of level poses over a box, by default the robot's test box."""
+    """Poses as a batch, or a grid of level poses over a box, by default the robot's test box."""
     if poses is not None:
         if box is not None:
             raise InvalidValueError("box", "given beside poses", "one of the two", "Leave one of them out.")
@@ -144,7 +144,7 @@ def checked_request(
 
 
 def _goals(given: Any) -> tuple[Goal, ...]:
-    """Goals, checked; a name stands for its goal."""
+    """Goals, checked; a name means its goal."""
     many = [given] if isinstance(given, Goal | str) else given
     if not isinstance(many, Sequence) or not many:
         step = 'Give [Goal("workspace_share")] for instance.'

@@ -75,7 +75,7 @@ class GroupThread(Thread):
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
-        """Queue a block to be written, in place of one not written yet, and read the PLC's."""
+        """Replace the block that waits for writing, and read the PLC's block."""
         self._outgoing.append(_Outgoing(block, data, self._clock()))
         self._kick.set()
 
@@ -96,9 +96,9 @@ class GroupThread(Thread):
     def silence(self, waited: float) -> Refusal:
         """Message about a PLC that has not answered for a time [s]."""
         if self._wire.reached():
-            return Refusal(f"the port is open, but there was no answer for {waited:g} s", "Check the port")
+            return Refusal(f"the port is open, but there was no response for {waited:g} s", "Check the port")
         return Refusal(
-            f"no answer for {waited:g} s", "Check address and cables, and that the PLC is on and in this network"
+            f"no response for {waited:g} s", "Check address and cables, and that the PLC is on and in this network"
         )
 
     def run(self) -> None:

@@ -50,7 +50,7 @@ SPARE: Final = 0.05  # of the picture, around it
 WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # in; of the width, that the drawing is tall
 PLACES: Final = np.linspace(0.12, 0.72, 31)  # along a cable from the frame, where its number may stand
 BESIDE, ROOM = 0.8, 0.8  # of the size of the text: from a cable to its number, and from a number to other lines
-CLEAR = 1.15  # the same where it stands beside its cable
+CLEAR = 1.15  # the same beside its cable
 FROM_ANCHOR = 1.6  # of the size of the text, from the end of a cable at the frame, which is to be seen
 ARROW: Final = 0.16  # of the picture's width: at most the length of the axes
 END_ON: Final = 0.12  # of its length: an axis seen so short has no name
@@ -81,10 +81,10 @@ def drawing(
 
     Args:
         robot: The robot.
-        pose: Where the platform is; None for the middle of the robot's test box. Where no tensions carry the platform
+        pose: Pose of the platform; None for the middle of the robot's test box. Where no tensions carry the platform
             the cables are straight, dashed and gray.
-        azimuth: Where the viewer stands, from the x axis toward the y axis [rad].
-        elevation: How far the viewer looks down [rad], 0 to pi / 2.
+        azimuth: Azimuth of the viewer, from the x axis toward the y axis [rad].
+        elevation: Elevation of the viewer [rad], 0 to pi / 2.
         ax: Axes to draw on, as large as they will be; None for a new figure.
 
     Returns:

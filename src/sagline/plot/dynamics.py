@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 ENERGY_STYLES = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
 ROUNDING = 1e-12  # of the energy that there is: an error below it is the arithmetic's
 THIN, WIDE = 0.6, 3.6  # pt: a mode in which only cables swing, one in which only the platform does
-FAINT = 0.4  # how dense the thin ones are
+FAINT = 0.4  # opacity of the thin ones
 SHARES = (1.0, 0.5, 0.0)  # in the legend
 PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # heights that are drawn -> panels beside each other; none stays empty
 HIGHEST, LOWEST = 2e2, 1e-3  # over the answer at rest: undamped peaks have no top, and zeros no bottom
@@ -120,7 +120,7 @@ def frequencies(
 
     Args:
         vibrations: Of N states in a row, from `vibration`.
-        time: Where the states are on the horizontal axis, ascending, shape (N,), times of a path [s] for instance;
+        time: Abscissae of the states, ascending, shape (N,), times of a path [s] for instance;
             None for their numbers.
         label: Of that axis, with its unit.
         ax: Axes to draw on; None for a new figure.
@@ -231,7 +231,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
         quantity: "frequency", "massless_frequency", "platform_share", "peak" or "peak_frequency".
 
     Returns:
-        The figure; gray where there is no answer.
+        The figure; gray without a solution.
 
     Raises:
         InvalidValueError: If there is no such quantity, or the poses are no grid.
@@ -282,7 +282,7 @@ def response(
 ) -> Axes:
     """Amplitude of the platform for a force of 1 N, over frequency: with cable mass, and massless.
 
-    Marks at the foot are the modes with cable mass, the darker the more the platform takes part.
+    Marks at the bottom are the modes with cable mass; darker marks have a larger platform share.
 
     Args:
         vibration: Of a stable state, from `vibration`; its damping is that of both curves. Or what `frequency_response`

@@ -54,7 +54,7 @@ def execution(done: Execution) -> Figure:
     """An execution at a glance: states, tensions, their error, and the estimated place of the platform.
 
     From top to bottom: the states, with a line at each fault; the measured tensions, and dashed the planned ones; the
-    part of their error that lengths can mend without moving the platform, filtered as the tension loop does; and the
+    part of their error that lengths can correct without moving the platform, filtered as the tension loop does; and the
     estimated position less the planned one.
 
     Args:
@@ -145,7 +145,7 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
 
 
 def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
-    """The part of the tension errors that lengths can mend without moving the platform, as the tension loop sees it.
+    """The part of the tension errors that lengths can correct without moving the platform, as the tension loop sees it.
 
     Args:
         done: The execution.
@@ -163,7 +163,7 @@ def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
     clock = _clock(done)
     for i, course in enumerate(null_space_error(done).T):
         draw_series(ax, clock, course, **cable_look(i), linewidth=1.0, label=f"cable {i}")
-    return _finished(ax, clock, "mendable tension\nerror [N]")
+    return _finished(ax, clock, "correctable tension\nerror [N]")
 
 
 def place_errors(done: Execution, ax: Axes | None = None) -> Axes:

@@ -24,7 +24,7 @@ EACH = 3.2  # in, the height of a panel
 def front(front: Front) -> Figure:
     """The best robots found by `design`, beside all candidates.
 
-    Of one goal the course of the search: each candidate, and the best until then. Of several the first goal against
+    With one goal the progress of the search: each candidate, and the best so far. With several the first goal against
     each of the others: better robots are joined, the start is marked.
 
     Args:

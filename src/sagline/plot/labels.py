@@ -158,7 +158,7 @@ def _spacing(ax: Axes) -> float:
 
 
 def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
-    """Write the names beside the ends of the lines, apart from each other; what all begin with stands above them."""
+    """Write the names beside the ends of the lines, apart from each other; their common beginning is above them."""
     look, names = current(), [end.name for end in ends]
     if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]

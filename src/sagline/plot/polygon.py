@@ -1,4 +1,4 @@
-"""The polygon of feasible tensions, with the points that ways of sharing the load choose in it."""
+"""The polygon of feasible tensions, with the results of the tension methods."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
     fresh = ax is None
     ax = axes_or_new(ax, height=4.5)
     if fresh:
-        cast(Figure, ax.get_figure(root=True)).set_layout_engine("compressed")  # it knows of axes of equal scales
+        cast(Figure, ax.get_figure(root=True)).set_layout_engine("compressed")  # for axes of equal scales
     corners = np.asarray(shape.vertices)
     ax.fill(*corners.T, facecolor=GAP_COLOR, alpha=0.25, edgecolor="none")
     for k, side in enumerate(shape.sides):

@@ -130,12 +130,12 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
     """The robot in space at rest: frame, platform, and its cables as exact catenaries that carry it.
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
-    numbers at the frame. Pulleys are turned into the planes of their cables. Dead cable is drawn as a vertical line of
+    numbers at the frame. Pulleys are turned into the planes of their cables. Dead length is drawn as a vertical line of
     its rise, dotted if its length is another one. The ground with the platform's shadow is at z = 0 or lower.
 
     Args:
         robot: The robot.
-        pose: Where the platform is; None for the middle of the robot's test box. Where no tensions carry the platform
+        pose: Pose of the platform; None for the middle of the robot's test box. Where no tensions carry the platform
             the cables are straight, dashed and without color.
         ax: Axes to draw on, made with `projection="3d"`; None for a new figure.
 
@@ -164,7 +164,7 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
 
 def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) -> tuple[Plan, Array]:
     """Frame, platform, cables and ground, without labels of the axes."""
-    ax.computed_zorder = False  # by the middles of things, which puts the ground over what stands on it
+    ax.computed_zorder = False  # by the middles of objects, which would draw the floor over objects on it
     plan = inverse(robot, where)
     courses = catenary_points(robot, where, plan) if plan.feasible else straight_points(robot, where)
     colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray where there is no tension

@@ -231,14 +231,14 @@ def svg_text(figure: Figure, dots: int, **settings: str) -> str:
 
 
 def unique_names(svg: str, prefix: str) -> str:
-    """A drawing whose inner names begin with a prefix, so that many stand on one page; unused names are left out."""
+    """A drawing whose inner names begin with a prefix, so that many fit on one page; unused names are left out."""
     used = {found[1] for found in _reference.findall(svg)}
     svg = _name.sub(lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", svg)
     return _reference.sub(lambda found: f"{found[1]}{prefix}{found[2]}", svg)
 
 
 def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
-    """Write a figure to a file, whole or not at all; the suffix (.png, .svg, .pdf) says how.
+    """Write a figure to a file atomically; the suffix (.png, .svg, .pdf) says how.
 
     Args:
         drawing: A figure, or Axes: then the whole figure they are in.

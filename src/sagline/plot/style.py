@@ -29,7 +29,7 @@ class Style:
         label: Size of the text at axes, in titles and at bars [pt].
         tick: Size of numbers and of names of lines [pt].
         line: Widths of lines and sizes of markers, relative to those of the documentation.
-        direct: True if the names of lines stand at their ends.
+        direct: True if the names of lines are at their ends.
     """
 
     name: str
@@ -96,7 +96,7 @@ def style(name: str, columns: int = 1) -> Using:
     """Style of figures for a journal or a slide: figures that are made inside its `with` statement keep it.
 
     Figures have the width of the column, fonts that come with Matplotlib and so are the same on any machine, sizes that
-    are read on paper at that width, and names stand at the ends of lines if there is space. Figures of
+    are read on paper at that width, and names are at the ends of lines if there is space. Figures of
     your own that are made inside, by Matplotlib alone, have its fonts and sizes as well. In PDF and SVG text stays text
     and its fonts are in the file.
 

@@ -42,7 +42,7 @@ Color = tuple[float, float, float]
 HALO: Final = [patheffects.withStroke(linewidth=2.2, foreground="white")]
 NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull before and behind the robot
 FINEST: Final = 90  # cells along the longest side of the hull as it is drawn: more is not seen, and takes long
-HEIGHT, ZOOM = 3.4, 1.0  # in; and how large the robot stands in its axes
+HEIGHT, ZOOM = 3.4, 1.0  # in; and size of the robot in its axes
 WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # of the sheet
 ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # the same where nothing fits beside anything
 MOST_LIMITS: Final = 10  # that have a bar of their own
@@ -59,7 +59,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     Args:
         space: The workspace; its robot, loads, orientations and criteria are those of the slice.
         normal: The axis at right angles: "x", "y" or "z".
-        at: Where on it [m]; None for the middle of the workspace.
+        at: Coordinate on it [m]; None for the middle of the workspace.
         ax: Axes to draw on; None for a new figure.
 
     Returns:

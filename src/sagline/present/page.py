@@ -16,7 +16,7 @@ from sagline.core.numbers import n
 from sagline.files.writing import atomic_files, create_folder, json_text
 
 SENTENCE = 40  # characters from which on a cell of a table is text
-NARROW = 3  # columns of a table that stands beside the text
+NARROW = 3  # columns of a table beside the text
 _subscript = re.compile(r"(?<=[A-Za-zα-ωΑ-Ω])_([A-Za-zα-ω0-9]{1,3}(?:,min)?)(?![A-Za-zα-ω0-9_])")
 
 
@@ -36,7 +36,7 @@ class Panel(NamedTuple):
 
     Attributes:
         svg: The drawing as text.
-        caption: What is to be seen.
+        caption: Text of the figure.
     """
 
     svg: str
@@ -47,7 +47,7 @@ class Table(NamedTuple):
     """A table of texts.
 
     Attributes:
-        caption: What it holds.
+        caption: Content of the table.
         head: Column heads with units.
         rows: The cells; the first of each row names it.
     """
@@ -72,9 +72,9 @@ class Finding:
         figures: Numbers of the article's figures that it redoes.
         tables: Numbers of the article's tables that it redoes.
         title: A few words.
-        statement: What the article says, with figure or equation; empty where it says nothing.
-        measured: What we found.
-        verdict: How the statement fares.
+        statement: Statement of the article, with figure or equation; empty if there is none.
+        measured: Our result.
+        verdict: Verdict on the statement.
         panels: Drawings.
         data: Tables.
         numbers: The numbers behind it, plain: they go into the JSON file.
@@ -99,8 +99,8 @@ class Chapter:
     Attributes:
         key: Name of the chapter.
         title: Its heading.
-        lead: What it is about.
-        findings: What was found.
+        lead: Topic of the chapter.
+        findings: Findings of the chapter.
     """
 
     key: str
@@ -216,7 +216,7 @@ def _chapter(number: int, chapter: Chapter) -> str:
 
 
 def _finding(finding: Finding) -> str:
-    """Heading, what is said and found, drawings and tables; one drawing or a narrow table stands beside the text."""
+    """Heading, what is said and found, drawings and tables; one drawing or a narrow table is beside the text."""
     said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
     paragraphs = "".join(f"<p>{_text(part)}</p>" for part in finding.measured.split("\n\n"))
     pair = f'<div class="pair">{said}<div class="found"><h4>Computed</h4>{paragraphs}</div></div>'

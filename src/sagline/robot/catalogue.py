@@ -61,7 +61,7 @@ class Design:
     """Data of a first robot.
 
     Attributes:
-        name: What the robot is called.
+        name: Name of the robot.
         frame: Edges of the frame [m], shape (3,); on the floor, around the origin.
         platform: Edges of the platform [m], shape (3,).
         mass: Mass of the platform with its load [kg].
@@ -94,7 +94,7 @@ class Design:
         """Check what the robot itself would not, or would say in other words.
 
         Args:
-            name: What the robot is called.
+            name: Name of the robot.
             frame: Edges of the frame [m], shape (3,).
             platform: Edges of the platform [m], shape (3,), smaller.
             mass: Mass of the platform with its load [kg].
@@ -166,7 +166,7 @@ class Design:
             assumed={
                 "cables": f"{rope.source}; {rope.assumed}",
                 "inertia": "a solid box of the platform's size",
-                "tension_min": f"{100 * SLACK_LIMIT:g} % of the platform's weight, so that no cable hangs slack",
+                "tension_min": f"{100 * SLACK_LIMIT:g} % of the platform's weight, so that no cable is slack",
                 "tension_max": f"breaking force {SAFETY * strongest:,.0f} N over a safety of {SAFETY:g}",
             },
         )

@@ -14,7 +14,7 @@ from sagline.robot.pose import unit
 from sagline.robot.winch import Winch
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
-_ROUNDED = 0.01  # what moments printed with three digits may lack: a thin plate's largest is the sum of the others
+_ROUNDED = 0.01  # tolerance of moments printed with three digits: the largest of a thin plate is the sum of the others
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:

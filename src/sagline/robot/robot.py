@@ -29,7 +29,7 @@ class Robot(Shown):
     """A cable-driven parallel robot. Cable i runs from frame_anchors[i] to platform_anchors[i].
 
     Attributes:
-        name: What the robot is called.
+        name: Name of the robot.
         frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
         cables: Material of the cables, one for all or one a cable; fields of shape (m,).
@@ -52,9 +52,9 @@ class Robot(Shown):
         platform_size: Edges of the platform, for drawing [m], shape (3,), or None.
         frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
         test_box: Poses of which nearly all are wrench-feasible, or None.
-        source: Where the numbers were read.
+        source: Source of the numbers.
         assumed: Field name -> why; the fields whose values the source does not give.
-        notes: What else a user should know.
+        notes: Further remarks for users.
         tolerances: Name of a number -> standard deviation of it [SI], > 0, infinite where nothing is known: how far
             the value given here may be off, as a drawing or a data sheet says. One for all of the field, one along
             each axis where it has three, or the whole field, whose shape it gets. Names: frame_anchors,
@@ -164,7 +164,7 @@ class Robot(Shown):
             A new robot; this one stays as it is.
 
         Raises:
-            InvalidValueError: If there is no such field, or the new values are none the constructor accepts.
+            InvalidValueError: If there is no such field, or the constructor does not accept the new values.
 
         Examples:
             >>> import sagline as sl

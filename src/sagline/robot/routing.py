@@ -29,7 +29,7 @@ PASSES: Final = 40  # of bends that follow from tensions, and tensions from bend
 STEPS: Final = 60  # of Newton's method for one span
 _TOLERANCE: Final = 1e-15  # change of a length, of that length
 _TENSION_TOLERANCE: Final = 1e-14  # change of a tension, of that tension
-_BALANCED: Final = 1e-12  # what tensions may miss, relatively
+_BALANCED: Final = 1e-12  # relative tolerance of tensions
 _STEP: Final = 1e-6  # of the tension, for its slope
 _TINY: Final = 1e-300
 
@@ -39,7 +39,7 @@ class _Routing(NamedTuple):
 
     wrapped: Array  # unstrained length on the pulleys [m]
     dead: Array  # unstrained length between pulleys and drums [m]; NaN where the cable is too slack for a catenary
-    drum_tension: Array  # where the cables leave the drums [N]
+    drum_tension: Array  # tension at the drums [N]
 
 
 class _ExitState(NamedTuple):

@@ -110,7 +110,7 @@ class Provenance:
         date: When it was done, ISO 8601.
         standard_error: Name of what was found -> standard error of the robot's number, in the shape of the field and
             its SI unit; infinite with neither observations nor a prior. The names are those of tolerances.
-        note: What else a user should know.
+        note: Further remarks for users.
 
     Raises:
         InvalidValueError: If one is of the wrong kind, or the date is none.

@@ -51,11 +51,11 @@ class Winch:
         drum_radius: Radius of the drum at the bottom of the cable [m]; None where the drum is not known.
         drum_width: Width that the cable may fill, along the drum's axis [m], >= groove_pitch; a layer has drum_width
             over groove_pitch turns, which need not be whole. None: wide enough for one layer.
-        groove_pitch: How far along its axis a turn of the drum moves the cable [m].
-        layers: How many layers the drum takes, a whole number >= 1.
+        groove_pitch: Distance of two turns along the drum's axis [m].
+        layers: Largest number of layers on the drum, a whole number >= 1.
         drum_distance: From the drum to the first pulley, across the drum's axis [m]; None: the cable leaves the drum at
             a fixed place.
-        drum_offset: Where the cable leaves the empty drum, at its first groove, along its axis from the middle of the
+        drum_offset: Exit of the cable on the empty drum, at its first groove, along its axis from the middle of the
             first pulley [m]; the grooves of the first layer go on to the positive side. -drum_width/2 for a drum with
             its middle opposite the pulley.
         gear: Turns of the encoder for a turn of the drum, not zero; negative where counts fall as cable is let out.
@@ -75,8 +75,8 @@ class Winch:
         integral_gain: k_i of its speed loop, at the cable [N/m].
         load_cell_range: Largest value that the load cell reads [N].
         load_cell_deviation: Standard deviation of a reading [N], >= 0.
-        load_cell_bias: What it reads without load [N].
-        load_cell_gain: What it reads of a newton.
+        load_cell_bias: Reading without load [N].
+        load_cell_gain: Reading per newton.
 
     All are given in SI, one number for all cables or one a cable. A swivel axis may have any length but zero; guides
     have the shape (k, 3) for all cables or (m, k, 3), k >= 1, and leave dead_cable and dead_rise at 0.
@@ -199,7 +199,7 @@ class Winch:
             A new winch; this one stays as it is.
 
         Raises:
-            InvalidValueError: If there is no such field, or the new values are none the constructor accepts.
+            InvalidValueError: If there is no such field, or the constructor does not accept the new values.
 
         Examples:
             >>> import sagline as sl
@@ -217,7 +217,7 @@ class Winch:
         """These winches with the dead length that follows from their guides.
 
         Args:
-            frame_anchors: Where the guides lead to, world axes [m], shape (m, 3).
+            frame_anchors: End points of the guides, world axes [m], shape (m, 3).
 
         Returns:
             Winch with fields of shape (m,); this one where there are no guides.

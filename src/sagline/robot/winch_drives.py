@@ -21,7 +21,7 @@ class WinchDrive:
     """A motor, with its gear where it has one, as its data sheet has it.
 
     Attributes:
-        name: What `winch_drive` takes.
+        name: Name for `winch_drive`.
         gear: Turns of the motor for a turn of the output.
         inertia: Of motor and gear at the motor's shaft [kg m^2].
         rated_torque: That it can give all the time, at the motor's shaft [N m].
@@ -29,7 +29,7 @@ class WinchDrive:
         rated_speed: At which it gives its rated torque, of the motor's shaft [rad/s].
         speed_limit: Largest, of the motor's shaft [rad/s].
         source: The sheet.
-        assumed: What is not on the sheet, or is left out.
+        assumed: Assumptions, and data that are left out.
     """
 
     name: str

@@ -52,7 +52,7 @@ def local_workers(workers: int, tell: Callable[[str], None]) -> Iterator[Any]:
         import dask.config
         import distributed
 
-        api: Any = distributed  # has types for a part of itself
+        api: Any = distributed  # it is only partly typed
         settings: Any = dask.config
         free = _is_free(DASHBOARD)
         given: dict[str, Any] = {

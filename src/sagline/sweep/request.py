@@ -141,7 +141,7 @@ class Request(Result):
             moment_arm: Of the margin's norm [m], >= 0, as in `sl.margin`.
 
         Raises:
-            InvalidValueError: If an argument is none of its kind, there is nothing of one, a robot cannot share its
+            InvalidValueError: If an argument is of the wrong kind, there is nothing of one, a robot cannot share its
                 load so, or a pose is outside its motions.
         """
         machines = (robots,) if isinstance(robots, Robot) else _sequence(robots, "robots", "a Robot, or a list of them")

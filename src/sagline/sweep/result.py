@@ -171,10 +171,10 @@ class Sweep(Result):
 
         Returns:
             Array of shape (R, P, W), for tensions and lengths (R, P, W, m), or what the index leaves of it: NaN where
-            there is no answer or not yet one; a status not yet known is -1.
+            there is no solution, or not yet; a status not yet known is -1.
 
         Raises:
-            InvalidValueError: If there is no such variable, the index is none of its own, or it needs more memory than
+            InvalidValueError: If there is no such variable, the index is unknown, or it needs more memory than
                 there is.
             FileError: If a chunk is damaged.
         """

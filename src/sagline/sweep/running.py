@@ -61,7 +61,7 @@ def run(
         The sweep, as `load` reads it.
 
     Raises:
-        InvalidValueError: If an argument is none of its kind, or Zarr is not installed.
+        InvalidValueError: If an argument is of the wrong kind, or Zarr is not installed.
         FileError: If the folder has something else or cannot be written; finished tasks are kept.
         SaglineError: If the workers or the scheduler fail; finished tasks are kept.
 

@@ -34,7 +34,7 @@ class TensionMethod:
     """A choice among the feasible tensions: a code that the kernels understand, and its options.
 
     Attributes:
-        code: Which choice the kernels make (`sagline.kernels.codes`).
+        code: Code of the method in the kernels (`sagline.kernels.codes`).
         needs_upper_limits: Whether every cable must have a finite upper limit.
         most_redundant: Largest number of redundant cables it can share among; None for any.
         continuous: Whether tensions follow the pose without jumps.

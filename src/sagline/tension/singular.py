@@ -20,7 +20,7 @@ class UnresistedMotion(NamedTuple):
     Attributes:
         twist: Velocity of the center of mass and angular velocity, world axes, shape (6,); its angular part has length
             1, or its linear part where it does not turn.
-        resistance: How fast the fastest cable changes its length in this motion, over the same of the motion it resists
+        resistance: Largest rate of a cable's length in this motion, relative to that of the motion it resists
             most; at a singular pose 0 up to rounding.
         text: The motion in words.
     """

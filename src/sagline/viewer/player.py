@@ -160,7 +160,7 @@ class Player:
     """A run, a simulation or a log, and its clock.
 
     Attributes:
-        played: What is played; None for nothing.
+        played: Played motion; None for none.
         clock: Its clock.
         following: Whether it is shown, and not a pose of the user.
         speed: Ratio of its time to real time.

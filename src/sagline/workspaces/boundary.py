@@ -42,7 +42,7 @@ class Boundary(Result):
         surface: The boundary, closed along the faces of the box; its vertices that are not on those are on the
             boundary to 1e-10 of a cell.
         volume: Of the set within the box [m^3]: that of the surface, and of what bulges between its vertices.
-        volume_error: By how much the volume can be wrong [m^3], but for parts of the set, and gaps in it, that are
+        volume_error: By how much the volume can be wrong [m^3], except for parts of the set, and gaps in it, that are
             thinner than two cells of the finest grid.
         grid: The function at the nodes of the grid, before cells were halved.
         components: The separate pieces of the set.

@@ -156,7 +156,7 @@ def triangulate(inside: Mask) -> Net:
     except ModuleNotFoundError:
         raise FileError.not_installed("scikit-image", "Workspaces need it", "workspace") from None
     padded = np.pad(np.where(inside, np.float32(1.0), np.float32(-1.0)), 1, constant_values=-1.0)
-    # the older table knows only signs, and no vertices but those on edges
+    # the older table has only signs, and vertices on edges alone
     middle, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         padded, 0.0, method="lorensen", gradient_direction="ascent"
     )

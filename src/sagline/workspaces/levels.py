@@ -125,7 +125,7 @@ class Levels:
             if one.needs_tensions and not given.held.any():
                 continue
             judged = one.judge(given)
-            # tensions that a way of sharing does not find where they surely are: outside. At the border of what can
+            # tensions that a tension method does not find although they exist: outside. At the border of what can
             # be held, and beyond, the margin decides.
             lost = np.isnan(judged.value) & (bracket.low >= 0.0)
             value = np.where(lost, -np.inf, judged.value / scale)

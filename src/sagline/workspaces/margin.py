@@ -47,7 +47,7 @@ class MarginStatus(Status):
     )
     NO_CHORD = (
         codes.MARGIN_NO_CHORD,
-        "both ends of a cable coincide, or its platform end is inside its pulley or hangs from it nearer to the swivel "
+        "both ends of a cable coincide, or its platform end is inside its pulley or below it, nearer to the swivel "
         "axis than the pulley's diameter, or the pose is not known; move the platform away from the anchor",
     )
     TOO_SLACK = (
@@ -57,7 +57,7 @@ class MarginStatus(Status):
 
 
 _CATENARY = Catenary()
-_POSE_BYTES = 200.0  # what a pose takes, its rows and answers
+_POSE_BYTES = 200.0  # memory of a pose, its rows and results
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -153,7 +153,7 @@ def margin(
         Margin.
 
     Raises:
-        InvalidValueError: If an argument is none of its kind, the robot has fewer cables than degrees of freedom, or
+        InvalidValueError: If an argument is of the wrong kind, the robot has fewer cables than degrees of freedom, or
             its motion pattern does not lead from the first pose to another.
 
     Examples:

@@ -22,7 +22,7 @@ _STEP: Final = 0.1  # of the box, with which it begins
 _EVALUATIONS: Final = 300  # at most, from each start
 _PRECISION: Final = 1e-4  # m
 _FAR: Final = 1e6  # a level as low as minus infinity, to a search that needs numbers
-_UNHELD: Final = 1e3  # what levels are lowered by where the platform cannot be held at all
+_UNHELD: Final = 1e3  # reduction of the levels at infeasible poses
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -34,7 +34,7 @@ class Nearest(Result):
         level: Of it: < 0, or not below where a region smaller than a cell of the grid was found.
         margin: Of the loads there [N].
         criterion: Index of the criterion that is missed most.
-        cables: Indices of the cables that stand against it.
+        cables: Indices of the cables that oppose it.
         reason: In a sentence.
     """
 
@@ -70,7 +70,7 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of positions: levels, and the share of the load that is borne where not all of it can be.
+    """Finite merit of positions: levels, and the feasible fraction of the load where not all of it is.
 
     Margins alone would lead to singular poses, at which all of them are small.
     """
@@ -80,12 +80,12 @@ def _merit(levels: Levels, positions: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         short = np.where(bare > 0.0, _share(bare, found.margin), bare / weight) - 1.0
     tensions = any(one.needs_tensions for one in levels.criteria)
-    short -= _UNHELD if tensions else 0.0  # where tensions can be looked at, what they make is nearer
+    short -= _UNHELD if tensions else 0.0  # with tensions the value is more accurate
     return np.maximum(np.where(found.margin >= 0.0, found.level, short), -_FAR)
 
 
 def _share(bare: Array, margin: Array) -> Array:
-    """Share of the load that is borne for certain, where the weight alone is: margins are concave in the load."""
+    """Certainly feasible fraction of the load, where the weight alone is feasible: margins are concave in the load."""
     return np.asarray(bare / (bare - margin))
 
 

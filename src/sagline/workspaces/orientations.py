@@ -33,7 +33,7 @@ _AXES: Final = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
 class Orientations:
     """Rotations of the platform, of which a position needs all, or any, to count.
 
-    A set of rotations that goes on between those listed is known at these alone: it is sampled.
+    A continuous set of rotations is sampled at those listed.
 
     Attributes:
         quaternion: Rotations from platform to world as unit quaternions (x, y, z, w), shape (K, 4).

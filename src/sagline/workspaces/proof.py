@@ -283,11 +283,11 @@ def prove(
 ) -> Proof:
     """Prove that a robot can work at every pose of a box, or at none; or divide the box into cells of both kinds.
 
-    Poses are level; with a tilt of the box a position is inside where every orientation tilted by no more is, about any
-    axis, and outside where one of them is; a planar platform turns about the normal of its plane alone. The box is
-    halved along its edges, again and again, and each cell that can be decided is; what remains when the budget ends is
-    open, never a guess. With `Catenary()` the proofs hold for the exact cables, at tensions of the same range as in
-    `margin`.
+    Poses are level; with a tilt of the box a position is inside where every orientation tilted by at most this angle
+    is, about any axis, and outside where one of them is; a planar platform turns about the normal of its plane alone.
+    The box is halved along its edges, again and again, and each cell that can be decided is; what remains when the
+    budget ends is open, never a guess. With `Catenary()` the proofs hold for the exact cables, at tensions of the same
+    range as in `margin`.
 
     Args:
         robot: The robot, without pulleys.
@@ -302,7 +302,7 @@ def prove(
         Proof.
 
     Raises:
-        InvalidValueError: If an argument is none of its kind, the robot has pulleys, or fewer cables
+        InvalidValueError: If an argument is of the wrong kind, the robot has pulleys, or fewer cables
             than degrees of freedom, or the box tilts a platform that does not turn.
 
     Examples:

@@ -68,15 +68,15 @@ class Workspace(Result, Saved):
         moment_arm: As of `margin`; None for the mean lever arm.
         unit: Of the volume, "m³" or "m²".
         volume: In that unit.
-        volume_error: By how much the volume can be wrong, but for parts and gaps that are thinner than two cells of the
-            finest grid; 0 where it is empty.
+        volume_error: By how much the volume can be wrong, except for parts and gaps that are thinner than two cells of
+            the finest grid; 0 where it is empty.
         components: Components of the workspace.
         surface: The boundary, closed, the faces of the box where it reaches them included.
         limiting: At each vertex of the surface the criterion that decides, as an index; -1 where the box does,
             shape (V,).
         limiting_cable: And the cable, -1 where none does, shape (V,).
         margin: And the margin of the loads there [N], shape (V,).
-        open_faces: Faces of the box through which the workspace goes on, "x low" for instance: the volume is what
+        open_faces: Faces of the box through which the workspace continues, "x low" for instance: the volume is what
             there is of it in this box.
         x: Coordinates of the nodes of the grid [m], shape (X,).
         y: The same along y, shape (Y,).
@@ -132,7 +132,7 @@ class Workspace(Result, Saved):
     def field(self) -> Any:
         """Level, margin, deciding criterion and cable at the points of the grid, with their coordinates.
 
-        An xarray Dataset with dimensions x, y and z; worked out at each call.
+        An xarray Dataset with dimensions x, y and z; computed at each call.
         """
         return formats().module_of(self).field_of(self)
 

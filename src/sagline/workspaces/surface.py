@@ -55,7 +55,7 @@ class Surface(Result):
         return f"{counts}, {'closed' if self.closed else 'open'}, {spans} m"
 
     def export(self, file: Path | str) -> None:
-        """Write it to a file, whole or not at all, in meters and z up (GLB: y up, as that format wants it).
+        """Write it to a file atomically, in meters and z up (GLB: y up, as that format requires).
 
         Args:
             file: The file: "hull.stl", ".glb", ".ply", or ".vtk" or ".vtu" where meshio or PyVista is installed; one

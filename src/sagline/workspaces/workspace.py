@@ -56,8 +56,8 @@ def workspace(
 
     Args:
         robot: The robot. Of a planar one, whose plane_normal is along x, y or z, the workspace is an area.
-        box: Box of positions; one of no height along an axis: in that plane. Its tilt stands for `Tilts`. None: all of
-            the frame that the robot stands in, or of the box that its anchors span down to the floor.
+        box: Box of positions; one of no height along an axis: in that plane. Its tilt means `Tilts`. None: all of
+            the frame of the robot, or of the box that its anchors span down to the floor.
         wrenches: Loads that the platform has to bear besides its weight; None for none.
         orientations: In which it is held: `Tilts`, or `Orientations`; None for level.
         criteria: Further criteria, `MaximumSag(0.05)` for instance. Those on tensions take the tensions of

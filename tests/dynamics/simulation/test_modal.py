@@ -134,5 +134,5 @@ def test_what_modes_do_not_know_is_refused(given: dict[str, Any], item: str, val
 def test_robots_with_pulleys_and_starts_in_motion_have_no_modes_here() -> None:
     robot = sl.load_robot("expo2015-lucia-pulleys")
     rest = sl.inverse(robot, sl.Pose([-0.6, 0.0, 3.5], np.eye(3))).state
-    with refused("start", "a robot with pulleys or dead cable"):
+    with refused("start", "a robot with pulleys or dead length"):
         sl.simulate(rest, cable_mass="modal", duration=0.5)

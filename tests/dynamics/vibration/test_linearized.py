@@ -175,5 +175,5 @@ def test_what_is_refused() -> None:
 
 @extended
 def test_losses_of_cables_over_pulleys_are_refused() -> None:
-    with refused("loss_time", "0.001 s", "0 where cables run over pulleys or have dead cable"):
+    with refused("loss_time", "0.001 s", "0 where cables run over pulleys or have dead length"):
         sl.linearized(one_pose(OVER_PULLEYS, sl.Catenary()), sl.Damping(1e-3), "speeds")

@@ -232,7 +232,7 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
     table[:, c.ELEMENT] = state.free_length / nodes
     table[:, c.DENSITY], table[:, c.STIFFNESS] = material.linear_density, material.axial_stiffness
     table[:, c.LOSS_TIME], table[:, c.AIR_RATE] = losses.loss_time, losses.air_damping / material.linear_density
-    # what lies behind the exit is as strained as the element there
+    # the cable behind the exit has the strain of the element there
     table[:, c.BEHIND] = state.unstrained_length - state.free_length
     last = np.linalg.norm(place[:, :, -1] - place[:, :, -2], axis=1)
     table[:, c.RUN] = table[:, c.BEHIND] * last / table[:, c.ELEMENT]

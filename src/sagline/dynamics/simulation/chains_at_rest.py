@@ -14,7 +14,7 @@ from sagline.robot.pose import Pose
 from sagline.statics.slopes import platform_end_forces
 
 STEPS = 60
-NEAR = 1e-8  # of a length, of a force: Newton squares what is left, and one more step leaves rounding
+NEAR = 1e-8  # of a length, of a force: the error of Newton's method is then squared to rounding
 NEUTRAL = 1e-12  # of the largest stiffness: smaller ones are rounding
 LONGEST_STEP = 0.2  # of a force: a longer one is shortened, which keeps far starts from folding a chain
 
@@ -127,7 +127,7 @@ def _size(levers: Array) -> float:
 
 def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
     """The motion that takes an unbalance away; none in directions in which the platform is neutral."""
-    # So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, but for rounding
+    # So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, except for rounding
     units = np.array([1.0, 1.0, 1.0, size, size, size])
     slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
     found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]

@@ -265,10 +265,10 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
 
 
 def check_set_points(robot: Robot, lengths: TimeTable) -> None:
-    """Refuse lengths [m] that are not longer than the dead cable."""
+    """Refuse lengths [m] that are not longer than the dead length."""
     checked(lengths.value, "unstrained_length", "m")
     least, dead = lengths.value.min(axis=0), dead_cable(robot)
     if (short := least <= dead).any():
         i = int(np.argmax(short))
-        allowed, step = f"> {dead[i]:g} m" + (", its dead cable" if dead[i] else ""), "Give longer ones."
+        allowed, step = f"> {dead[i]:g} m" + (", its dead length" if dead[i] else ""), "Give longer ones."
         raise InvalidValueError(f"unstrained_length: cable {i}", f"{least[i]:g} m", allowed, step)

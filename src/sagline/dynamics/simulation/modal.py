@@ -96,7 +96,7 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
 
 
 def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> _ModalMotion:
-    """Modes that rest at first, under forces that are straight between instants: exact but for rounding."""
+    """Modes that rest at first, under forces that are straight between instants: exact except for rounding."""
     # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
     root = -ratio * frequency + 1j * ringing
@@ -183,7 +183,7 @@ def _check(given: InitialConditions) -> None:
     """Refuse initial conditions without modes."""
     if given.state.contact is not None:
         step = 'Leave winches out of the robot, or give cable_mass="lumped".'
-        raise InvalidValueError("start", "a robot with pulleys or dead cable", 'none for cable_mass="modal"', step)
+        raise InvalidValueError("start", "a robot with pulleys or dead length", 'none for cable_mass="modal"', step)
     if given.model.code != codes.CATENARY:
         step = 'Plan with Catenary(), or give cable_mass="none".'
         raise InvalidValueError("start: model", type(given.model).__name__, "Catenary() where cables have mass", step)

@@ -71,12 +71,12 @@ class Plant:
         cables: Indices of the cables that are there, (m,).
         state: As in `sagline.kernels.dynamics.rigid_body`, (13,).
         rows: Of the cables, (CABLE_ROWS, m).
-        now: What the drives do, (DRIVE_ROWS, m).
-        data: What the drives are, (DATA_ROWS, m).
-        audit: What is added up, (AUDIT_SIZE,).
+        now: State of the drives, (DRIVE_ROWS, m).
+        data: Parameters of the drives, (DATA_ROWS, m).
+        audit: Sums over the run, (AUDIT_SIZE,).
         counters: Of the kernel, (COUNTERS,).
         layers: Strain of the cable on the drums, (m, B).
-        kernel: What moves it: called with `arguments`, arrays of records, steps to take, and steps a record.
+        kernel: Integrator: called with `arguments`, arrays of records, steps to take, and steps a record.
         cable_mass: As `simulate` takes it.
     """
 
@@ -149,10 +149,10 @@ class Plant:
 
     def cut(self, places: Any) -> None:
         """Let cables break in the midst of a run, by their places: the kernel's arrays stay as they are."""
-        # Stiffness and weight fall by one factor, so that every cable hangs as before and all it pulls with is nothing
+        # Stiffness and weight fall by one factor, so that every cable keeps its shape with zero force
         for column in (tables.STIFFNESS, tables.DENSITY):
             self._table[places, column] *= BROKEN
-        self.counters[k.READY] = 0  # look at all forces and energies anew
+        self.counters[k.READY] = 0  # compute all forces and energies again
 
     def lock_winches(self, places: Any) -> None:
         """Lock winches, by their places among the cables that are there; what moves of them is lost at once."""

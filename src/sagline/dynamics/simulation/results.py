@@ -28,7 +28,7 @@ class Break(NumberFields):
     """A cable breaks: from then on it is not there. Its energy goes with it, as `energy.removed`.
 
     Attributes:
-        cable: Which, from 0.
+        cable: Number of the cable, from 0.
         time: When [s].
     """
 
@@ -41,7 +41,7 @@ class Stall(NumberFields):
     """A winch stops at once, and stands from then on while the others go on.
 
     Attributes:
-        winch: Which, from 0.
+        winch: Number of the winch, from 0.
         time: When [s].
     """
 
@@ -57,8 +57,8 @@ class Brake(NumberFields):
 
     Attributes:
         time: When [s].
-        winch: Which, from 0; None for all.
-        duration: How long it takes [s], > 0.
+        winch: Number of the winch, from 0; None for all.
+        duration: Duration [s], > 0.
     """
 
     time: float = field(metadata=TIME)
@@ -71,7 +71,7 @@ class Drop(NumberFields):
     """A part of the platform's mass falls off; the inertia shrinks with it, the center of mass stays where it is.
 
     Attributes:
-        mass: How much [kg], > 0, less than the platform's.
+        mass: Mass [kg], > 0, less than the platform's.
         time: When [s].
     """
 
@@ -86,7 +86,7 @@ class PickUp(NumberFields):
     The inertia grows with the mass, the center of mass stays where it is.
 
     Attributes:
-        mass: How much [kg], > 0.
+        mass: Mass [kg], > 0.
         time: When [s].
     """
 
@@ -184,7 +184,7 @@ class Occurrence:
     Attributes:
         time: When [s].
         kind: "break", "stall", "brake", "drop" or "pick up", as asked for; "saturate" or "slack" by itself.
-        cable: Which cable or winch, or None where it is the platform's.
+        cable: Number of the cable or winch, or None for the platform.
         tension_before: Largest tension of that cable, or of all, before it [N].
         tension_after: Largest tension of any cable after it, to the end or the next [N].
     """
@@ -207,8 +207,8 @@ class Simulation(Result, Saved):
         twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
         tensions: At the frame ends [N], shape (N, m).
         length: Unstrained lengths off the drum [m], shape (N, m); NaN of a cable that has broken.
-        energy: Where the energy is.
-        events: What happened, in order.
+        energy: Energies over time.
+        events: Events in order.
         cable_mass: "none", "lumped" or "modal".
         step: Of the integrator [s].
         nodes: Position of every cable at its nodes, world axes [m], shape (N, m, P, 3); None without cable mass, NaN of
@@ -216,7 +216,7 @@ class Simulation(Result, Saved):
         integrator: "runge-kutta" or "splitting"; "exact" of modes.
         winches: "ideal", "robot" or SecondOrder(...).
         winding: "constant" or "remembered".
-        damping: What took energy out of the cables.
+        damping: Energy losses of the cables.
         largest_tension: Of each cable at the frame end at any step, also between samples [N], shape (m,); None where it
             is not known.
     """

@@ -56,8 +56,8 @@ def simulate(
 ) -> Simulation:
     """Move a robot in time: the platform is a free body on exact cables, whose lengths its winches change.
 
-    Cables have no inertia ("massless"): they hang at every instant as they do at rest, pull or are slack as their
-    lengths say, over pulleys and with dead cable as the robot has them.
+    Cables have no inertia ("massless"): they are static catenaries at every instant, taut or slack as their
+    lengths say, over pulleys and with dead length as the robot has them.
 
     Between samples a plan's lengths are followed by cubics that have its `length_rate` there; at its samples they are
     the plan's own. A plan that is sampled more often is followed more closely: give its path at 1 kHz.
@@ -65,10 +65,10 @@ def simulate(
     Args:
         start: A plan along a path, from the pose and at the speed that it begins with; its wrench, without the path's
             inertia, acts. Or a single equilibrium, at rest.
-        duration: How long [s]; lengths are held after the end of what is given. None: as long as the plan, or the table
-            of lengths.
+        duration: Duration [s]; lengths are constant after the end of the plan or table. None: as long as the plan, or
+            the table of lengths.
         step: Of the integrator [s]; None: 0.2 radians of the highest frequency (massless, cables taut), at most 1 ms.
-        cable_mass: "none": cables hang at every instant as they do at rest. "lumped": each is a chain of nodes with
+        cable_mass: "none": cables are static catenaries at every instant. "lumped": each is a chain of nodes with
             its mass, at fixed material points, which swings, and transmits its waves; new nodes are born at the frame
             and merged there as cable is let out and wound in. A chain keeps the exit from its pulley of the start.
             "modal": small motion about an equilibrium, each mode of `vibration` by itself; lengths and wrench may
@@ -80,17 +80,17 @@ def simulate(
         winches: "ideal": lengths are what is given. SecondOrder(...): they lag. "robot": the robot's winches, with
             inertia, limits of torque and speed, friction, and loops of position and speed that are closed every
             millisecond; from the start on they expect the tensions of the plan.
-        winding: What lies on the drums. "constant": cable wound at the winches' winding_tension. "remembered": cable
-            that is wound in lies at its tension, until it is paid out. Of winches="robot" alone.
+        winding: State of the cable on the drums. "constant": cable wound at the winches' winding_tension. "remembered":
+            cable that is wound in lies at its tension, until it is paid out. Of winches="robot" alone.
         unstrained_length: Set points in time for an equilibrium: times [s] (K,) and lengths [m] (K, m), straight in
             between; or one row (m,), which is kept from the start on.
-        events: What happens on the way, at the first step that is not earlier: `Break`, `Stall`, `Brake`, `Drop`,
+        events: Events, each at the first step that is not earlier: `Break`, `Stall`, `Brake`, `Drop`,
             `PickUp`.
         wrench: On the platform, in place of that of the start: one row (6,) [N, N m], or times and rows (K, 6).
         wind: Velocity of the air [m/s], (3,), or times and rows (K, 3). Half of its force on a cable, as if it were
             straight, acts on the platform; needs the cables' diameter. The platform's own is a wrench.
-        damping: What takes energy out of the cables; None: nothing.
-        record: How often the motion is written down [s], in whole steps; None: 0.01.
+        damping: Energy losses of the cables; None: nothing.
+        record: Interval of the records [s], in whole steps; None: 0.01.
 
     Returns:
         Simulation. Its events name also when a cable began to be slack, and when a winch came to a limit.

@@ -49,7 +49,7 @@ MOST_SEED: Final = 2**128
 
 
 class Reading(NamedTuple):
-    """Sensor readings and true values; the arrays are read-only, and the simulator's next step fills them anew.
+    """Sensor readings and true values; the arrays are read-only, and the simulator's next step overwrites them.
 
     Attributes:
         counts: Of the encoders, whole numbers as floats, shape (m,); None where data are missing that counts need.
@@ -60,7 +60,7 @@ class Reading(NamedTuple):
         tension: At the frame ends [N], shape (m,).
         length: Unstrained lengths off the drums [m], shape (m,).
         force: Of the motors, at the cable, outward [N], shape (m,); 0 without the robot's winches.
-        saturated: Which drives are at a limit of torque or speed, not 0 where they are, shape (m,).
+        saturated: Flags of the drives at a limit of torque or speed, not 0 there, shape (m,).
     """
 
     counts: Array | None
@@ -166,7 +166,7 @@ class Simulator:
             self._length_table.value[:, m:] = given.tensions.value
         self._wrench_table = TimeTable(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
         table, counters = self._length_table, self._plant.counters
-        # what is asked for goes here first, and to the run when all of it can be
+        # the new set points, copied to the run if all are possible
         self._given = np.zeros(m), np.zeros(wide - m), np.zeros(6)
         self._asked, self._expected, self._wrench = (array.data for array in self._given)
         writable = (table.time, table.value, table.begin, table.end)
@@ -206,10 +206,10 @@ class Simulator:
             wrench: On the platform, throughout the period [N, N m], shape (6,); None: as before.
 
         Returns:
-            What is read at the end of the period; its arrays are filled anew by the next step.
+            What is read at the end of the period; the next step overwrites its arrays.
 
         Raises:
-            InvalidValueError: If the period is not of whole steps, a length is not longer than its dead cable, or an
+            InvalidValueError: If the period is not of whole steps, a length is not longer than its dead length, or an
                 argument is no such array: then nothing has changed. Or if energy grows by itself.
         """
         count = self._count(dt)
@@ -230,7 +230,7 @@ class Simulator:
     def _take_tension(self, tension: ArrayLike) -> None:
         if self._kind != d.DRUMS:
             step = "Leave it out: these winches have no motors."
-            raise InvalidValueError("tension", "given", 'None but for winches="robot"', step)
+            raise InvalidValueError("tension", "given", 'None except for winches="robot"', step)
         copy_in(self._expected, tension, "tension", "N")
 
     def _refuse(self, with_tension: bool) -> NoReturn:
@@ -257,7 +257,7 @@ class Simulator:
         """Lock drums at once, as brakes do; they stay so until `release`.
 
         Args:
-            winches: Which, from 0; none for all.
+            winches: Numbers of the winches, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such winch.
@@ -267,10 +267,10 @@ class Simulator:
     def release(self, *winches: int) -> None:
         """Let drums go that were locked: from where they stood they go straight to the next set points.
 
-        A motor is switched on with an empty integral: it holds the tension that is expected, no more.
+        A motor is switched on with an empty integral: it only holds the expected tension.
 
         Args:
-            winches: Which, from 0; none for all.
+            winches: Numbers of the winches, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such winch.
@@ -279,7 +279,7 @@ class Simulator:
         chosen[self._chosen(winches)] = True
         freed = chosen & (plant.now[d.HELD] > 0.0)
         plant.now[d.HELD, freed] = plant.now[d.INTEGRAL, freed] = 0.0
-        if self._kind != d.SECOND_ORDER:  # whose set points were not at where they stood before either
+        if self._kind != d.SECOND_ORDER:  # which had other set points before as well
             stood = plant.now[d.WOUND] if self._kind == d.DRUMS else plant.rows[LENGTH]
             self._lengths[freed] = plant.rows[LENGTH, freed]
             self._length_table.value[1, : len(freed)][freed] = stood[freed]
@@ -289,7 +289,7 @@ class Simulator:
 
         Args:
             length: By how much the way to the next set points begins elsewhere [m].
-            winches: Which, from 0; none for all.
+            winches: Numbers of the winches, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such winch, or the length is no number.
@@ -304,7 +304,7 @@ class Simulator:
         """Let cables break: they pull and weigh no longer; their drums go on as they are asked to.
 
         Args:
-            cables: Which, from 0; none for all.
+            cables: Numbers of the cables, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such cable.
@@ -316,7 +316,7 @@ class Simulator:
 
         Args:
             force: At the cable [N], >= 0.
-            winches: Which, from 0; none for all.
+            winches: Numbers of the winches, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such winch, the force is no such number, or the winches have no motors.

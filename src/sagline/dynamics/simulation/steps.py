@@ -16,7 +16,7 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # of step times highest angular frequency
-SHARE: Final = 0.2  # radians of that frequency in a step, unless told otherwise
+SHARE: Final = 0.2  # radians of that frequency in a step, by default
 WAVE_SHARE: Final = 0.465  # of the limit of cables with mass, 0.4 l sqrt(rho/EA): what breaks shakes the shortest waves
 LONGEST: Final = 1e-3  # s
 

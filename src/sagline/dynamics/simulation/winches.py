@@ -103,7 +103,7 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
         raise InvalidValueError(f"winches: speed_gain[{i}]", f"{data[d.SPEED_GAIN, i]:g} N s/m", allowed, step)
 
 
-COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # what an encoder's counts need
+COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # needed by encoder counts
 
 
 class Encoders:

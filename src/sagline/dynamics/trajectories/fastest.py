@@ -30,7 +30,7 @@ _CONVERGED: Final = 1e-7  # of the time, that a round changes
 _INSTANTS: Final = 4001  # of a move, at which its limits are checked in the end
 _SLOWER: Final = 1e-6  # of the time, that is given first where a limit is missed; four times as much each time
 _TRIES: Final = 12
-_GENTLE: Final = 8  # of these, in which no more is given than winches may need
+_GENTLE: Final = 8  # of these, the margin of the rates for the winches
 _ROUNDING: Final = 1e-12
 
 
@@ -76,7 +76,7 @@ def fastest(
     Args:
         robot: The robot. Its tension_min and tension_max are kept, of chords or at the frame ends as it says.
         path: Its curve is followed, whatever its times; where it rests the new one rests too.
-        margin: How far off both limits [N], >= 0.
+        margin: Distance from both limits [N], >= 0.
         jerk: Largest jerk of the platform's origin [m/s^3], > 0; None for no bound.
         angular_jerk: Largest second rate of the angular velocity [rad/s^3], > 0; None for no bound.
         progress: Called after each move: how many are done, of how many.
@@ -121,7 +121,7 @@ def fastest(
         plan = inverse(inner, new)
         slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
-            ratio = _speed_excess(plan)  # what stretches falls with the cube of the time, the rest in proportion
+            ratio = _speed_excess(plan)  # terms of the stretch fall with the cube of the time, others in proportion
             slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
         if slower == 1.0:
             return new

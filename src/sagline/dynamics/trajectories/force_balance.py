@@ -169,7 +169,7 @@ class SpeedProfile:
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
     """The profile from rest to rest that is at each place as fast as any that stays within the bounds; place (K,)."""
     # Backward, from which squares of the speed the end can be reached; forward, the largest acceleration that stays
-    # among them. What holds at both ends of a step holds in it, but for the bounds' curvature.
+    # among them. A bound at both ends of a step holds within it, except for the bounds' curvature.
     # source: Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018
     steps, last = np.diff(place), len(place) - 1
     reach = np.zeros((len(place), 2))
@@ -205,7 +205,7 @@ def _range(rates: Array, bound: Array) -> tuple[float, float]:
     flat = np.abs(rates[:, 0]) <= _FLAT * np.abs(rates[:, 0]).max()
     up, down = ~flat & (rates[:, 0] > 0.0), ~flat & (rates[:, 0] < 0.0)
     slope, level = rates[:, 1] / np.where(flat, 1.0, rates[:, 0]), bound / np.where(flat, 1.0, rates[:, 0])
-    # what bounds the first from above, less what bounds it from below, must leave something
+    # upper bounds of the first minus its lower bounds must be positive
     rate = np.concatenate(((slope[up][:, None] - slope[down]).ravel(), rates[flat, 1]))
     gap = np.concatenate(((level[up][:, None] - level[down]).ravel(), bound[flat]))
     size = np.abs(rate).max(initial=0.0) * _FLAT

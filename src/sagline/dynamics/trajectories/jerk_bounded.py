@@ -14,7 +14,7 @@ from sagline.dynamics.trajectories.segments import Curve
 from sagline.kinematics.inverse import inverse
 from sagline.robot.robot import Robot
 
-Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # what else holds at parameters
+Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # further conditions at parameters
 
 PIECES: Final = 100  # of constant jerk
 _ITERATIONS: Final = 40
@@ -60,8 +60,8 @@ def fastest_jerk_profile(
     curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
 ) -> JerkProfile | None:
     """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk."""
-    # Linear in the jerk and in the square of the time, but for where the platform is at each share of the time, the
-    # square of its speed and the time's third power: those are computed anew in iterations, each a linear program
+    # Linear in the jerk and in the square of the time, except for the position at each share of the time, the
+    # square of its speed and the time's third power: those are computed again in iterations, each a linear program
     # units: limits [m/s^3]; least [s]
     from scipy.optimize import linprog  # takes longer to load than all the rest of dynamics
 

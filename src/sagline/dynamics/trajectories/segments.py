@@ -140,7 +140,7 @@ def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
             "Make it of two paths, each from rest to rest.",
         )
     growth = np.sum(twist * twist_rate, axis=1) / np.where(speed > 0.0, speed, 1.0)
-    growth[[0, -1]] = np.linalg.norm(twist_rate[[0, -1]], axis=1) * (1.0, -1.0)  # where it stands
+    growth[[0, -1]] = np.linalg.norm(twist_rate[[0, -1]], axis=1) * (1.0, -1.0)  # position
     step = np.diff(time)
     pieces = 0.5 * step * (speed[1:] + speed[:-1]) + step**2 / 12.0 * (growth[:-1] - growth[1:])
     return np.stack((np.append(0.0, np.cumsum(pieces)), speed, growth))
@@ -265,7 +265,7 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
     rates = [path.twist[part], path.twist_rate[part], *([] if path.jerk is None else [path.jerk[part]])]
     curve, values = _parametrized(time, path.pose[part], rates)
     standing, over = abs(time[0]) <= near, abs(time[-1] - (end - begin)) <= near
-    # a sample at a rest may know of the move after it only; quintic paths are exact with 3 of 4, septic ones to h^7
+    # a sample at a rest may belong to the next segment only; quintic paths are exact with 3 of 4, septic ones to h^7
     at_end = 3 if path.jerk is not None or part.stop == len(path) else 2
     progress = piecewise(time, values, at_end if over else len(values))
     if not (standing and over):

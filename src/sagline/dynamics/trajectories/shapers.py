@@ -34,7 +34,7 @@ class Shaper(Result):
     Attributes:
         time: When the impulses come [s], shape (K,), ascending, the first no earlier than 0.
         amplitude: Share of the motion that starts at each, shape (K,), their sum 1.
-        frequency: What they were made for [Hz], shape (F,); empty where that is not known.
+        frequency: Design frequencies [Hz], shape (F,); empty if unknown.
     """
 
     time: Array
@@ -47,7 +47,7 @@ class Shaper(Result):
         Args:
             time: When they come [s], shape (K,), strictly increasing, >= 0.
             amplitude: Their shares, shape (K,); they sum to 1.
-            frequency: What they are made for [Hz], > 0, shape (F,).
+            frequency: Design frequencies [Hz], > 0, shape (F,).
 
         Raises:
             InvalidValueError: If they are no such impulses.
@@ -263,7 +263,7 @@ def shaped(path: Path, shaper: Shaper) -> Path:
     Args:
         path: A path from rest to rest; where it does not know its rests (see `Path.rests`), they are the samples
             without velocity and acceleration.
-        shaper: What to convolve with: `ZV`, `ZVD`, `EI` of a frequency, or their product.
+        shaper: Shaper of the convolution: `ZV`, `ZVD`, `EI` of a frequency, or their product.
 
     Returns:
         Path at the same sample rate, each of its moves longer by the shaper's duration.

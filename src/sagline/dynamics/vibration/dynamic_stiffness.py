@@ -63,11 +63,11 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
     Args:
         state: An equilibrium, a single one.
         frequency: [Hz], >= 0, shape (F,) or a single one.
-        damping: What takes energy out of the vibration; None: nothing. Its modal_damping is a loss factor twice as
+        damping: Energy losses of the vibration; None: none. Its modal_damping is a loss factor twice as
             large of all stiffness, which damps every mode by that ratio at its own frequency.
 
     Returns:
-        Complex array of shape (F, m, 3, 3), or (m, 3, 3) [N/m], world axes; NaN for cables that hang folded or slack,
+        Complex array of shape (F, m, 3, 3), or (m, 3, 3) [N/m], world axes; NaN for folded or slack cables,
         which have no linear vibration.
 
     Raises:

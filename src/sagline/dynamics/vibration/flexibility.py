@@ -1,4 +1,4 @@
-"""Derivatives of the flexibility of hanging cables by force, length and material: third order of their energy."""
+"""Derivatives of the flexibility of free cables by force, length and material: third order of their energy."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class _CatenaryState(NamedTuple):
 
 
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
-    """Derivatives of the flexibility of hanging cables, from where they leave the frame to their platform ends."""
+    """Derivatives of the flexibility of free cables, from where they leave the frame to their platform ends."""
     # shapes: force (..., m, 3) [N]
     cables = state.cables
     length = cables.unstrained_length

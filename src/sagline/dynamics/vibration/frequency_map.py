@@ -48,7 +48,7 @@ class FrequencyMap(Result, Saved):
         robot: The robot.
         pose: The poses, a batch of N.
         up_to: Frequency below which modes are found [Hz].
-        damping: What takes energy out.
+        damping: Energy losses.
         status: Codes of `VibrationStatus`, shape (N,).
         frequency: Lowest, with cable mass [Hz], shape (N,).
         massless_frequency: Lowest of the platform on cables whose mass does not swing [Hz], shape (N,).
@@ -56,7 +56,7 @@ class FrequencyMap(Result, Saved):
         peak: Strongest answer, at rest or near a mode below up_to: displacement of the center of mass for a force on
             it, in the direction that it answers to most, as of `frequency_response` [m/N], shape (N,); infinite
             without damping.
-        peak_frequency: Where that is [Hz], shape (N,).
+        peak_frequency: Frequency of that peak [Hz], shape (N,).
     """
 
     robot: Robot
@@ -88,8 +88,8 @@ def frequency_map(
         robot: The robot.
         poses: A batch of N.
         up_to: Frequency below which modes are wanted [Hz], > 0.
-        tension: How the load is shared among redundant cables, as in `inverse`.
-        damping: What takes energy out, for the strongest answer; a modal damping of 1 % unless told otherwise; None:
+        tension: Tension distribution method, as in `inverse`.
+        damping: Energy losses, for the largest response; a modal damping of 1 % by default; None:
             nothing.
         progress: Called after every few poses: how many are done, of how many.
 
@@ -97,7 +97,7 @@ def frequency_map(
         FrequencyMap.
 
     Raises:
-        InvalidValueError: If an argument is none of its kind, up_to is not positive, or too many modes lie below it.
+        InvalidValueError: If an argument is of the wrong kind, up_to is not positive, or too many modes lie below it.
         SaglineError: If modes and count disagree; the message names the pose.
 
     Examples:

@@ -34,14 +34,14 @@ class FrequencySlopes(Result):
     All else is held: the lengths off the drums, the wrench. Where the lengths are to follow a pose, by a way of
     sharing, add length_sensitivity times what they change by.
 
-    Frequencies that are one frequency have no derivative each: where a datum grows they part, by what stands in their
+    Equal frequencies have no separate derivatives: with a growing datum they separate, by the values in their
     rows, ascending; where it shrinks the same apart from the sign. The mean over them has their mean as derivative.
 
     Attributes:
         state: The state.
         cable_mass: Whether the cables' mass swings; if not, the frequencies are massless ones.
         frequency: [Hz], shape (K,).
-        group: Which frequencies are one: those of the same number, shape (K,).
+        group: Group of each frequency; equal frequencies have the same number, shape (K,).
         length_sensitivity: By the length of each cable, shape (K, m) [Hz/m].
         density_sensitivity: By the linear density of each cable, its weight included, shape (K, m) [Hz m/kg].
         stiffness_sensitivity: By the axial stiffness of each cable, shape (K, m) [Hz/N].
@@ -71,7 +71,7 @@ def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> 
 
     Args:
         state: An equilibrium, a single one, for the massless frequencies, those of `modes`; or a vibration, for those
-            with cable mass. Cables are exact or weightless ones that hang from their anchors.
+            with cable mass. Cables are exact or weightless and start at their anchors.
         together: Relative difference up to which neighboring frequencies count as one.
 
     Returns:
@@ -120,7 +120,7 @@ def _with_cable_mass(vibration: Vibration, together: float) -> FrequencySlopes:
 def _rest(state: Equilibrium) -> StateSlopes:
     check_model(single_state(state))
     if state.contact is not None:
-        value, allowed = "one of cables with something behind them", "cables that hang from their frame anchors"
+        value, allowed = "one of cables with something behind them", "cables that start at their frame anchors"
         raise InvalidValueError("state", value, allowed, "Take the robot without winches: robot.replace(winches=None).")
     check_solved(state)
     return state_slopes(state)

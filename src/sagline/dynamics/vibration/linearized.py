@@ -46,7 +46,7 @@ class Linearized(Result):
 
     Attributes:
         state: The state.
-        damping: What takes energy out.
+        damping: Energy losses.
         A: Shape (X, X); X = 2 n, or 2 n + m with winch speeds as inputs.
         B: Shape (X, m + 6).
         C: Shape (6 + 2 m, X).
@@ -94,8 +94,8 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
 
     Args:
         state: An equilibrium, a single one, from `inverse` or `forward`. An unstable one gives poles that grow.
-        damping: `loss_time` of the hanging cables' stretch, to first order in it, and `modal_damping`; none by default.
-        inputs: What the winches give: "lengths" off the drums, or "speeds", their rates, where lengths are states.
+        damping: `loss_time` of the cables' stretch, to first order in it, and `modal_damping`; none by default.
+        inputs: Inputs of the winches: "lengths" off the drums, or "speeds", their rates, with lengths as states.
 
     Returns:
         The system.
@@ -134,7 +134,7 @@ def _check(state: Equilibrium, damping: Damping, inputs: Inputs) -> None:
         return
     item, value = "loss_time", f"{damping.loss_time:g} s"
     if state.contact is not None:
-        allowed, step = "0 where cables run over pulleys or have dead cable", "Give modal_damping instead."
+        allowed, step = "0 where cables run over pulleys or have dead length", "Give modal_damping instead."
         raise InvalidValueError(item, value, allowed, step)
     if inputs == "lengths":
         allowed = '0 with inputs="lengths", at whose steps tensions would be infinite'
@@ -218,7 +218,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
         return np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m)
     follows = loss_time * slopes.blocks @ flexibility(state, slopes.force).stretch
     per_motion = follows @ slopes.blocks  # N s/m, of the platform ends
-    per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # what is wound off need not stretch
+    per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # paid-out cable has no stretch
     if not np.isfinite(per_motion).all():
         step = "Give modal_damping instead, or tighten the cable."
         raise InvalidValueError("state", "one with a folded cable", "cables that stretch, for loss_time", step)
@@ -235,7 +235,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
 
 
 def _modal_drag(state: Equilibrium, ratio: float) -> Array:
-    """Drag on the platform that damps every massless mode by the same ratio, shape (6, 6); unstable ones by nothing."""
+    """Drag on the platform with the same damping ratio for every stable massless mode, shape (6, 6)."""
     found, mass = modes(state), mass_matrix(state)
     momenta = mass @ found.shape
     drag: Array = momenta * (2.0 * ratio * 2.0 * np.pi * np.nan_to_num(found.frequency)) @ momenta.T

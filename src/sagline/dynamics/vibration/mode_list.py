@@ -27,7 +27,7 @@ def end_displacements(state: Equilibrium, shape: Array) -> Array:
 def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:
     """Damping ratio that the loss in the cables' stretch gives each massless mode, to first order."""
     # Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
-    # hanging and behind their exits; the rest is in what they sag and swivel
+    # free and behind their exits; the rest is in sag and swivel
     # shapes: loss_time [s]; returns (n,)
     # source: docs/model.md, section 11
     omega = 2.0 * np.pi * platform.frequency

@@ -34,7 +34,7 @@ class FrequencyResponse(Result):
 
     Attributes:
         state: The state, a single one.
-        damping: What takes energy out.
+        damping: Energy losses.
         frequency: [Hz], shape (F,).
         compliance: Motion by wrench with cable mass, shape (F, 6, 6) [m/N, rad/N, ...]; zero in motions that the
             robot's pattern does not have.
@@ -56,12 +56,12 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
     """Motion of the platform for an oscillating wrench, cables with mass; and on massless cables, to compare.
 
     From the modes of every cable with its ends held; at some of the frequencies the exact stiffness of the cables is
-    taken too, and the deviation told.
+    taken too, and the deviation is reported.
 
     Args:
         state: An equilibrium, a single one.
         frequency: [Hz], >= 0, shape (F,).
-        damping: What takes energy out; None: nothing, the answer then is infinite at the natural frequencies. Its
+        damping: Energy losses; None: none, with infinite response at the natural frequencies. Its
             modal_damping is a loss factor twice as large of all stiffness, as in `dynamic_stiffness`.
 
     Returns:

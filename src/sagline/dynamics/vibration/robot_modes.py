@@ -104,7 +104,7 @@ def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedMode
 
 
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
-    """Motions that stand for many: orthonormal columns of amplitudes, and the stiffness between them."""
+    """Motions that represent many: orthonormal columns of amplitudes, and the stiffness between them."""
     chain = [drives / square[:, None]]
     for _ in range(LEVELS - 1):
         chain.append(chain[-1] / square[:, None])

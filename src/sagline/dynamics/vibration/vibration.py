@@ -46,8 +46,8 @@ class VibrationStatus(IntEnum):
 _TEXTS = {
     VibrationStatus.SOLVED: "all modes up to the frequency asked for are found",
     VibrationStatus.UNSTABLE: "the equilibrium is unstable: it leaves in its negative_directions; simulate it",
-    VibrationStatus.NO_LENGTHS: "the pose has no answer: see the status of the plan",
-    VibrationStatus.FOLDED: "a cable hangs folded or slack and has no linear vibration: its index is in slack_cables; "
+    VibrationStatus.NO_LENGTHS: "the pose has no solution: see the status of the plan",
+    VibrationStatus.FOLDED: "a cable is folded or slack and has no linear vibration: its index is in slack_cables; "
     "the modes are those of the others",
 }
 
@@ -97,7 +97,7 @@ class Vibration(Result):
     Attributes:
         state: The state, a single one.
         up_to: Frequency below which all modes are found [Hz].
-        damping: What takes energy out of them.
+        damping: Their energy losses.
         status: Whether the state has linear vibrations.
         frequency: Of the modes with cable mass [Hz], ascending, shape (K,).
         shape: Motion of the platform (displacement of the center of mass, rotation vector, world axes), one mode a
@@ -108,7 +108,7 @@ class Vibration(Result):
             axes, shape (K, m, P, 3) [m/sqrt(kg)].
         loss: Damping ratio of each mode, to first order in the damping, shape (K,).
         massless_frequency: Of the platform on cables whose mass does not swing [Hz], as in `modes`, shape (n,).
-        count: How many modes there are below up_to by the exact count, which needs no mode: K where it is complete.
+        count: Number of modes below up_to by the exact count, which uses no modes: K if the modes are complete.
         negative_directions: Motions in which the platform leaves an unstable equilibrium, one a column, shape (6, d);
             no columns where it is stable.
         slack_cables: Indices of the cables that have no linear vibration.
@@ -161,10 +161,10 @@ def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = Non
     Args:
         state: An equilibrium, a single one, from `inverse` or `forward`.
         up_to: Frequency below which modes are wanted [Hz], > 0.
-        damping: What takes energy out of the vibration, for `loss`; None: nothing.
+        damping: Energy losses of the vibration, for `loss`; None: none.
 
     Returns:
-        Vibration. Its status tells of an unstable equilibrium, and of cables that hang folded or slack: these have no
+        Vibration. Its status reports an unstable equilibrium, and folded or slack cables: these have no
         linear vibration, and the modes are those of all else.
 
     Raises:

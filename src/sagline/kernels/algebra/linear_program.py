@@ -1,7 +1,7 @@
 """Linear programs in few unknowns, over bounds: the dual simplex method.
 
-It walks over points that are optimal for the sides they stand on until it meets one that keeps all bounds, or a side
-that contradicts those it stands on: the proof that there is none. Where the same rows and cost are met again with other
+It visits points that are optimal for their active sides until one satisfies all bounds, or a side
+contradicts the active ones: the proof of infeasibility. Where the same rows and cost are met again with other
 limits, the sides of the last answer are still optimal, and it starts from there.
 """
 
@@ -23,15 +23,15 @@ PIVOT = 1e-11  # smallest pivot, of the row's largest
 
 
 class Basis(NamedTuple):
-    """The sides an optimal point stands on; good for the next program with the same rows and cost.
+    """The active sides of an optimal point; good for the next program with the same rows and cost.
 
-    A limit that was finite must then still be so: a side at infinity is no side to stand on.
+    A limit that was finite must then still be so: a side at infinity cannot be active.
     """
 
     # of the sides, and of the one that contradicts them if the bounds have nothing in common, (d + 1,); labels[0] is -1
-    # for no basis. From 2k on they name the sides of a box that stands in for infinity.
+    # for no basis. From 2k on they are the sides of a box that replaces infinity.
     labels: Indices
-    weights: Array  # what each of them weighs in the combination that proves the answer, (d + 1,), >= 0
+    weights: Array  # multipliers of the proof, (d + 1,), >= 0
     inverse: Array  # inverse of their normals, (d, d)
 
 
@@ -67,7 +67,7 @@ def _violation(rows: Array, bounds: Array, label: int, radius: float, cost: Arra
 
 @glue
 def _start_at_box_corner(rows: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
-    """Stand on the corner of the box at which the cost is least."""
+    """Start at the corner of the box with the least cost."""
     labels, weights, inverse = basis
     d = cost.size
     for k in range(d):
@@ -103,7 +103,7 @@ def _exchange_sides(rows: Array, entering: int, leaving: int, miss: float, basis
 
 @glue
 def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basis: Basis, point: Array) -> None:
-    """Move the point to where all sides of the basis meet: from anywhere, then twice by what they still miss."""
+    """Move the point to the intersection of the sides of the basis, with two steps of iterative refinement."""
     d = point.size
     for _ in range(3):
         for j in range(d):
@@ -116,7 +116,7 @@ def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basi
 def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
     """Fill the point (d,) of least cost . x that keeps all bounds up to a slack; returns the outcome.
 
-    A slack of 0 stands for the usual tolerance. A solution as far out as the box is infinitely far.
+    A slack of 0 means the usual tolerance. A solution as far out as the box is infinitely far.
     """
     labels, weights, inverse = basis
     d = cost.size

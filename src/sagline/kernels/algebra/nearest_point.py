@@ -24,15 +24,15 @@ EXCHANGES = 2000
 DEPENDENT = 1e-10  # a side that leaves less than this of itself outside the span of others depends on them
 
 # rows of the pushes
-PUSH, SHARE = 0, 1  # how hard each held side pushes; how the one that enters is made of them
+PUSH, SHARE = 0, 1  # multipliers of the active sides; components of the entering side
 
 
 class ActiveSet(NamedTuple):
-    """The sides a nearest point stands on, and the memory to find them in."""
+    """The active sides of a nearest point, and work arrays."""
 
-    labels: Indices  # how many, then their labels, (d + 2,)
+    labels: Indices  # number of sides, then their labels, (d + 2,)
     frame: Array  # their orthonormal frame, and a row for the one that enters, (d + 1, d)
-    triangle: Array  # what makes them of it, (d + 1, d + 1)
+    triangle: Array  # triangular factor, (d + 1, d + 1)
     pushes: Array  # rows PUSH and SHARE, (2, d + 1)
 
 
@@ -53,7 +53,7 @@ def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: 
     count, d = labels[0], point.size
     for k in range(d):
         point[k] = target[k]
-    for c in range(count):  # how far the edge is from the target along row c of the frame
+    for c in range(count):  # distance of the edge from the target along row c of the frame
         label = labels[1 + c]
         miss = side_of(bounds, label)
         size = 0.0
@@ -82,7 +82,7 @@ def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: 
 
 @glue
 def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
-    """Let go of the held side at a place, and make the frame of the others anew."""
+    """Release the active side at an index, and compute the frame of the others again."""
     labels, frame, triangle, pushes = held
     count = labels[0] - 1
     labels[0] = count
@@ -99,7 +99,7 @@ def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
 def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
     """Fill the point (d,) nearest to the target (d,) that keeps all bounds up to a slack; False where there is none.
 
-    held: what a similar problem left, or labels[0] = 0; filled with what this point stands on.
+    held: what a similar problem left, or labels[0] = 0; filled with the active sides of this point.
     """
     labels, frame, triangle, pushes = held
     d = target.size

@@ -1,6 +1,6 @@
 """Data of one pose: cables in place, their limits, and the factored force balance.
 
-This is the one place that sets a pose up. The load is shared in a variable t that is scale times the chord tension plus
+This is the one place that sets a pose up. The tension method uses t, which is scale times the chord tension plus
 offset: chord, horizontal or frame-end tensions, and weighted ones. Limits and minimum norm are those of t - offset.
 """
 
@@ -134,7 +134,7 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
         if limits.quantity == codes.LIMITS_OF_FRAME_END:
             line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
             low = chord_tension_at_frame_end(model, line, material, pulley, low)
-            high = taut_at_frame_end(model, line, material, pulley, high, 0.0)  # 0: no cable hangs with so little
+            high = taut_at_frame_end(model, line, material, pulley, high, 0.0)  # 0: no cable has so little tension
         if not math.isnan(limits.validity):
             # on a vertical cable T_x is zero, and so is a margin of zero
             margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0

@@ -70,7 +70,7 @@ def components_along(free: Array, full: Array, part: Array) -> float:
 
 @formula
 def fill_motion_of_components(free: Array, part: Array, motion: Array) -> None:
-    """Fill the motion (6,) that components (n,) along the free motions stand for."""
+    """Fill the motion (6,) of components (n,) along the free motions."""
     for a in range(6):
         motion[a] = 0.0
     for j in range(free.shape[0]):
@@ -108,7 +108,7 @@ def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array,
     """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
 
     It balances the platform's weight (counted here, once), the given wrench (external plus inertial,
-    about the center of mass) and the cables' sag forces T_z - tau sin phi (m,), which hang on the platform ends.
+    about the center of mass) and the cables' sag forces T_z - tau sin phi (m,), which act at the platform ends.
     """
     fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
     mx = -wrench[3]

@@ -190,9 +190,9 @@ def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: fl
 def _catenary_sag(
     span: float, rise: float, length: float, horizontal: float, vertical: float, weight: float, stiffness: float
 ) -> float:
-    """Largest drop below the chord [m]; on a vertical chord, how far the cable hangs below its lower end."""
+    """Largest drop below the chord [m]; on a vertical chord, the drop below its lower end."""
     slope = rise / span if span > 0.0 else 0.0
-    # where the cable runs parallel to the chord (a vertical one: where it turns), as a length from the frame end
+    # point with a tangent parallel to the chord (vertical chord: the turning point), as a length from the frame end
     part = length - (vertical - horizontal * slope) / weight
     part = min(max(part, 0.0), length)
     x, z = catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
@@ -274,7 +274,7 @@ def creep_strains(
         tension: [N], (N, m).
         stiffness: Of each element [N], (k,).
         delay: Its time [s], (k,).
-        settled: Whether the first tension has long been there, (1,); else the strain begins at zero.
+        settled: Whether the first tension has long acted, (1,); else the strain begins at zero.
         strain_out: (N, m).
     """
     for i in range(tension.shape[1]):

@@ -43,7 +43,7 @@ class Cables(NamedTuple):
     wrap_cosine: Array  # cosine of psi
     radius: Array  # of the pulley [m]
     entry: Array  # +1 where a cable enters its pulley from below, -1 from above
-    dead: Array  # length of dead cable [m]
+    dead: Array  # length of dead length [m]
     rise: Array  # height of the frame anchor above the drum [m]
 
 

@@ -23,11 +23,11 @@ from sagline.kernels.algebra.functions import (
 from sagline.kernels.cable.terms import Force
 from sagline.kernels.jit import formula, kernel
 
-RANGE = 500.0  # of X = wD/(2 tau): beyond it sinh X overflows and no cable hangs like this
+RANGE = 500.0  # of X = wD/(2 tau): beyond it sinh X overflows, without a practical cable
 TAUT_STRAIN = 0.01  # of e = tau/EA: up to here two Newton steps reach the last digit
 ORDINARY_STRAIN = 0.1  # and up to here three
 STEPS = 80
-# Relative steps after which no other counts: Newton squares what is left, Halley cubes it.
+# Relative steps after which no other counts: Newton's method squares the error, Halley's cubes it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
 
@@ -86,7 +86,7 @@ def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: fl
 
 @formula
 def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
-    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; up to 0.1 it wants a third.
+    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; up to 0.1 it needs a third.
 
     Free of branches, so that a loop over cables vectorizes: two calls, not a loop, for the same reason.
     """

@@ -116,7 +116,7 @@ def follow_memory(
         given: Lengths off the drum [m], (N, m): unstrained ones, or those along the path of winding.
         strain: Of the cable at the drum, at each sample, (N, m).
         rest_strain: Of the cable that lies on the drum at first, (m,).
-        unstrained: Which of the two lengths are given.
+        unstrained: True if the given lengths are unstrained.
         found_out: The others [m], (N, m).
         memory: Work array, (MEMORY_ROWS, N).
     """

@@ -1,7 +1,8 @@
 """Forces of all cables of one pose at their unstrained lengths.
 
 Most calls come from a pose close by. Ordinary catenaries therefore take two Halley steps from the parameter h they
-had there, in loops without branches, which vectorize; whoever has not arrived by then is solved alone, from scratch.
+had there, in loops without branches, which vectorize; cables that have not converged then are solved alone, from the
+start.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from sagline.kernels.jit import formula, glue
 CLOSE = 0.1  # relative first step within which two Halley steps are trusted
 ORDINARY = 2.0  # of h: up to here the polynomials are exact
 PASSES = 30  # over pulleys; one or two from a pose close by
-MISSED = 1e-13  # of a cable's length: a platform end missed by less is met
+MISSED = 1e-13  # of a cable's length: tolerance of the platform end
 
 
 @formula

@@ -37,9 +37,9 @@ def _rotation_matrix(pose: Array, rotation: Array) -> None:
 def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[float, float, float]:
     """Length, sin phi and cos phi of the line from a pulley that touches it and ends at a point; NaN if there is none.
 
-    The pulley stands in the cable's vertical plane; span and rise count from where the cable enters it, entry is +1
+    The pulley is in the cable's vertical plane; span and rise count from where the cable enters it, entry is +1
     for one that comes from below. No tangent leads to a point inside the pulley, or past its near side: straight
-    below (above, for a cable from above) a cable hangs twice the radius from where it enters.
+    below (above, for a cable from above) the exit is twice the radius from the entry.
     """
     across = span - radius
     along = entry * rise
@@ -104,7 +104,7 @@ def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array
 
 LENGTH = GEOMETRY_ROWS  # unstrained length [m]
 HORIZONTAL, VERTICAL, TENSION = LENGTH + 1, LENGTH + 2, LENGTH + 3  # T_x, T_z, tau [N]
-STATUS = LENGTH + 4  # how the cable's calculation ended
+STATUS = LENGTH + 4  # status of the cable
 # of `cable_forces`; PARAMETER is h, kept from pose to pose, NaN where there was none
 PARAMETER, KAPPA, EXCESS, FIRST, SECOND = LENGTH + 5, LENGTH + 6, LENGTH + 7, LENGTH + 8, LENGTH + 9
 XX, XZ, ZX, ZZ = LENGTH + 10, LENGTH + 11, LENGTH + 12, LENGTH + 13  # in-plane stiffness [N/m]

@@ -1,6 +1,6 @@
 """A cable over the pulley at its frame anchor, and the straight run behind it; docs/model.md, section 10.
 
-The pulley swivels about a vertical axis through the anchor A, where the cable enters it, and so stands in the cable's
+The pulley swivels about a vertical axis through the anchor A, where the cable enters it, and so is in the cable's
 vertical plane. The cable leaves it at P along the force there, F_A = (T_x, T_zA): that force alone says where.
 Nothing rubs: H = T + T^2/(2 EA) - w z is one number along all of a cable, and -H its energy's slope by its length.
 With beta = w R/EA and E_A = 1 + T_A/EA, what is neglected on the pulley is of the order R beta^2.

@@ -1,6 +1,6 @@
 """The cables of one pose as curves: how their sag forces T_z - tau sin phi run with their chord tensions.
 
-Weight makes the sag force of a cable that hangs below its frame end rise and fall with the tension: it falls while the
+Weight makes the sag force of a cable below its frame end rise and fall with the tension: it falls while the
 sag is deep, rises while the sag grows shallow, and falls again by stretch. On a range of tensions it is therefore
 within its ends and at most two turns between them; docs/model.md, section 5.
 """
@@ -38,7 +38,7 @@ class Curves(NamedTuple):
     model: Model  # cable model
     cables: Cables  # the cables; what they carry is working space
     turns: Array  # of their sag forces, (TURN_ROWS, m)
-    statuses: Codes  # how each cable's calculation ended, (m,)
+    statuses: Codes  # status of each cable, (m,)
 
 
 class Section(NamedTuple):
@@ -124,12 +124,12 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along tau - hanging sag_force(tau) on a section [N]; exact where the better end is the answer.
+    """Upper bound of along tau - weight sag_force(tau) on a section [N]; exact where the better end is the answer.
 
     That end, and the range of the sag force, say how far from it anything better can be; so the section shrinks.
 
     section: of its chord tensions; the upper end may be infinite; along: what a newton of chord tension counts;
-    hanging: what a newton of sag force takes away.
+    hanging: weight of a newton of sag force.
     """
     low, high, at_low, at_high = section
     if along > 0.0 and high == math.inf:

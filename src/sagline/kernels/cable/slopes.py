@@ -31,7 +31,7 @@ class _ForceSlopes(NamedTuple):
 
 
 class _MachineSlopes(NamedTuple):
-    """Derivatives of the force on the platform end by R and the dead cable [N/m]."""
+    """Derivatives of the force on the platform end by R and the dead length [N/m]."""
 
     by_radius: PlaneVector
     by_dead: PlaneVector

@@ -27,7 +27,7 @@ from sagline.kernels.jit import entry, glue, kernel
 NEAR = 1e-3
 # passes until a cable leaves its pulley where its force says; a taut one is 1e-4, 4e-8, 1e-11, 0 off
 CONTACTS = 40
-SAME_SAG_FORCE = 4e-16  # of the tension: a sag force that changes by no more stands still
+SAME_SAG_FORCE = 4e-16  # of the tension: smaller changes of a sag force count as converged
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative: more than what the passes for a slack cable's pulley leave
@@ -154,7 +154,7 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
-    What no cable hangs with is answered by the chord tension, if any, at which a parabola's frame-end tension is least.
+    Without such a cable the result is the chord tension, if any, of the least frame-end tension of a parabola.
     """
     loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
     return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
@@ -170,7 +170,7 @@ def taut_at_frame_end(
     with a slope of at most 1 + wD/EA: from the taut side steps by secants come down to the root, or to where the slope
     is none.
 
-    tension: at the frame end [N]; otherwise: the answer where no cable hangs with so little.
+    tension: at the frame end [N]; otherwise: the result where no cable has so little.
     """
     weight = material.density * model.gravity
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:
@@ -238,7 +238,7 @@ def lengths_at_frame_ends(
         body: Row of the body_table.
         pose: Pose row.
         tension: At the frame ends [N], (m,).
-        tension_out: What they are at these lengths: others, where no cable hangs with so little [N], (m,).
+        tension_out: Tensions at these lengths; they differ where no cable has so little [N], (m,).
         length_out: (m,).
         rotation: Work array, (3, 3).
         geometry: Work array, (GEOMETRY_ROWS, m).

@@ -120,7 +120,7 @@ def shallow_slopes(
     square = tension * tension
     share = sag / square
     by_tension = length * (tension + sag_force * sine) / (stretch * stiffness) + 2.0 * chord * share / tension
-    # what s changes with the chord at fixed tau: through sin phi and through the sag force, which is proportional to D
+    # derivative of s by the chord at fixed tau: by sin phi and by the sag force, which is proportional to D
     by_sag_force = (sag_force + tension * sine) / stretch
     by_sine = tension * sag_force / stretch
     stretch_x = by_sag_force * sag_force * cosine / chord - by_sine * sine * cosine / chord

@@ -15,7 +15,7 @@ Terms = tuple[int, float, float, float]  # a Model as it comes from Python: numb
 class Model(NamedTuple):
     """A cable model where it stands."""
 
-    code: int  # which equations
+    code: int  # code of the equations
     k_h: float  # the empirical model's constant of the sag force
     k_p: float  # the empirical model's constant of the sag
     gravity: float  # [m/s^2]

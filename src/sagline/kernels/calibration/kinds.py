@@ -1,6 +1,6 @@
 """Rows of the table that says which unknown, if any, a number of the robot is: (KIND_ROWS, m), -1 for none.
 
-What the platform or the measuring system has once stands in the column of the first cable.
+Single values of the platform or the measuring system are in the column of the first cable.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ DRUM = 7  # drum radius [m]
 DENSITY = 8  # [kg/m]
 STIFFNESS = 9  # [N]
 RADIUS = 10  # of the pulley [m]
-DEAD = 11  # dead cable [m]
+DEAD = 11  # dead length [m]
 GAIN = 12  # of the load cell
 BIAS = 13  # of the load cell [N]
 PER_CABLE = 14

@@ -113,7 +113,7 @@ def store_linearization(
 @formula
 def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Triple:
     """Rotation vector, in the measuring system's axes, from the platform's predicted rotation to that read."""
-    # what the system should read: conj(frame) * pose
+    # predicted reading of the system: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
     ax = fw * pose[3] + fx * pose[6] + fy * pose[5] - fz * pose[4]
     ay = fw * pose[4] + fy * pose[6] + fz * pose[3] - fx * pose[5]

@@ -17,7 +17,7 @@ from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, vector
 
 ITERATIONS = 3  # of balancing: what the cables' weight sag forces changes little with the tensions
-LEAST = 0.2  # of a tension that was read: balancing takes no more of it away
+LEAST = 0.2  # of a tension that was read: largest decrease by balancing
 
 
 @entry

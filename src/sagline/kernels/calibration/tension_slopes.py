@@ -25,7 +25,7 @@ class _FrameEndSlopes(NamedTuple):
     by_density: float  # [N m/kg]
     by_stiffness: float  # by EA
     by_radius: float  # by that of the pulley [N/m]
-    by_dead: float  # by the dead cable [N/m]
+    by_dead: float  # by the dead length [N/m]
 
 
 @formula

@@ -42,8 +42,8 @@ class PoseReadings(NamedTuple):
 class Unknowns(NamedTuple):
     """The P numbers that are looked for."""
 
-    where: Indices  # which number each row of `kinds` is, (KIND_ROWS, m), -1 for none
-    scale: Array  # what one of it changes of that row, (KIND_ROWS, m)
+    where: Indices  # parameter of each row of `kinds`, (KIND_ROWS, m), -1 for none
+    scale: Array  # derivative of that row by it, (KIND_ROWS, m)
     paid: Array  # slopes of the lengths that the winches say, by zero, drum radius and EA, (3, N, m)
 
 
@@ -56,7 +56,7 @@ class Linearization(NamedTuple):
     matrix: Array  # whitened slopes, (N, R, P); rows without a reading are zero
     misfit: Array  # whitened residuals, (N, R)
     residual: Array  # as they are, readings less predictions at the lengths given [N, m, rad], (N, m + 6); NaN for none
-    back: Array  # what a whitened residual changes of the true lengths [m], (N, m, R)
+    back: Array  # change of the true lengths by a whitened residual [m], (N, m, R)
     # of the platform about its center of mass [m, rad], world axes: by each cable's length, and in the last row by the
     # first of the P, (N, m + 1, 6); (0, m + 1, 6) where it is not wanted
     motion: Array

@@ -26,12 +26,12 @@ def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: f
 
 
 # columns of the chain table, a row for each cable
-EXIT_X, EXIT_Y, EXIT_Z = 0, 1, 2  # where the chain leaves the frame, world axes [m]
+EXIT_X, EXIT_Y, EXIT_Z = 0, 1, 2  # exit point of the chain, world axes [m]
 ELEMENT = 3  # unstrained length of an element [m]
 DENSITY, STIFFNESS = 4, 5  # [kg/m], [N]
 LOSS_TIME = 6  # [s]
 AIR_RATE = 7  # force of the air on a length, by its velocity and its mass [1/s]
-BEHIND, RUN = 8, 9  # what lies on pulley and dead cable: unstrained, and its way from drum to exit [m]
+BEHIND, RUN = 8, 9  # cable on the pulley and dead length: unstrained, and its path from drum to exit [m]
 WIND = 10  # force of the wind on a length, by the square of its speed [N s^2/m^3]
 SMOOTH = 11  # share of a step's mean tension in that by which a slack cable is known
 GRAVITY = 12  # [m/s^2]

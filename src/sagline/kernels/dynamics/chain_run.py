@@ -32,7 +32,7 @@ Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, l
 class _Chains(NamedTuple):
     """The chains of m cables, with room for P nodes each."""
 
-    table: Array  # what they are, (m, CHAIN_COLUMNS)
+    table: Array  # their parameters, (m, CHAIN_COLUMNS)
     place: Array  # of the nodes [m], (m, 3, P)
     speed: Array  # of the nodes [m/s], (m, 3, P)
     pulls: Array  # forces by length of the elements [N/m], (m, P)

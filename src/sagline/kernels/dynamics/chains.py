@@ -193,7 +193,7 @@ def run_chains(
     steps: int,
     every: int,
 ) -> None:
-    """Go on for some steps; a run that is ready goes on where the last call ended, bit by bit the same.
+    """Go on for some steps; a prepared run continues at the end of the last call, identical to the last bit.
 
     Args:
         rules: See `Rules`; the loops of drums are closed every so many steps.
@@ -210,7 +210,7 @@ def run_chains(
         records: Filled as in `motion.run_massless`; and points of the cables (R, m, points, 3) at equal material steps
         from the
             exit on.
-        steps: How many steps to take, fewer where there is no room left for the notes of another. With 0 the state at
+        steps: Number of steps, fewer without space for the records of another. With 0 the state at
             hand is recorded.
         every: After how many steps one is recorded, the start first.
     """

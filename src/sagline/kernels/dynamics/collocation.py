@@ -153,7 +153,7 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
 OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
 ROOM = (5 * STAGES, 20)  # of the numbers to work in
-MESHES = 8  # tried in turn where a joint of elements is about at a node of the cable up to there
+MESHES = 8  # tried in turn if a joint of elements is near a node of the cable up to that joint
 SHORTER = 0.0618034  # by which share each has shorter elements: no ratio of small numbers, which would meet nodes again
 ROUNDING = 2.0**-52  # by which mu grows with them, should the frequency be a held one to the last bit
 CLEAR = 1e-6  # of what a joint moves at rest: one that moves less is at a node, and digits would be lost

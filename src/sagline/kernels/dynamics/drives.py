@@ -77,11 +77,11 @@ RATE = 0  # dL/dt of the unstrained length [m/s]
 WOUND, SPEED = 1, 2  # s let out [m], and its rate [m/s]
 FORCE, INTEGRAL = 3, 4  # of the motor at the cable, outward; that of its loop [N]
 AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # tension at the frame end, damping with it; H, tension at the drum without [N]
-STRETCHING = 8  # what damping adds to H [N]
+STRETCHING = 8  # damping part of H [N]
 FILTERED = 9  # tension at the frame end behind the load cell's filter [N]
 PEAK = 10  # largest tension at the frame end [N]
 HELD, SATURATED, SLACK = 11, 12, 13  # NO, YES, or NEW until it is noted
-STORED = 14  # strain of the cable that goes on or off the drum
+STORED = 14  # strain of the cable that enters or leaves the drum
 BEFORE, BEFORE_WHOLE, BEFORE_DRUM = 15, 16, 17  # L, H and tension at the drum one step before
 PULL = 18  # tension at the frame end without what damping adds [N]; of cables without mass
 DRIVE_ROWS = 19
@@ -97,7 +97,7 @@ BEHIND_RISE = 10  # height of the frame end above the drum [m]
 DRAG = 11  # force of the wind on a length, by the square of its speed [N s^2/m^3]
 DATA_ROWS = 12
 
-# what a run adds up, [J]
+# sums over a run [J]
 SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
 START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start, of which potential [J]; the time of step 0 [s]
 MOVED = 8  # the most that has been in motion
@@ -111,10 +111,10 @@ class Drives(NamedTuple):
 
     kind: int  # IDEAL, SECOND_ORDER or DRUMS
     remembered: bool  # whether the drum remembers at which tension it was wound
-    data: Array  # what they are, (DATA_ROWS, m)
-    now: Array  # what they do, (DRIVE_ROWS, m)
+    data: Array  # their parameters, (DATA_ROWS, m)
+    now: Array  # their state, (DRIVE_ROWS, m)
     layers: Array  # strain of the cable on the drums, bin by bin, (m, B)
-    audit: Array  # what is added up, (AUDIT_SIZE,)
+    audit: Array  # sums over the run, (AUDIT_SIZE,)
 
 
 @formula
@@ -216,7 +216,7 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
 
 @formula
 def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
-    """Tension at the drum [N] from H there, that at the frame end less the weight of what hangs between them."""
+    """Tension at the drum [N] from H there, that at the frame end less the weight of the cable between them."""
     fallen = whole - lifted
     return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
 
@@ -243,7 +243,7 @@ def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begin
 
 @glue
 def store_step_start(drives: Drives, rows: Array) -> None:
-    """Keep what `add_winch_energy` needs to know of a step's begin."""
+    """Store the data of a step's begin for `add_winch_energy`."""
     for i in range(rows.shape[1]):
         drives.now[BEFORE, i] = rows[g.LENGTH, i]
         drives.now[BEFORE_WHOLE, i] = drives.now[WHOLE, i]

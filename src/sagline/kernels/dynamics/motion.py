@@ -175,7 +175,7 @@ def splitting_step(run: MasslessRun, now: float) -> None:
 
 @glue
 def _start_run(run: MasslessRun, records: Records, room: Array) -> None:
-    """Look at where a run begins, or goes on after something happened to it."""
+    """Prepare the start of a run, or its continuation after an event."""
     at, now = run.at, run.drives.now
     time = run.drives.audit[d.BEGIN] + at[progress.STEPS] * run.step
     at[progress.READY] = 1
@@ -204,7 +204,7 @@ def run_massless(
     steps: int,
     every: int,
 ) -> None:
-    """Go on for some steps; a run that is ready goes on where the last call ended, bit by bit the same.
+    """Go on for some steps; a prepared run continues at the end of the last call, identical to the last bit.
 
     Args:
         model: See `ModelTerms`.
@@ -213,12 +213,12 @@ def run_massless(
         robot: Rows of the cable_table, anchors in the platform's principal axes from its center of mass; body with
             its center at zero; inertia; and free motions (n, 6).
         data: Of the drives, (DATA_ROWS, m).
-        courses: Of lengths, of wrenches and of the wind's velocity. Lengths (K, m) are unstrained, but for drums:
+        courses: Of lengths, of wrenches and of the wind's velocity. Lengths (K, m) are unstrained, except for drums:
             lengths s along the path of winding, then expected tensions, (K, 2 m).
-        kept: What a run is in the midst of, in and out, and room for numbers.
+        kept: State of a run, in and out, and work arrays.
         records: Filled: states with the angular velocity in the momentum's place, tensions at the frame ends, lengths,
             energies, notes.
-        steps: How many steps to take, fewer where there is no room left for the notes of another. With 0 the start
+        steps: Number of steps, fewer without space for the records of another. With 0 the start
             alone is looked at.
         every: After how many steps one is recorded, the start first; 0 for the last one.
     """

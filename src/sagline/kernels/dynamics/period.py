@@ -25,7 +25,7 @@ def begin_period(
 
     Args:
         given: Unstrained lengths (m,); of drums tensions that are expected (m,), else none; wrench (6,).
-        least: What lengths must be longer than, (m,).
+        least: Lower bounds of the lengths, (m,).
         stretch: From unstrained lengths to those that the course is of, (m,).
         lengths: Unstrained lengths where the last period ended, and where this one does, (2, m).
         course: See `tables_in_time.Course`, of two instants.

@@ -87,7 +87,7 @@ def _longest_element(string: String, start: float, end: float, omega: float, pha
 
 @formula
 def is_at_end(string: String, s: float) -> bool:
-    """True if the sum of the elements' lengths equals the cable's but for rounding."""
+    """True if the sum of the elements' lengths equals the cable's except for rounding."""
     return s >= string.length * (1.0 - 1e-12)
 
 

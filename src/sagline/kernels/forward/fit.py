@@ -1,6 +1,6 @@
 """Forward kinematics of straight cables: the pose whose distances fit the lengths best, by Levenberg and Marquardt.
 
-For comparison with the exact cable. Straight cables that are too long or too short to meet are not told from taut
+For comparison with the exact cable. Straight cables that are too long or too short are not distinguished from taut
 ones: every length counts alike, and mirrored poses fit as well as the right one.
 """
 

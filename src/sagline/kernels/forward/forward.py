@@ -135,7 +135,7 @@ def _find_pose(
 def _fill_stability(
     problem: PoseProblem, pose: Array, arcs: Array, size: float, space: ForwardArrays, numbers: Array
 ) -> int:
-    """Fill the numbers of the pose that space holds, but for residuals and steps; returns the status."""
+    """Fill the numbers of the pose in the work arrays, except for residuals and steps; returns the status."""
     model, cables, body = problem.model, problem.cables, problem.body
     numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
     symmetric_part(arcs, space.stiffness, space.matrix)

@@ -134,13 +134,13 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
 
     0 steps where that is in doubt: the stiffness is not positive definite, or the first step is not short; the pose has
     not moved then and matrix is its stiffness. -1 where the steps do not shrink as they should. On return space is that
-    of the pose, but for the stiffness. The skew part, half a given moment, is left out: it takes a step more.
+    of the pose, except for the stiffness. The skew part, half a given moment, is left out: it takes a step more.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     rotation, rows, gradient = space.rotation, space.rows, space.gradient
     part, step = space.part, space.step
     best, before = math.inf, NEAR / SHRINKING
-    age = math.inf  # how far away the stiffness was factored
+    age = math.inf  # distance from the pose of the factored stiffness
     steps = -1
     size = 0.0
     last = False
@@ -167,7 +167,7 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
         if not length <= SHRINKING * before:
             steps = -min(iteration, 1)
             break
-        last = length * length <= LAST_DIGIT * before  # each step is a share of the one before, as that was
+        last = length * length <= LAST_DIGIT * before  # the steps decrease at a constant ratio
         before = length
         age += length
         step_pose(free, body, pose, step, space.motion, space.trial)
@@ -217,8 +217,8 @@ def _newton_steps(
 def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
     """Newton on the wrench balance while it gets better, to the last digit; returns the number of steps.
 
-    good: an unbalance that counts as none. Before and on return space is that of the pose; the stiffness may be that of
-    a pose a rounding error away.
+    good: an unbalance that counts as none. The work arrays are those of the pose before and after; the stiffness
+    may be that of a pose at the distance of a rounding error.
     """
     best = components_along(problem.free, space.gradient, space.part)
     before = 0.0

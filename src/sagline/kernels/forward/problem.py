@@ -18,7 +18,7 @@ UNIT_SHARE = 0.2  # of the mean length: the displacement that counts as much as 
 ENERGY, FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN, ITERATIONS = 0, 1, 2, 3, 4
 FORWARD_NUMBERS = 5
 
-# columns of what a chain of samples remembers of the platform: pose, then wrench
+# columns of the state of a chain of samples: pose, then wrench
 LAST_WRENCH = tables.POSE_COLUMNS
 LAST_COLUMNS = LAST_WRENCH + 6
 
@@ -46,7 +46,7 @@ class Solutions(NamedTuple):
     results: Array  # span, rise, length, T_x, T_z, tau, (RESULT_ROWS, N, m)
     statuses: Codes  # status of each cable, (N, m)
     numbers: Array  # energy, residuals, smallest stiffness, iterations, (N, FORWARD_NUMBERS)
-    pose_statuses: Codes  # how each sample ended, (N,)
+    pose_statuses: Codes  # status of each sample, (N,)
 
 
 class LastEquilibrium(NamedTuple):

@@ -18,7 +18,7 @@ from sagline.kernels.forward.problem import ForwardSamples, ForwardTerms, Sample
 from sagline.kernels.jit import entry, formula, glue
 from sagline.kernels.memory import Memory, block, vector
 
-# which datum changes
+# index of the datum
 BY_LENGTH, BY_DENSITY, BY_STIFFNESS, BY_RADIUS, BY_DEAD = 0, 1, 2, 3, 4
 DATA = 5
 

@@ -1,1 +1,1 @@
-"""Least distances of hanging cables."""
+"""Least distances of sagging cables."""

@@ -1,7 +1,7 @@
-"""Least distances of cables as they hang, from each other, from rods and from boxes: certified, by branch and bound.
+"""Least distances of sagging cables from each other, from rods and from boxes: certified, by branch and bound.
 
-A piece of a cable lies within its bulge of its chord, so chords tell a lower bound; points of the cables themselves
-tell the upper one, which Newton's method takes to the last digit. Pieces whose lower bound is within the precision of
+A piece of a cable lies within its bulge of its chord, so chords give a lower bound; points of the cables themselves
+give the upper one, which Newton's method takes to the last digit. Pieces whose lower bound is within the precision of
 it are set aside, the others split: pieces of a cable are shared by all its pairs. docs/model.md, section 13.
 """
 
@@ -251,10 +251,10 @@ def least_distances(
     """Least distances of pairs at every pose, less their radii, with proved lower bounds and the nearest points.
 
     Args:
-        moving: What differs from pose to pose, shape (N, K, COLUMNS).
-        still: What does not, shape (S, COLUMNS).
+        moving: Shapes that differ between poses, shape (N, K, COLUMNS).
+        still: Shapes that do not, shape (S, COLUMNS).
         pairs: Which, numbered through both, a box behind what is none, shape (P, 2).
-        precision: How far the lower bound may stay below the distance [m].
+        precision: Largest difference of the lower bound from the distance [m].
         together: Whether the least of all distances of a pose is enough: of the others then only so much is known.
         pieces: Memory, of `work_arrays_for_pieces`.
         waiting: Memory.

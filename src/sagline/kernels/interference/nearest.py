@@ -8,7 +8,7 @@ from sagline.kernels.jit import kernel
 
 STEPS = 30
 HALVINGS = 6
-SMALL = 1e-8  # steps, as shares of a cable's length, after which no other counts: Newton squares what is left
+SMALL = 1e-8  # steps, as shares of a cable's length, after which no other counts: Newton's method squares the error
 FLAT = 1e-13  # of the product of curvatures, below which two cables run side by side
 
 
@@ -45,7 +45,7 @@ def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, f
             determinant = max(hss * htt - hst * hst, FLAT * uu * vv)
         ds = -(gs * htt - gt * hst) / determinant
         dt = -(gt * hss - gs * hst) / determinant
-        # a bound that is met on the way stays met: the other share alone goes on
+        # a bound that is reached stays active: the other share alone continues
         new_s, new_t = min(max(s + ds, one[FIRST]), one[LAST]), min(max(t + dt, other[FIRST]), other[LAST])
         if new_s != s + ds and new_t == t + dt:
             new_t = min(max(t - (gt + hst * (new_s - s)) / htt, other[FIRST]), other[LAST])

@@ -15,7 +15,7 @@ from sagline.kernels.jit import kernel
 KIND = 0
 PLACE = 1  # three: where a cable leaves the frame, a rod's start, a box's center [m]
 RADIUS = 4  # half the diameter, which is taken off distances [m]
-FIRST = 5  # where a cable or rod begins to count, as a share of its unstrained length; and where it ends
+FIRST = 5  # first and last measured point of a cable or rod, as shares of its unstrained length
 LAST = 6
 LEVEL = 7  # two: horizontal unit vector toward the platform end
 HORIZONTAL = 9  # T_x [N]                          | of a parabola: its span [m]

@@ -42,8 +42,8 @@ from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
 
-SUPPORT = 1e-9  # of the largest component along the proof: cables that count less do not stand against the wrench
-AT_LIMIT = 1e-9  # of a limit: what is this near stands at it
+SUPPORT = 1e-9  # of the largest component along the proof: cables that count less do not oppose the wrench
+AT_LIMIT = 1e-9  # of a limit: nearer values are at it
 PROVED, ENOUGH = 0, 1  # columns of the brackets
 
 
@@ -70,13 +70,13 @@ def decide_poses(
         robot_terms: As in `inverse_poses`.
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial, about the center of mass, (1 or N, 6).
-        which: Which poses, (K,).
+        which: Indices of the poses, (K,).
         covers: True if the method finds every feasible distribution; where it does not: POSE_NOT_COVERED.
         memory: `memory_for` as many cables.
-        answers: As in `inverse_poses`; filled anew for these poses.
+        answers: As in `inverse_poses`; overwritten for these poses.
         verdicts: Filled for these poses: what is proved and what suffices of the smallest change of the force [N],
             (N, 2); that change, along the free motions, (N, n), and Farkas vectors, (N, n), NaN where there is none;
-            whether a limit of a cable stands against the needed wrench, (N, m).
+            whether a limit of a cable opposes the needed wrench, (N, m).
     """
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
@@ -198,7 +198,7 @@ def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Ar
 
 @glue
 def _block_cables(cables: Cables, demand: Demand, change: TensionChange, blocking: Flags) -> None:
-    """Fill which cables (m,) stand at a limit that keeps them from giving more along the least change."""
+    """Fill which cables (m,) are at a limit that opposes the least change."""
     largest = 0.0
     for i in range(blocking.size):
         largest = max(largest, abs(component_along(demand.matrix, change.direction, i)))

@@ -67,7 +67,7 @@ def inverse_poses(
     Args:
         model_terms: Cable model: code, k_h, k_p.
         distribution_terms: Tension distribution: `Distribution`.
-        limit_terms: What tensions must keep: `TensionLimits`.
+        limit_terms: Limits of the tensions: `TensionLimits`.
         robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or N,
             BODY_COLUMNS); cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
@@ -160,7 +160,7 @@ def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p:
             results[tables.WRAP, p, i] = results[tables.WRAPPED, p, i] = math.nan
             results[tables.DEAD, p, i] = results[tables.SINE, p, i] = math.nan
     if solved:
-        tension = cables.last_sag_force  # where the cables leave; nobody asks for the sag forces before any more
+        tension = cables.last_sag_force  # exit points of the cables; the previous sag forces are no longer needed
         for i in range(m):
             tension[i] = cables.tau[i]
         if model.code == codes.CATENARY:

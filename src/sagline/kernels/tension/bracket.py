@@ -171,7 +171,7 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
 
 @glue
 def _first_range(curves: Curves, size: float, range_: Array) -> None:
-    """Fill the range that the limits allow, never a wider one, but for cables that are all but slack (LOOSEST).
+    """Fill the range that the limits allow, never a wider one, except for almost slack cables (LOOSEST).
 
     Where there is no upper limit, sagging cables are stretched to twice their length at most, and others carry a
     million times the largest force at hand.

@@ -15,7 +15,7 @@ from sagline.kernels.tension.norms import program_status
 from sagline.kernels.tension.on_polygon import centroid, feasible_corners
 from sagline.kernels.tension.polygon import WorkArrays
 
-THIN = 1e-9  # of the largest tension: a set thinner than this has no inside worth centering in
+THIN = 1e-9  # of the largest tension: thinner sets have no center
 NEWTON_STEPS = 200
 CENTERED = 1e-18  # square of the Newton decrement at which the center is found
 

@@ -28,7 +28,7 @@ from sagline.kernels.memory import Memory, block, vector
 
 NEWTON_STEPS = 40
 HALVINGS = 12
-STEADINESS = 1e-8  # what the square of a newton of changed tension weighs against that of a changed wrench
+STEADINESS = 1e-8  # weight of the squared change of a tension relative to that of the wrench
 DECREASE = 1e-4  # share of a full step's promise that a step must keep
 STIFFEST = 1e3  # largest weight of a bend, which the normal matrix still bears beside that
 STANDS = 1e-13  # of the largest force at hand: a step that promises less is none
@@ -41,7 +41,7 @@ class Demand(NamedTuple):
     matrix: Array  # J, what a chord tension gives, (n, m)
     hanging: Array  # G, what a sag force takes away, (n, m)
     right: Array  # wrench to be supplied beside the sag forces, (n,)
-    soft: int  # how many of the rows, the first ones, may leave something; the others, hard ones, leave nothing
+    soft: int  # number of soft rows, the first ones; the other rows are hard
     size: float  # the largest force at hand [N], by which tolerances are measured
 
 
@@ -50,7 +50,7 @@ class TensionChange(NamedTuple):
 
     tau: Array  # chord tensions [N], (m,)
     sag_force: Array  # their sag forces [N], (m,)
-    residual: Array  # what they leave of the demand [N], moments per lever arm, (n,)
+    residual: Array  # residual of the demand [N], moments per lever arm, (n,)
     direction: Array  # y, along which the rest is; moments per lever arm, (n,)
 
 
@@ -64,13 +64,13 @@ class _Tangents(NamedTuple):
     inverse: Array  # transposed pseudo-inverse of the hard rows, (h, m)
     soft: Array  # the soft rows along the null space of the hard ones, (k, d)
     normal: Array  # normal matrix of these and the weight of change, then its factor, (d, d)
-    rows: Array  # what each unknown changes the tensions by, (d, m)
+    rows: Array  # derivatives of the tensions by the unknowns, (d, m)
     bounds: Array  # tensions that are best without limits, and the limits, (3, m)
     unknowns: Array  # A right side, a target of zeros and the point, (3, d)
-    held: ActiveSet  # limits that the last point stands on
+    held: ActiveSet  # active limits of the last point
     push: Array  # slopes of the sag forces, then what the limits push with, (m,)
-    bend: Array  # what the square of a change of each tension weighs, (m,)
-    multipliers: Array  # what the step before left, and what its hard rows cost [N], (n,)
+    bend: Array  # weights of the squared changes of the tensions, (m,)
+    multipliers: Array  # residual of the last step, and multipliers of its hard rows [N], (n,)
     trial: tuple[Array, Array, Array]  # tensions, (m,), sag forces, (m,), and residual of a step that is tried, (n,)
 
 
@@ -124,7 +124,7 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
     """Fill the tangents at given tensions, and the normal matrix; False where the hard rows depend on each other.
 
     The curves' bend counts with the multipliers (n,) of the step before, where it is against going on: without it the
-    steps go to and fro across a valley.
+    steps oscillate across a valley.
     """
     n, m = step.matrix.shape
     soft = demand.soft

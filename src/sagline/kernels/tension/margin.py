@@ -103,7 +103,7 @@ def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
         needed: Wrench to supply, in the same rows, (n,).
         low: Least tensions (m,).
         high: Largest tensions (m,), may be infinite.
-        translations: How many of the rows are forces.
+        translations: Number of rows that are forces.
         memory: To work in.
     """
     n, m = matrix.shape

@@ -20,7 +20,7 @@ from sagline.kernels.memory import Memory, block
 class Distribution(NamedTuple):
     """Tension distribution of one pose."""
 
-    method: int  # which choice
+    method: int  # code of the method
     parameter: float  # its exponent, or which optimum of the polygon walk
     variable: int  # in which variable
     weight: Array  # root weights of the cables, (m,)

@@ -119,7 +119,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
                 if lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack:
                     met[k] = 1
             met[turn] = 1
-            # its border ends here, where the walk goes on: it will be the last side to be passed
+            # its border ends here, where the walk continues: it will be the last side to be passed
             first_line = line
             count = 0
     return -1

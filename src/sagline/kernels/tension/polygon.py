@@ -2,7 +2,7 @@
 
 Cable i allows low_i <= t0_i + N_i . lambda <= high_i: a bound. A polygon is kept as its corners, counter-clockwise,
 each with the label of the side that leaves it: 2i for the lower limit of cable i, 2i + 1 for its upper limit, and from
-2m on for the sides of the box that stands in for infinity.
+2m on for the sides of the box that replaces infinity.
 """
 
 from __future__ import annotations
@@ -235,7 +235,7 @@ class WorkArrays(NamedTuple):
 
     corners: Array  # of the feasible polygon, (2m + SPARE_CORNERS, 2)
     labels: Indices  # of its sides, (2m + SPARE_CORNERS,)
-    known: Indices  # how many corners the polygon of the last iteration had, (1,); 0 for none
+    known: Indices  # number of corners of the last polygon, (1,); 0 for none
     basis: Basis  # of the linear program of the last iteration
     rest: Memory  # memory that keeps nothing
 

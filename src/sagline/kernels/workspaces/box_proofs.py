@@ -23,7 +23,7 @@ ITERATIONS = 3  # of that estimate
 class Precision(NamedTuple):
     """Allowances of the proofs; tests switch them off."""
 
-    bends: float  # how much of what the slopes leave out is counted: 1
+    bends: float  # weight of the terms beyond the linear prediction: 1
     rounding: float  # error of a sum, of the sum of its parts' sizes
 
 
@@ -263,7 +263,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3
     arm = norm3(direction[3], direction[4], direction[5])
-    turned_arm = 0.0  # how far the moment part of y goes
+    turned_arm = 0.0  # change of the moment part of y
     square = 0.0
     for motion in range(motions):
         length = norm3(turning[motion, 3], turning[motion, 4], turning[motion, 5])

@@ -2,8 +2,8 @@
 
 Centered tensions make sum over cables of -log(tau - low) - log(high - tau), times a smoothing, plus half the square of
 what is left of the demand, least. Where the demand can be balanced they are near the analytic center; where not, what
-is left points along the direction that separates the demand from all that the cables give, but for the square root of
-the smoothing. Primal-dual Newton steps, each one system of as many unknowns as the platform has free motions.
+is left points along the direction that separates the demand from all that the cables give, except for the square root
+of the smoothing. Primal-dual Newton steps, each one system of as many unknowns as the platform has free motions.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sagline.kernels.workspaces.sag_force_bounds import has_sag, largest_sag_for
 STEPS = 40
 REDUCTION = 0.1  # of the smoothing, at most, with each step
 TO_LIMIT = 0.95  # share of the way to a limit that a step may go
-CENTERED = 0.2  # relative error of slack times push at which the center is found: nothing depends on it but luck
+CENTERED = 0.2  # relative error of slack times push of the center; it affects only the chance of success
 FARTHEST = 50.0  # of all forces at hand: where there is no limit, tensions are sought up to so much
 
 
@@ -34,11 +34,11 @@ class Centered(NamedTuple):
     low: Array  # limits of the tensions [N], (m,)
     high: Array  # (m,), finite
     tau: Array  # tensions, strictly inside, (m,)
-    below: Array  # what the lower limits push with [N], (m,), > 0
-    above: Array  # what the upper ones do, (m,), > 0
+    below: Array  # barrier forces of the lower limits [N], (m,), > 0
+    above: Array  # those of the upper limits, (m,), > 0
     give: Array  # inverse of how stiffly the limits hold each tension, (m,)
-    right: Array  # what the chord tensions have to supply [N], (n,)
-    left: Array  # what they leave of it, (n,)
+    right: Array  # demand on the chord tensions [N], (n,)
+    left: Array  # its residual, (n,)
     normal: Array  # working space, (n, n)
     vector: Array  # working space, (n,)
 
@@ -173,10 +173,10 @@ LEAST_WAY = 1e-4  # of a chord: a smaller box is smoothed as one so large
 class Ranges(NamedTuple):
     """Limits of the chord tensions that hold all over a box [N]."""
 
-    low: Array  # what no limit exceeds, (m,): for inside
-    high: Array  # what no limit falls below, nor stretches a cable to more than twice its length; may be infinite
-    lowest: Array  # what no limit falls below: for outside
-    highest: Array  # what no limit exceeds, or no load can cause; may be infinite
+    low: Array  # upper bound of the limits, (m,): for inside
+    high: Array  # lower bound of the limits, up to twice the length of a cable; may be infinite
+    lowest: Array  # lower bound of the limits: for outside
+    highest: Array  # upper bound of the limits, or of tensions by the load; may be infinite
     sag_force: Array  # sag forces at the centered tensions
 
 

@@ -1,4 +1,4 @@
-"""The cables over a box of poses: how they stand at its middle, and how far from that they get in it.
+"""The cables over a box of poses: geometry at its middle, and its largest change in the box.
 
 A box holds the positions no farther than half an edge from its middle along each axis, at every orientation that one
 turn by no more than an angle, about any axis, makes of the one at the middle. Where the angle is zero all of them have
@@ -35,11 +35,11 @@ class CablesInBox(NamedTuple):
     matrix: Array  # its components along the rows, (n, m)
     lever: Array  # from center of mass to platform end, world axes [m], (3, m)
     slopes: Array  # of the structure matrix with each motion of the platform, (MOTIONS, 6 * m)
-    way: Array  # how far a platform end goes [m], (m,)
-    turned: Array  # how far a unit vector goes, (m,)
-    bent: Array  # how far it gets from where its slopes lead, (m,)
-    swung: Array  # how far a lever goes [m], (m,)
-    curled: Array  # how far it gets from where its slopes lead [m], (m,)
+    way: Array  # largest displacement of a platform end [m], (m,)
+    turned: Array  # largest change of a unit vector, (m,)
+    bent: Array  # its largest deviation from the linear prediction, (m,)
+    swung: Array  # largest change of a lever [m], (m,)
+    curled: Array  # its largest deviation from the linear prediction [m], (m,)
 
 
 @glue
@@ -115,7 +115,7 @@ def _set_slopes(geometry: Array, rotation: Array, center: Array, box: PoseRange,
         for i in range(m):
             x, y, z = place.full[0, i], place.full[1, i], place.full[2, i]
             rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
-            bx = by = bz = 0.0  # how the platform end moves
+            bx = by = bz = 0.0  # displacement of the platform end
             sx = sy = sz = 0.0  # and the lever
             if motion == 0:
                 bx = 1.0

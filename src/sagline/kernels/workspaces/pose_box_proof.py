@@ -60,7 +60,7 @@ def prove_boxes(
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
-        limit_terms: What tensions must keep: `TensionLimits`.
+        limit_terms: Limits of the tensions: `TensionLimits`.
         robot_terms: Rows of the structure matrix that count, (n, 6); body_table (1, BODY_COLUMNS); cable_table,
             (1, m, CABLE_COLUMNS), without pulleys.
         load_terms: The wrenches to bear: `Loads`.

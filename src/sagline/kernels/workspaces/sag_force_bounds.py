@@ -32,7 +32,7 @@ BAND_ROWS = 7
 
 @glue
 def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
-    """Fill the bands of the cables in place; False where one is too slack to hang, whatever its tension.
+    """Fill the bands of the cables in place; False where one is too slack at any tension.
 
     Tensions below which a cable's X = wD/(2 tau) is above LOOSEST are left out: with a least tension of zero the sag
     force has no largest value.
@@ -113,13 +113,13 @@ SMALL = 1e-3  # X below which series do
 
 @formula
 def _sinh_ratio(x: float) -> float:
-    """An upper bound of sinh(x)/x, its value but for small x."""
+    """An upper bound of sinh(x)/x, its value except for small x."""
     return math.sinh(x) / x if x > SMALL else 1.0 + x * x / 3.0
 
 
 @formula
 def _slack_rate(x: float) -> float:
-    """An upper bound of x cosh x - sinh x, its value but for small x."""
+    """An upper bound of x cosh x - sinh x, its value except for small x."""
     return x * math.cosh(x) - math.sinh(x) if x > 0.1 else 0.34 * x * x * x
 
 

@@ -55,7 +55,7 @@ PURE = 1e-9  # force part of a normal of length 1, moments times the lever arm, 
 
 # Rows of what counts of the cables (COUNT_ROWS, m).
 WIDTH = 0  # half the range of the tensions
-SLOPE = 1  # half of how far the sag force grows from end to end
+SLOPE = 1  # half the increase of the sag force from end to end
 UNSURE = 2  # half the range of the sag force
 LEVER_X, LEVER_Y = 3, 4
 COLUMN = 5  # of the structure matrix, six rows
@@ -69,8 +69,8 @@ TOGETHER = 64
 OF_A_SUBSET = 20  # of the other columns: so many normals at most, 6 over 3
 NORMAL = 0  # six rows
 ROUNDING = 6 * TOGETHER
-BY_ENDS, BY_TENSIONS, BY_SAG_FORCES = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # what the cables give about the points
-AGAINST, FOR = 10 * TOGETHER, 11 * TOGETHER  # how far the set reaches to either side
+BY_ENDS, BY_TENSIONS, BY_SAG_FORCES = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # wrench of the cables about the points
+AGAINST, FOR = 10 * TOGETHER, 11 * TOGETHER  # extent of the set in both directions
 UP, DOWN = 12 * TOGETHER, 13 * TOGETHER  # the most that a cable without limit counts to either side
 WORK = 14 * TOGETHER  # two rows
 LENGTH = 16 * TOGETHER  # the inverse of the normal's
@@ -89,7 +89,7 @@ class _FacetWeights(NamedTuple):
     """Weights of the facets of one pose."""
 
     rows: Array  # of the cables, (COUNT_ROWS, m)
-    # what the cables give in the middle of their ends, and of their sag forces' ranges, less the demand, (2, 6)
+    # wrench of the cables at the middle of their limits, and of their sag forces' ranges, less the demand, (2, 6)
     points: Array
     high: Array  # upper limits [N], (m,)
     endless: bool  # whether a cable has none
@@ -114,7 +114,7 @@ def signed_margins(
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
-        limit_terms: What tensions must keep: `TensionLimits`.
+        limit_terms: Limits of the tensions: `TensionLimits`.
         robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or R,
             BODY_COLUMNS); cable_table, (1 or R, m, CABLE_COLUMNS); the first N/R poses are the first robot's and so on.
         set_terms: The set of loads.
@@ -214,7 +214,7 @@ def _fill_weights(body: Array, center: Array, geometry: Array, bands: Array, row
 
 @glue
 def _subtract_sag_force(point: Array, sag_force: float, x: float, y: float) -> None:
-    """Take what a cable's sag force hangs on the platform at a lever from what the cables give, (6,)."""
+    """Subtract the wrench of a cable's sag force at a lever from the wrench of the cables, (6,)."""
     point[2] -= sag_force
     point[3] -= sag_force * y
     point[4] += sag_force * x
@@ -247,7 +247,7 @@ def _measure_all_facets(
             held = 0
         if depth < 0:
             break
-    margin[BELOW] = min(margin[BELOW], margin[VALUE])  # but for rounding they are
+    margin[BELOW] = min(margin[BELOW], margin[VALUE])  # except for rounding they are
     margin[ABOVE] = max(margin[ABOVE], margin[VALUE])
     for k in range(3):
         if abs(margin[k]) >= AS_GOOD_AS_INFINITE:

@@ -1,0 +1,185 @@
+"""A first robot from a few numbers: a box frame, a box platform, six to eight equal cables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sagline.cables.rope import ROPES, SAFETY
+from sagline.core.arguments import choice
+from sagline.core.arrays import Array, checked
+from sagline.core.errors import InvalidValueError
+from sagline.robot.inertia import box_inertia
+from sagline.robot.pose import PoseBox
+from sagline.robot.robot import Robot
+
+LAYOUTS: Final = ("top", "mixed", "bottom")
+COUNTS: Final = {"top": (8, 6), "mixed": (8, 7)}
+THINNEST, THICKEST = 0.0003, 0.08  # m, of usual ropes
+SLACK_LIMIT = 0.05  # lowest tension, of the platform's weight
+_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, of the edges
+_POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # a triangle in the same rectangle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Design:
+    """Data of a first robot.
+
+    Attributes:
+        name: Name of the robot.
+        frame: Edges of the frame [m], shape (3,); on the floor around the origin.
+        platform: Edges of the platform [m], shape (3,).
+        mass: Mass of the platform with its load [kg].
+        rope: Name in the catalogue of ropes.
+        diameter: Diameter of the rope [m].
+        cables: Number of cables, 6 to 8.
+        layout: "top" (all cables from above) or "mixed" (from above and from below).
+    """
+
+    name: str
+    frame: Array
+    platform: Array
+    mass: float
+    rope: str
+    diameter: float
+    cables: int
+    layout: str
+
+    def __init__(
+        self,
+        name: str,
+        frame: ArrayLike,
+        platform: ArrayLike,
+        mass: float,
+        rope: str = "dyneema-sk78",
+        diameter: float = 0.006,
+        cables: int = 8,
+        layout: str = "top",
+    ) -> None:
+        """Check what the robot itself would not, or would say in other words.
+
+        Args:
+            name: Name of the robot.
+            frame: Edges of the frame [m], shape (3,).
+            platform: Edges of the platform [m], shape (3,), smaller.
+            mass: Mass of the platform with its load [kg].
+            rope: Name in the catalogue of ropes.
+            diameter: Diameter of the rope [m], 0.3 mm to 80 mm.
+            cables: Number of cables, 6 to 8.
+            layout: "top" or "mixed".
+
+        Raises:
+            InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot carry a load,
+                or there is no such rope.
+        """
+        outer = checked(frame, "frame", "m", shape=(3,), above=0.0)
+        inner = checked(platform, "platform", "m", shape=(3,), above=0.0)
+        if (inner >= outer).any():
+            axis = int(np.argmax(inner >= outer))
+            raise InvalidValueError(
+                f"platform[{axis}]", f"{inner[axis]:g} m", f"< frame[{axis}], {outer[axis]:g} m", "Take a smaller one."
+            )
+        if choice(layout, "layout", LAYOUTS) == "bottom":
+            raise InvalidValueError(
+                "layout", "'bottom'", "top, mixed", "Cables from below only pull down; some must come from above."
+            )
+        if cables not in COUNTS[layout]:
+            allowed = " or ".join(map(str, COUNTS[layout]))
+            raise InvalidValueError(f"cables of layout {layout}", cables, allowed, "Choose another number or layout.")
+        choice(rope, "rope", tuple(ROPES))
+        if not THINNEST <= diameter <= THICKEST:
+            raise InvalidValueError(
+                "diameter",
+                f"{diameter:g} m",
+                f"{1e3 * THINNEST:g} mm to {1e3 * THICKEST:g} mm",
+                "Give it with its unit.",
+            )
+        values = (name, outer, inner, float(mass), rope, float(diameter), int(cables), layout)
+        for field, value in zip(fields(self), values, strict=True):
+            object.__setattr__(self, field.name, value)
+
+    def robot(self) -> Robot:
+        """The robot, its limits from its weight and its ropes.
+
+        Returns:
+            Robot; what was assumed is marked as such.
+
+        Raises:
+            InvalidValueError: If the ropes are too weak for any tension between the limits, or a number is wrong.
+        """
+        rope = ROPES[self.rope]
+        cable = rope.cable(self.diameter)
+        weakest = SLACK_LIMIT * self.mass * 9.81
+        strongest = rope.breaking_force(self.diameter) / SAFETY
+        if strongest <= weakest:
+            raise InvalidValueError(
+                "diameter", f"{1e3 * self.diameter:g} mm", "a rope that can carry the load", "Take a thicker rope."
+            )
+        frame, platform = self._anchors()
+        return Robot(
+            name=self.name,
+            frame_anchors=frame,
+            platform_anchors=platform,
+            cables=cable,
+            mass=self.mass,
+            inertia=box_inertia(self.mass, *self.platform),
+            tension_min=weakest,
+            tension_max=strongest,
+            platform_size=self.platform,
+            frame_size=self.frame,
+            source=f"sagline new: {self.cables} cables, {self.layout}, {rope.description}, {1e3 * self.diameter:g} mm",
+            assumed={
+                "cables": f"{rope.source}; {rope.assumed}",
+                "inertia": "a solid box of the platform's size",
+                "tension_min": f"{100 * SLACK_LIMIT:g} % of the platform's weight, so that no cable is slack",
+                "tension_max": f"breaking force {SAFETY * strongest:,.0f} N over a safety of {SAFETY:g}",
+            },
+        )
+
+    def placed(self, share: float) -> PoseBox:
+        """The middle of the frame, a share of each of its edges.
+
+        share: of each edge of the frame that the platform leaves free, 0 to 1.
+        """
+        middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
+        half = 0.5 * share * (self.frame - self.platform)
+        return PoseBox(middle - half, middle + half)
+
+    def _anchors(self) -> tuple[Array, Array]:
+        """Frame and platform anchors, shape (m, 3) each."""
+        top = self.frame[2]
+        if self.layout == "top" and self.cables == 8:
+            frame, platform = _crossed()
+        elif self.layout == "top":
+            frame, platform = _octahedron()
+        else:
+            frame, platform = _mixed(_CORNERS if self.cables == 8 else _POSTS)
+        return frame * self.frame + np.array([0.0, 0.0, 0.5 * top]), platform * self.platform
+
+
+def _at(plane: Array, height: float) -> Array:
+    """Points of a plane at a height."""
+    return np.column_stack((plane, np.full(len(plane), height)))
+
+
+def _crossed() -> tuple[Array, Array]:
+    """Two cables from each top corner, to the next upper and to the previous lower corner of the platform."""
+    frame = np.repeat(_at(_CORNERS, 0.5), 2, axis=0)
+    upper, lower = _at(np.roll(_CORNERS, -1, axis=0), 0.5), _at(np.roll(_CORNERS, 1, axis=0), -0.5)
+    return frame, np.stack((upper, lower), axis=1).reshape(-1, 3)
+
+
+def _octahedron() -> tuple[Array, Array]:
+    """Two cables from each of three posts, to the two nearest corners of a triangle turned by half a turn."""
+    frame = np.repeat(_at(_POSTS, 0.5), 2, axis=0)
+    triangle = _at(-_POSTS, 0.5)  # corner k lies opposite post k
+    return frame, triangle[[1, 2, 2, 0, 0, 1]]
+
+
+def _mixed(below: Array) -> tuple[Array, Array]:
+    """From each top corner to the lower platform corner next to it, from points of the floor to upper ones."""
+    frame = np.concatenate((_at(_CORNERS, 0.5), _at(below, -0.5)))
+    return frame, np.concatenate((_at(_CORNERS, -0.5), _at(below, 0.5)))
