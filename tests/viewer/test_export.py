@@ -48,7 +48,7 @@ def test_glb_holds_pulleys_as_they_have_turned_and_what_is_behind() -> None:
     winch = sl.Winch(pulley_radius=[0.0] + [0.3] * 7, dead_cable=2.0, dead_rise=[2.0] * 4 + [1.0] * 4, drum_radius=0.2)
     robot, pose = ROBOT.replace(winches=winch), sl.Pose([1.0, 0.5, 2.0], np.eye(3))
     scene = exported(robot, pose)
-    behind = {f"dead cable {i}" for i in range(4)} | {f"dead cable {i}, path not known" for i in range(4, 8)}
+    behind = {f"dead length {i}" for i in range(4)} | {f"dead length {i}, path not known" for i in range(4, 8)}
     assert set(scene.geometry) == {
         "frame",
         "winches",

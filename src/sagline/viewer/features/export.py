@@ -63,7 +63,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
     thin = _DEAD_RADIUS * shapes.size_of(robot)
     for i, (run, known) in enumerate(zip(*shapes.dead_runs(robot), strict=True)):
         if run[0, 2] != run[1, 2]:
-            name = f"dead cable {i}" if known else f"dead cable {i}, path not known"
+            name = f"dead length {i}" if known else f"dead length {i}, path not known"
             _add(scene, name, shapes.rod(run, thin), STEEL)
     _add(scene, "platform", shapes.platform_solid(robot), PLATFORM if snapshot.feasible else INFEASIBLE, place)
     colors = scale.colors(snapshot.tension)
