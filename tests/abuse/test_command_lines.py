@@ -67,7 +67,7 @@ def short_of_work(stocked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagline.cli.run.CELLS", 4)
     monkeypatch.setattr("sagline.cli.run._figures", lambda *_: ())
     monkeypatch.setattr("sagline.workspaces.nearest._EVALUATIONS", 30)
-    monkeypatch.setattr("sagline.article.report.Part.build", lambda part: Chapter(part.key, part.key, "", ()))
+    monkeypatch.setattr("sagline.article.report.ReportPart.build", lambda part: Chapter(part.key, part.key, "", ()))
     monkeypatch.setattr("sagline.cli.output.Output.draw", lambda *_: None)
 
     def started(host: str, port: int, title: str) -> Any:

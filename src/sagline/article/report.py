@@ -68,7 +68,7 @@ def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progr
     return ArticleReport(*write_page(folder, NAMES, text, numbers), tuple(chapters), numbers)
 
 
-class _Part(NamedTuple):
+class ReportPart(NamedTuple):
     """A chapter that can be selected."""
 
     key: str  # its name
@@ -84,16 +84,16 @@ class _Part(NamedTuple):
 
 
 PARTS = (
-    _Part("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
-    _Part("intercept", (6, 7), (), "constants", "intercept_chapter"),
-    _Part("sag", tuple(range(8, 16)), (), "sag", "sag_chapter"),
-    _Part("constants", (), (), "constants", "constants_chapter"),
-    _Part("identify", (), (), "identification", "identify_chapter"),
-    _Part("models", (), (), "models", "models_chapter"),
-    _Part("simulation", tuple(range(17, 23)), (), "simulation_page", "simulation_chapter"),
-    _Part("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
-    _Part("workspace", (), (), "workspace", "workspace_chapter"),
-    _Part("errata", (), (), "errata", "errata_chapter"),
+    ReportPart("feasible-sets", (3, 4, 5), (), "feasible_sets", "feasible_chapter"),
+    ReportPart("intercept", (6, 7), (), "constants", "intercept_chapter"),
+    ReportPart("sag", tuple(range(8, 16)), (), "sag", "sag_chapter"),
+    ReportPart("constants", (), (), "constants", "constants_chapter"),
+    ReportPart("identify", (), (), "identification", "identify_chapter"),
+    ReportPart("models", (), (), "models", "models_chapter"),
+    ReportPart("simulation", tuple(range(17, 23)), (), "simulation_page", "simulation_chapter"),
+    ReportPart("poses", (25, 26, 27), (2,), "poses", "poses_chapter"),
+    ReportPart("workspace", (), (), "workspace", "workspace_chapter"),
+    ReportPart("errata", (), (), "errata", "errata_chapter"),
 )
 
 
@@ -106,7 +106,7 @@ class _Selection:
     tables: frozenset[int]  # numbers of tables that are wanted
 
     @property
-    def parts(self) -> tuple[_Part, ...]:
+    def parts(self) -> tuple[ReportPart, ...]:
         """The chapters that have something to build."""
         return tuple(
             p for p in PARTS if p.key in self.whole or self.figures & {*p.figures} or self.tables & {*p.tables}
