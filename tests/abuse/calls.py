@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 
 import sagline as sl
 from sagline.control.link import Command, Mode
-from sagline.core.results import Saved
 from sagline.robot.tolerances import Provenance
 from tests.calibration.made_up import made_up
 from tests.calibration.synthetic import log_of, true_robot, with_drums
@@ -75,8 +74,9 @@ def _of_class(name: str, kind: type) -> set[str]:
     if issubclass(kind, Exception | Enum | tuple):
         return set()
     found = set() if name in RESULTS or not inspect.signature(kind).parameters else {name}
-    own = {**vars(kind), **(vars(Saved) if issubclass(kind, Saved) else {})}  # other inherited ones are called once
-    for method, value in own.items():
+    private = [base for base in kind.__mro__[1:] if base.__name__ not in sl.__all__ and base is not object]
+    methods = {method: value for base in reversed([kind, *private]) for method, value in vars(base).items()}
+    for method, value in methods.items():  # those of a public base are called once, there
         function = value.__func__ if isinstance(value, classmethod) else value
         public = not method.startswith("_") or method in MAGIC
         if inspect.isfunction(function) and public and len(inspect.signature(function).parameters) > 1:
@@ -102,6 +102,7 @@ INTERNAL = frozenset(
     {"TensionMethod.preference", "QuadraticProgram.preference", "twin.Machine.deliver"}
     | {"control.Fault", "control.Fault.look", "control.Fault.found", "control.Histogram.add"}
     | {"control.TensionLoop.step", "control.Gains.at", "control.Link", "control.Link.exchange", "control.Recorder"}
+    | {"plc.ModbusLink.exchange", "plc.S7Link.exchange"}
     | {"Orientations.at", "Tilts.sampled"}
     | {f"{name}.{method}" for name in (*CRITERIA, "PositionError") for method in ("check", "judge", "scale", "values")}
     | {"AnchorErrors.added", "FreeAnchors.bound", "FreeCable.bound", "FreeLimit.bound", "Goal.values"}

@@ -252,7 +252,9 @@ from sagline.cli import compilation
 from sagline.cli.compilation import compilation_events
 compilation.available_cores = lambda: 2
 def say(stage):
-    print(stage.words, stage.done, stage.expected, int(stage.finished), sep="\\t", flush=True)
+    row = stage.words, stage.done, stage.expected, int(stage.finished)
+    sys.stdout.write("\\t".join(map(str, row)) + "\\n")  # one write: two threads report
+    sys.stdout.flush()
 with compilation_events(say):
     compilation.compile_all(sys.argv[1:] or {names!r}, say)
 """

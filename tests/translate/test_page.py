@@ -30,5 +30,5 @@ def test_the_example_of_the_page_is_what_the_translator_writes(tmp_path: Path) -
     kernel = space["weighted_mean"]
     assert isinstance(kernel, FunctionType)
     text = translate([(kernel, (F1, F1, Scalar.INT), "sagline_example")])
-    assert function in text
-    assert prototype in text
+    for part in (function, prototype):  # the page breaks long lines
+        assert " ".join(part.split()) in " ".join(text.split())

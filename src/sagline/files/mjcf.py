@@ -32,9 +32,9 @@ from sagline.statics.tables import refuse_missing_chords, touching_angle
 
 NOTE = (
     "The pulleys are cylinders in the direction of the initial pose, and they do not swivel: forces and stiffness are "
-    "those of the robot at this pose; elsewhere lengths are right only in the planes of the pulleys, with an error that "
-    "grows with the cube of the distance. The stiffness of a tendon includes the cable outside it (dead length, and a "
-    "part of the wrap), and its springlength excludes it. "
+    "those of the robot at this pose; elsewhere lengths are right only in the planes of the pulleys, with an error "
+    "that grows with the cube of the distance. The stiffness of a tendon includes the cable outside it (dead length, "
+    "and a part of the wrap), and its springlength excludes it. "
     "The model has no friction on the pulleys and no drums. "
 )
 _OFF = 0.05  # of the radius: a tendon that begins nearer to its cylinder would not be laid on it

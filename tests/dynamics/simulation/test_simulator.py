@@ -166,7 +166,7 @@ def test_what_a_period_cannot_be_is_refused_and_changes_nothing(winches: Any, de
         ]
     if dead_cable:
         short = {"unstrained_length": np.where(one, 0.9, length)}
-        asked.append((short, "unstrained_length: cable 3", "0.9 m", "> 1 m, its dead cable"))
+        asked.append((short, "unstrained_length: cable 3", "0.9 m", "> 1 m, its dead length"))
     for change, *parts in asked:
         with refused(*parts, kind=sl.InvalidValueError):
             machine.step(**{"unstrained_length": length, "dt": 0.01, **change})
