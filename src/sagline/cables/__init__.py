@@ -1,1 +1,1 @@
-"""Cables that stretch and sag: their material, five models of them, and their states."""
+"""Cables with elongation and sag: material, five cable models and cable states."""

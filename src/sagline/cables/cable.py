@@ -1,4 +1,4 @@
-"""The material of a cable: what it weighs, how stiff it is, and how thick where that is known."""
+"""Material of a cable: linear density, axial stiffness, and diameter if known."""
 
 from __future__ import annotations
 
@@ -17,14 +17,13 @@ from sagline.core.memory import check_memory
 
 @frozen(eq=False, weakref_slot=False)
 class Cable:
-    """One cable's material, or that of many: every field that is given has one shape.
+    """Material of one cable or of many: all given fields have one shape.
 
     Attributes:
         linear_density: Mass per unstrained length [kg/m], shape (...), >= 0.
         axial_stiffness: Young's modulus times section area EA [N], shape (...), > 0.
-        diameter: Diameter of the rope [m], shape (...), > 0; None where it is not known. Only drums need it.
-        expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None where it is not
-            known.
+        diameter: Diameter of the rope [m], shape (...), > 0; None if not known. Only drums need it.
+        expansion: Coefficient of thermal expansion [1/K], shape (...), negative for most fibers; None if not known.
 
     Raises:
         InvalidValueError: If a density is negative, a stiffness or diameter not positive, or the shapes do not
@@ -42,7 +41,7 @@ class Cable:
         array([44000., 44000.])
     """
 
-    __slots__: ClassVar[tuple[str, ...]]  # the names of the fields, in order
+    __slots__: ClassVar[tuple[str, ...]]  # names of the fields, in order
 
     linear_density: Array = field(converter=given, metadata=rule("kg/m", low=0.0))
     axial_stiffness: Array = field(converter=given, metadata=rule("N", above=0.0))
@@ -76,10 +75,11 @@ class Cable:
 
         Args:
             linear_density: Mass per unstrained length [kg/m], >= 0.
-            youngs_modulus: E [Pa], > 0: of the rope as a whole, which is below that of its fibers or wires.
-            section_area: A [m^2], > 0: what E was measured on, for a rope usually its fibers or metal alone.
-            diameter: Of the rope [m], > 0; None where it is not known. No section area follows from it.
-            expansion: Thermal expansion [1/K], or None.
+            youngs_modulus: E [Pa], > 0: that of the whole rope, smaller than that of its fibers or wires.
+            section_area: A [m^2], > 0: the area for which E was measured; for a rope usually that of its fibers or
+                metal alone.
+            diameter: Diameter of the rope [m], > 0; None if not known. The section area does not follow from it.
+            expansion: Coefficient of thermal expansion [1/K], or None.
 
         Returns:
             Cable of axial stiffness EA.
@@ -108,7 +108,7 @@ class Cable:
             changes: Fields of `Cable` and their new values.
 
         Returns:
-            A new cable; this one stays as it is.
+            A new cable; this one remains unchanged.
 
         Raises:
             InvalidValueError: If there is no such field, or the constructor does not accept the new values.
@@ -128,12 +128,12 @@ class Cable:
         """The fields that are known, by their names.
 
         Returns:
-            linear_density and axial_stiffness, and of diameter and expansion those that are not None.
+            linear_density and axial_stiffness; also diameter and expansion where they are not None.
         """
         return {name: value for name in self.__slots__ if (value := getattr(self, name)) is not None}
 
     def _part(self, index: int | slice | NDArray[Any], shape: tuple[int, ...]) -> Cable:
-        """The material of a part of a batch of that shape; one without the batch's first axis stays what it is."""
+        """Material of a part of a batch of that shape; unchanged if it lacks the first axis of the batch."""
         own = self.linear_density.shape
         if len(own) < len(shape):
             return self

@@ -1,4 +1,4 @@
-"""Creep: how much longer a cable slowly becomes under tension, beside what its axial stiffness says."""
+"""Creep: slow elongation of a cable under tension, in addition to its elastic elongation."""
 
 from __future__ import annotations
 
@@ -17,18 +17,19 @@ MOST_ELEMENTS = 2
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Creep:
-    """Late strain of a cable: one or two springs in series with it, each with a damper beside it.
+    """Creep strain of a cable: one or two Kelvin-Voigt elements (spring parallel to damper) in series with it.
 
-    With the cable's axial stiffness, which acts at once, one element is the standard linear solid, two the five-element
-    model of polymer ropes. It is recoverable: without tension the strain goes back.
+    Together with the elastic axial stiffness of the cable, one element gives the standard linear solid and two give the
+    five-element model of polymer ropes. The creep is recoverable: without tension the strain returns to zero.
 
     Attributes:
-        axial_stiffness: Of each element [N], > 0, shape (1,) or (2,): under a tension T that stays, its strain becomes
-            T over it.
-        time: In which all but 1/e of that has come [s], > 0, of the same shape.
+        axial_stiffness: Stiffness k of each element [N], > 0, shape (1,) or (2,): under a constant tension T its strain
+            approaches T/k.
+        time: Retardation time of each element [s], > 0, of the same shape: the strain then differs from T/k by 1/e of
+            it.
 
     Examples:
-        A kilonewton on a fiber rope, after a second, a minute and an hour:
+        A fiber rope under 1 kN, after a second, a minute and an hour:
 
         >>> import sagline as sl
         >>> creep = sl.Creep(axial_stiffness=[1e6, 4e5], time=[30.0, 1200.0])
@@ -47,8 +48,8 @@ class Creep:
         """Check the elements.
 
         Args:
-            axial_stiffness: Of each element [N], > 0: a number, or one or two in a list.
-            time: Of each element [s], > 0, likewise.
+            axial_stiffness: Stiffness of each element [N], > 0: a number, or a list of one or two.
+            time: Retardation time of each element [s], > 0: a number, or a list of one or two.
 
         Raises:
             InvalidValueError: If one is not positive, or there are more than two.
@@ -64,17 +65,17 @@ class Creep:
             object.__setattr__(self, name, locked(np.array(np.broadcast_to(values, shape))))
 
     def strain(self, time: ArrayLike, tension: ArrayLike, *, settled: bool = False) -> Array:
-        """Late strain along a course of tensions: unstrained lengths become L (1 + strain).
+        """Creep strain for a time series of tensions: unstrained lengths become L (1 + strain).
 
-        Exact for tensions that change evenly from sample to sample.
+        Exact for tensions that vary linearly between samples.
 
         Args:
-            time: Of the samples [s], rising, shape (N,).
-            tension: [N], shape (N,) or (N, m); NaN at a sample without an answer.
-            settled: Whether the first tension has acted for long; if not, the strain begins at zero.
+            time: Times of the samples [s], increasing, shape (N,).
+            tension: Tensions [N], shape (N,) or (N, m); NaN at a sample without a solution.
+            settled: True if the first tension has acted for a long time; if False, the strain starts at zero.
 
         Returns:
-            Strain, of the shape of tension; NaN where that is.
+            Strain, of the shape of tension; NaN where the tension is NaN.
 
         Raises:
             InvalidValueError: If the times do not rise, or the shapes do not fit.

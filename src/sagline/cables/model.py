@@ -1,4 +1,4 @@
-"""The interface of all cable models, the states they give, and their status."""
+"""The interface of all cable models, the cable states that they return, and the cable status."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sagline.kernels.cable.terms import Terms
 
 
 class CableStatus(Status):
-    """Status of one cable; `text` says what it means and what to do."""
+    """Status of one cable; `text` states its meaning and the next step."""
 
     SOLVED = codes.CABLE_SOLVED, "solved"
     SLACK = codes.CABLE_SLACK, "slack: the cable carries no chord tension; shorten it if it should pull"
@@ -65,18 +65,18 @@ class CableModel:
     weightless: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Refuse the model that is none: the interface by itself."""
+        """Refuse direct use of the interface: it is not a cable model."""
         if type(self) is CableModel:
             step = "Choose one of the models, Catenary() for instance."
             raise InvalidValueError("CableModel()", "the interface alone", "a cable model", step)
 
     @property
     def parameters(self) -> tuple[float, float]:
-        """The article's k_h and k_p; zero where the model has none."""
+        """The article's k_h and k_p; zero in models without these parameters."""
         return 0.0, 0.0
 
     def terms(self, gravity: float) -> Terms:
-        """The model as kernels take it.
+        """Parameters of the model in the form for kernels.
 
         Args:
             gravity: Gravitational acceleration [m/s^2].
@@ -85,14 +85,14 @@ class CableModel:
             Code, k_h, k_p and gravity.
 
         Raises:
-            InvalidValueError: If gravity is negative, or no number.
+            InvalidValueError: If gravity is negative or not a number.
         """
         return self.code, *self.parameters, number(gravity, "gravity", "m/s^2", low=0.0)
 
     def from_tension(
         self, cable: Cable, span: ArrayLike, rise: ArrayLike, chord_tension: ArrayLike, gravity: float = 9.81
     ) -> CableState:
-        """Length and forces of cables held at given chord tensions.
+        """Length and forces of cables with given chord tensions.
 
         All arguments broadcast to one shape (...).
 
@@ -111,7 +111,7 @@ class CableModel:
             InvalidValueError: If a tension or gravity is negative or not finite, or shapes do not broadcast.
 
         Examples:
-            One cable, and the same at three tensions:
+            One cable, then the cable at three tensions:
 
             >>> import sagline as sl
             >>> model = sl.Catenary()
@@ -177,7 +177,7 @@ class CableModel:
         tension: Array,
         status: Codes,
     ) -> CableState:
-        """The solved batch in the caller's shape."""
+        """State of the solved batch in the caller's shape."""
         return CableState(
             model=self,
             cable=cable,
@@ -192,7 +192,7 @@ class CableModel:
         )
 
     def profile(self, cable: Cable, state: CableState, points: int = 50) -> Array:
-        """Points of a cable in its own vertical plane as this model draws it.
+        """Points of a cable in its own vertical plane, according to this model.
 
         Args:
             cable: Material.
@@ -200,10 +200,10 @@ class CableModel:
             points: Number of points at equal steps of unstrained length, >= 2.
 
         Returns:
-            Horizontal and vertical coordinates from the frame end on [m], shape (..., points, 2).
+            Horizontal and vertical coordinates relative to the frame end [m], shape (..., points, 2).
 
         Raises:
-            InvalidValueError: If fewer than two points are asked for, or cable or state are none.
+            InvalidValueError: If points is less than two, or cable or state has the wrong type.
         """
         placed = replace(instance(state, CableState, "state"), model=self, cable=instance(cable, Cable, "cable"))
         return placed.points(whole_number(points, "points", 2))
@@ -213,8 +213,9 @@ class CableModel:
 class CableState(Result):
     """Ends, forces and lengths of cables: results of a cable model.
 
-    Every array has shape (...), one entry a cable. Forces act on the cable at its platform end. A batch is indexed
-    along its first axis, by a number, a slice, or an array of numbers or booleans; slices share its memory.
+    Every array has shape (...), one entry per cable. Forces act on the cable at its platform end. A batch is indexed
+    along its first axis, by a number, a slice, or an array of numbers or booleans; a slice shares the memory of the
+    batch.
 
     Attributes:
         model: The cable model that was solved.
@@ -226,7 +227,7 @@ class CableState(Result):
         horizontal_tension: T_x [N], >= 0.
         vertical_force: T_z [N], up positive.
         chord_tension: tau = T_x/cos phi [N].
-        status: Codes of `CableStatus`; where it is not SOLVED, SLACK or BELOW_VALIDITY the answer is NaN.
+        status: Codes of `CableStatus`; values are NaN unless the code is SOLVED, SLACK or BELOW_VALIDITY.
     """
 
     model: CableModel
@@ -252,11 +253,11 @@ class CableState(Result):
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
         """The state of a part of the cables, along the first axis.
 
-        Args:
+        index: A number (negative: from the end), a slice, or an array of numbers or booleans.
             index: A number, which may count from the end; a slice; or an array of numbers or booleans.
 
-        Raises:
-            NoBatchError: If the state is that of a single cable; it is a TypeError too.
+        NoBatchError: If the state is that of a single cable (also a TypeError).
+            NoSuchEntryError: If there is no such entry (also an IndexError).
             NoSuchEntryError: If there is no such entry; it is an IndexError too.
         """
         part = part_of(index, self.shape, "state of a single cable")
@@ -279,14 +280,14 @@ class CableState(Result):
 
     @property
     def cable_weight(self) -> Array:
-        """Weight of the whole cable [N] as its model sees it: zero for the weightless models."""
+        """Weight of the whole cable in its model [N]: zero in the weightless models."""
         if self.model.weightless:
             return np.zeros(self.shape)
         return self.cable.linear_density * self.gravity * self.unstrained_length
 
     @property
     def frame_end_tension(self) -> Array:
-        """Tension at the frame end, where a winch's load cell sits [N]."""
+        """Tension at the frame end, at the load cell of a winch [N]."""
         return np.hypot(self.horizontal_tension, self.vertical_force - self.cable_weight)
 
     @property
@@ -303,7 +304,7 @@ class CableState(Result):
 
     @property
     def closure_residual(self) -> Array:
-        """Closure error of the state in its own model's equations [m]."""
+        """Closure error of the state in the equations of its cable model [m]."""
         out = np.empty(self.unstrained_length.size)
         batch.closures(self.model.terms(self.gravity), *self._columns(), out)
         return out.reshape(self.shape)
@@ -318,7 +319,7 @@ class CableState(Result):
             Horizontal and vertical coordinates [m], frame end first, shape (..., count, 2).
 
         Raises:
-            InvalidValueError: If fewer than two are asked for, or more than the memory of this machine holds.
+            InvalidValueError: If count is less than two, or the points do not fit into memory.
         """
         whole_number(count, "points", 2)
         check_memory("points", 16.0 * self.unstrained_length.size * count, "Ask for fewer points.")

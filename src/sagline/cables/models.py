@@ -1,4 +1,4 @@
-"""The five cable models, and all of them by name."""
+"""The five cable models, and a table of all of them by name."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from sagline.kernels import codes
 
 @dataclass(frozen=True, slots=True)
 class Straight(CableModel):
-    """A cable that neither stretches nor sags: L = D.
+    """A cable without elongation and sag: L = D.
 
-    From a length it knows no tension: the answer is NaN, and the closure residual is |L - D|.
+    The tension does not follow from a length: it is NaN, and the closure residual is |L - D|.
 
     Source:
         docs/model.md, section 3.
@@ -26,9 +26,9 @@ class Straight(CableModel):
 
 @dataclass(frozen=True, slots=True)
 class Elastic(CableModel):
-    """A cable that stretches but has no weight: L = D/(1 + tau/EA).
+    """A cable with elongation but without weight: L = D/(1 + tau/EA).
 
-    Where L >= D it is slack and carries nothing.
+    Where L >= D the cable is slack and its tension is zero.
 
     Source:
         docs/model.md, section 3.
@@ -42,8 +42,8 @@ class Elastic(CableModel):
 class Empirical(CableModel):
     """The article's closed form: T_z = tan(phi) T_x + k_h rho D, and L of T_x by its equation (48).
 
-    Valid while the lowest point of the cable lies outside the span, T_x > w D/(2 |tan phi|); below that the
-    answer stands but its status says BELOW_VALIDITY. From a length, (48) is solved on its decreasing branch.
+    Valid while the lowest point of the cable lies outside the span, T_x > w D/(2 |tan phi|); below that the result is
+    returned with the status BELOW_VALIDITY. For a given length, (48) is solved on its decreasing branch.
 
     Attributes:
         k_h: Intercept constant [m/s^2]; the published 4.845 in magnitude (exactly g/2 for a shallow cable).
@@ -72,7 +72,7 @@ class Empirical(CableModel):
 class Parabolic(CableModel):
     """A shallow cable to first order: L = D (1 + (w D cos phi)^2/(24 tau^2))/(1 + tau/EA), T_z = tau sin phi + w D/2.
 
-    From a length: the positive root of its cubic in tau.
+    For a given length: the positive root of its cubic equation in tau.
 
     Source:
         docs/model.md, section 3.
@@ -83,7 +83,7 @@ class Parabolic(CableModel):
 
 @dataclass(frozen=True, slots=True)
 class Catenary(CableModel):
-    """Irvine's elastic catenary, solved to the last digits in both directions. The default everywhere.
+    """Irvine's elastic catenary, solved to rounding error in both directions. The default cable model.
 
     Source:
         Irvine 1981, ch. 2; cancellation-free forms in docs/model.md, section 2.

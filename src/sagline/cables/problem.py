@@ -1,4 +1,4 @@
-"""A batch of cables to be solved: checked, flat, and back in the caller's shape."""
+"""A batch of cables to be solved: checked, flattened, and the results reshaped to the caller's shape."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ class Problem(NamedTuple):
     gravity: float  # gravitational acceleration [m/s^2]
     span: Array  # horizontal distances between the ends [m]; broadcasts with the shape
     rise: Array  # heights of the platform ends above the frame ends [m]; broadcasts with the shape
-    # span, rise, linear density, axial stiffness and what is given, flat: each as long as the batch, or of length 1
+    # span, rise, linear density, axial stiffness and the given quantity, flat: each as long as the batch, or of length
+    # 1
     operands: tuple[Array, Array, Array, Array, Array]
 
     @classmethod
     def of(cls, cable: Cable, span: ArrayLike, rise: ArrayLike, given: Array, gravity: float) -> Self:
-        """Check geometry and gravity and bring everything to one shape.
+        """Check geometry and gravity and broadcast all operands to one shape.
 
-        Units: span [m]; rise [m]; given [N]; gravity [m/s^2].
+        Units: span [m]; rise [m]; given: chord tension [N] or unstrained length [m]; gravity [m/s^2].
         """
         span = _checked_span(span)
         rise = checked(rise, "rise", "m")
@@ -48,14 +49,14 @@ class Problem(NamedTuple):
         return cls(shape, gravity, span, rise, (a, b, c, d, e))
 
     def outputs(self) -> tuple[Array, Array, Array, Codes]:
-        """Room for what kernels find: three numbers and a status a cable."""
+        """Arrays for the results of kernels: three numbers and a status per cable."""
         size = math.prod(self.shape)
         return np.empty(size), np.empty(size), np.empty(size), np.empty(size, dtype=np.int8)
 
     def shaped(self, field: Array) -> Array:
         """A result or an operand in the batch's shape, locked.
 
-        Returns (...).
+        Shape of the result: (...).
         """
         whole = field.size == math.prod(self.shape)
         return locked(field.reshape(self.shape) if whole else np.broadcast_to(field, self.shape))
@@ -69,5 +70,5 @@ def _checked_span(span: ArrayLike) -> Array:
 
 
 def _flat(field: Array, shape: tuple[int, ...]) -> Array:
-    """One axis: the whole batch, or a single value that holds for all of it."""
+    """Flatten to one axis: the whole batch, or a single value valid for all of it."""
     return field.reshape(1) if field.size == 1 else kernel_input(field, shape).reshape(-1)

@@ -1,4 +1,4 @@
-"""Ropes that cables are made of: a small catalogue, each by its diameter, with where its numbers come from."""
+"""Ropes of cables: a small catalogue; properties follow from the diameter, with their sources."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Final
 from sagline.cables.cable import Cable
 from sagline.core.arrays import checked
 
-SAFETY = 5.0  # breaking force over the highest tension that a robot may use, as usual for general lifting
+SAFETY = 5.0  # breaking force over the highest allowed tension, as usual for general lifting
 
 
 @dataclass(frozen=True, slots=True)
 class Rope:
-    """A kind of rope whose numbers go with the square of its diameter.
+    """A type of rope whose properties are proportional to the square of its diameter.
 
     Attributes:
         name: Name in the catalogue.
@@ -43,7 +43,7 @@ class Rope:
         return Cable(self.density_factor * square, self.stiffness_factor * square, diameter=diameter)
 
     def breaking_force(self, diameter: float) -> float:
-        """Least force at which a new rope breaks.
+        """Minimum breaking force of a new rope.
 
         Units: diameter [m]; returns [N].
         """
@@ -51,7 +51,7 @@ class Rope:
 
 
 def _steel(name: str, construction: str, mass: float, section: float, strength: float) -> Rope:
-    """A steel rope by the factors of EN 12385-4: length mass W [kg/(100 m mm^2)], metallic section C, strength K."""
+    """A steel rope from the factors of EN 12385-4: length mass W [kg/(100 m mm^2)], metallic section C, strength K."""
     return Rope(
         name=name,
         description=f"steel wire rope {construction}, grade 1770",
@@ -64,7 +64,7 @@ def _steel(name: str, construction: str, mass: float, section: float, strength: 
 
 
 def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) -> Rope:
-    """A braid of a fiber of modulus [Pa] and strength [Pa]."""
+    """A braided rope of a fiber with given modulus [Pa] and strength [Pa]."""
     section = 0.7853981633974483 * _BRAID_FILL
     return Rope(
         name=name,
@@ -79,8 +79,8 @@ def _braid(name: str, fiber: str, modulus: float, strength: float, source: str) 
 
 
 _STEEL_MODULUS = 100e9  # Pa, on the metallic section
-_BRAID_FILL = 2.0 / 3.0  # fiber in the circle of the nominal diameter
-_POLYETHYLENE = 975.0  # kg/m^3, ours: a common figure for the fiber
+_BRAID_FILL = 2.0 / 3.0  # share of fiber in the circle of the nominal diameter
+_POLYETHYLENE = 975.0  # kg/m^3, our assumption: a common value of the fiber
 _DSM = "DSM Dyneema, fact sheet UHMWPE fiber, CIS YA100 (2010): {}; density 975 kg/m^3 assumed"
 
 ROPES: Final = MappingProxyType(

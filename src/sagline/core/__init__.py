@@ -1,1 +1,1 @@
-"""Arrays, arguments, errors, numbers and results: what every other folder builds on."""
+"""Arrays, arguments, errors, numbers and results: the base that every other folder uses."""

@@ -21,7 +21,7 @@ from sagline.core.errors import FileError, InvalidValueError, nearest, printable
 
 T = TypeVar("T")
 
-# The way to get an object of a kind; the end of every message about a missing one.
+# How to get an object of each type; ends every message about a missing object.
 HOW_TO_GET: Final = MappingProxyType(
     {
         "AnchorErrors": "Give AnchorErrors(deviation), 0.01 m for instance, or None.",
@@ -58,8 +58,8 @@ HOW_TO_GET: Final = MappingProxyType(
         "Winch": "Give Winch(pulley_radius, dead_cable=...), or None.",
     }
 )
-LONGEST_TITLE: Final = 100  # letters of a name; it becomes part of file names
-LONGEST_NAME = 255  # bytes of a file's name, on all the usual disks
+LONGEST_TITLE: Final = 100  # characters of a name; it becomes part of file names
+LONGEST_NAME = 255  # bytes of a file name on common file systems
 _PARTS = ("state", "pose", "robot", "plan", "path", "cables", "cable", "model", "tension")
 
 
@@ -81,51 +81,51 @@ class _Brief(Repr):
 
 
 def brief(value: object) -> str:
-    """A value as a message shows it: one short line, whatever it is.
+    """Short text of a value for a message: one line, for any object.
 
-    Returns its text, or its kind where the text is long or not to be had.
+    Returns the type of the object where its text is too long or raises an error.
     """
     if isinstance(value, type):
         return f"the class {value.__name__}"
     try:
         return printable(_Brief().repr(value))
-    except Exception:  # the text of a caller's object is the caller's code
+    except Exception:  # the text of a caller's object comes from the caller's code
         return f"one of type {type(value).__name__}"
 
 
 def instance(value: object, kind: type[T], item: str) -> T:
-    """An argument of one of our kinds, as it is."""
+    """Return an argument unchanged after a check of its type."""
     if isinstance(value, kind):
         return value
     raise InvalidValueError(item, brief(value), _a(kind.__name__), _step_to(value, kind))
 
 
 def optional(value: object, kind: type[T], item: str) -> T | None:
-    """An argument of one of our kinds, or None, which leaves it out."""
+    """Return an argument unchanged after a check of its type; None is allowed and means not given."""
     return None if value is None else instance(value, kind, item)
 
 
 def choice(value: Any, item: str, allowed: Iterable[str]) -> Any:
-    """One of a few words."""
+    """Check that a value is one of the allowed words."""
     words = tuple(allowed)
     if isinstance(value, str) and value in words:
-        return str(value)  # numpy has a kind of its own
+        return str(value)  # numpy has its own string type
     near = nearest(value, words) if isinstance(value, str) else None
     step = f"Choose one of them as {item}." if near is None else f"Did you mean {near}?"
     raise InvalidValueError(item, brief(value), ", ".join(words), step)
 
 
 def text(value: Any, item: str) -> str:
-    """A text, of several lines perhaps, that a terminal can show."""
+    """Check a text, possibly of several lines, that a terminal can display."""
     if not isinstance(value, str):
         raise InvalidValueError(item, brief(value), "a text", f'Put {item} between quotes: "...".')
     if (flat := value.replace("\n", " ").replace("\t", " ")) != printable(flat):
         raise InvalidValueError(item, brief(value), "printable text", f"Remove what does not print in {item}.")
-    return str(value)  # numpy has a kind of its own
+    return str(value)  # numpy has its own string type
 
 
 def label(value: Any, item: str) -> str:
-    """A name: one line of text that a terminal, a figure and a file name can show."""
+    """Check a name: one line of text that a terminal, a figure and a file name can contain."""
     if isinstance(value, str) and not value.strip():
         raise InvalidValueError(item, "empty" if not value else "blank", "a text to call it by", f"Give a {item}.")
     if not isinstance(value, str) or len(value) > LONGEST_TITLE or value != printable(value):
@@ -135,9 +135,9 @@ def label(value: Any, item: str) -> str:
 
 
 def integer(value: Any) -> int | None:
-    """The integer that a value is; truth values are none, and arrays of one number are no number either.
+    """Value as an integer; Booleans and arrays, even with one element, are not accepted.
 
-    Returns the integer, or None.
+    Returns the integer, or None if the value is not an integer.
     """
     if isinstance(value, bool | np.bool_) or (isinstance(value, np.ndarray) and value.ndim):
         return None
@@ -148,10 +148,10 @@ def integer(value: Any) -> int | None:
 
 
 def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> int:
-    """A whole number.
+    """Check a whole number.
 
-    value: what was given: an integer of Python or numpy; a truth value is none; high: the largest allowed; by default
-    the largest that counts anything.
+    value: integer of Python or numpy; Booleans are refused; high: largest allowed number; default: the largest size of
+    a Python container.
     """
     number = integer(value)
     if number is not None and low <= number <= high:
@@ -163,16 +163,16 @@ def whole_number(value: Any, item: str, low: int, high: int = sys.maxsize) -> in
 
 
 def callback(value: Any, item: str) -> Any:
-    """A function to call, or None."""
+    """Check a callback: a function, or None."""
     if value is None or (callable(value) and not isinstance(value, type)):
         return value
     raise InvalidValueError(item, brief(value), "a function of two numbers: done, of how many", "Give one, or None.")
 
 
 def file_path(file: Any, item: str = "file", *, folder: bool = False) -> Path:
-    """The path of a file or folder.
+    """Check the path of a file or folder.
 
-    file: what was given: a text or a path object.
+    file: a text or a path object.
     """
     given = os.fspath(file) if isinstance(file, os.PathLike) and not isinstance(file, type) else file
     if not isinstance(given, str):
@@ -198,7 +198,7 @@ def _a(name: str) -> str:
 
 
 def _step_to(value: object, kind: type) -> str:
-    """The step from the value that was given to one of the kind that is needed."""
+    """Instruction for a message: how to get an object of the required type from the given value."""
     if isinstance(value, type) and issubclass(value, kind):
         return f"Write {value.__name__}(), with parentheses: that makes one."
     if type(value).__module__.startswith("sagline"):

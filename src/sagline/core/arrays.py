@@ -1,7 +1,6 @@
-"""The border between a caller's numbers and ours: float64, C-contiguous, write-locked.
+"""Conversion of a caller's numbers to arrays for the kernels: float64, C-contiguous, write-locked.
 
-Kernels compile once for each memory layout they meet, so everything that enters one
-comes through here.
+A kernel is compiled once per memory layout of its arguments. Every array for a kernel is therefore converted here.
 """
 
 from __future__ import annotations
@@ -22,13 +21,13 @@ Codes = NDArray[np.int8]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-LARGEST: Final = 1e50  # in any unit: far beyond every machine, and its square and cube are still numbers
-SMALLEST: Final = 1e-50  # of what must be more than zero
+LARGEST: Final = 1e50  # in any unit: larger than any machine value; its square and cube are still finite
+SMALLEST: Final = 1e-50  # smallest value of a quantity that must be positive
 _KINDS = {"c": "complex", "M": "dates", "m": "durations of a calendar", "V": "records"}
 
 
 def locked(array: NDArray[Any]) -> NDArray[Any]:
-    """Adopt an array of our own making: the same memory, write-locked."""
+    """Write-lock an array that sagline created, without a copy."""
     array.flags.writeable = False
     return array
 
@@ -44,12 +43,12 @@ def checked(
     infinite: bool = False,
     missing: bool = False,
 ) -> Array:
-    """A locked float64 copy of a caller's value, or an error that names what is wrong.
+    """Locked float64 copy of a caller's value; raises an error that names the problem.
 
-    unit: unit of the value, for the message; "" for none; shape: trailing axes the array must have; None means any
+    unit: unit of the value, for the message; "" if dimensionless; shape: required trailing axes; None in it means any
     length. Leading axes are free. None (the default) accepts every shape; above: every value must be strictly larger
-    than this; missing: whether NaN may pass. Returns array of float64, C-contiguous, write-locked, with memory of its
-    own; an array that already is all this down to its memory, such as a result of ours, is taken as it is.
+    than this; missing: True if NaN is allowed. Returns a float64 array, C-contiguous, write-locked, that owns its
+    memory. An array that already has all these properties, such as a result of sagline, is returned without a copy.
     """
     array = value if _is_immutable(value) else numbers(value, item, unit)
     if shape is not None:
@@ -60,17 +59,17 @@ def checked(
 
 
 def numbers(value: ArrayLike, item: str, unit: str) -> Array:
-    """A float64 copy of a caller's numbers in C order, of any shape and range; NaN may be among them.
+    """Float64 copy of a caller's numbers in C order, of any shape and range; NaN is allowed.
 
-    value: number or array of numbers: real ones, without a unit of their own, none masked; unit: unit of the value, for
-    the message.
+    value: real number or array of real numbers, without unit object and without mask; unit: unit of the value, for the
+    message.
     """
     if type(value) in (float, np.float64):
         return np.array(value)
     _refuse_masked_or_with_unit(value, item, unit)
     try:
         size = value.size if isinstance(value, np.ndarray) else len(value)  # type: ignore[arg-type]
-    except Exception:  # a number has no length, and a caller's object may do anything
+    except Exception:  # a number has no length, and a caller's object may raise anything
         size = 1
     check_memory(item, 8.0 * size, "Give fewer numbers.")
     try:
@@ -80,7 +79,7 @@ def numbers(value: ArrayLike, item: str, unit: str) -> Array:
         return _from_other_kind(given, item)
     except InvalidValueError:
         raise
-    except Exception as error:  # whatever the caller's object does when it is asked for its numbers
+    except Exception as error:  # a caller's object may raise anything during conversion
         reason = brief(error.args[0] if error.args else error).strip("'\"")
         raise InvalidValueError(item, brief(value), "numbers", f"Give {item} as plain numbers ({reason}).") from None
 
@@ -94,7 +93,7 @@ def number(value: Any, item: str, unit: str, *, low: float = -np.inf, above: flo
 
 
 def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **limits: Any) -> Array:
-    """An array of exactly one shape, without batch axes."""
+    """Check an array of exactly the given shape, without batch axes."""
     array = checked(value, item, unit, **limits)
     if array.shape != shape:
         raise InvalidValueError(
@@ -104,7 +103,7 @@ def exactly(value: ArrayLike, item: str, unit: str, shape: tuple[int, ...], **li
 
 
 def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    """Broadcast to a shape and lay out as kernels expect; copies only where it must."""
+    """Broadcast an array to a shape in the memory layout of the kernels; copy only if necessary."""
     array = np.asarray(value, dtype=np.float64, order="C")
     if array.shape != shape:
         array = np.asarray(np.broadcast_to(array, shape), order="C")
@@ -112,14 +111,14 @@ def kernel_input(value: ArrayLike, shape: tuple[int, ...]) -> Array:
 
 
 def spread(array: Array, shape: tuple[int, ...]) -> Array:
-    """A write-locked array of `checked`, broadcast to the shape if it has another."""
+    """Write-locked array of `checked`, broadcast to the shape if its own shape differs."""
     return array if array.shape == shape else locked(np.array(np.broadcast_to(array, shape), order="C"))
 
 
 def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
     """The shape to which several arrays broadcast.
 
-    item: what the arrays are, for the message.
+    item: name of the arrays, for the message.
     """
     try:
         return np.broadcast_shapes(*shapes)
@@ -130,7 +129,7 @@ def broadcast_shape(item: str, *shapes: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
-    """True if a value, and the owner of its memory, is a locked array of float64 in C order."""
+    """True if the value and the array that owns its memory are locked float64 arrays in C order."""
     if not (type(value) is np.ndarray and value.dtype == np.float64 and value.flags.c_contiguous):
         return False
     holder: object = value
@@ -142,7 +141,7 @@ def _is_immutable(value: ArrayLike) -> TypeGuard[Array]:
 
 
 def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
-    """Refuse masked arrays and quantities with units, which numpy would strip silently."""
+    """Refuse masked arrays and quantities with units: numpy would remove mask and unit silently."""
     if type(value) in (np.ndarray, int, list, tuple):
         return
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
@@ -157,9 +156,9 @@ def _refuse_masked_or_with_unit(value: Any, item: str, unit: str) -> None:
 
 
 def _from_other_kind(given: NDArray[Any], item: str) -> Array:
-    """From long doubles and Python's own numbers; what is no real number is refused."""
+    """Convert long doubles and Python number objects; refuse values that are not real numbers."""
     if given.dtype.kind in "fO" and (given.dtype.kind == "f" or all(_is_real(entry) for entry in given.flat)):
-        with np.errstate(over="ignore"):  # beyond the range is infinite, which is refused like any infinity
+        with np.errstate(over="ignore"):  # a value beyond the float64 range becomes infinite and is refused as infinite
             return np.array(given, dtype=np.float64, order="C")
     shown = next((entry for entry in given.flat if not _is_real(entry)), given) if given.dtype.kind == "O" else given
     kind = _KINDS.get(given.dtype.kind, "")
@@ -177,7 +176,7 @@ def _is_real(entry: object) -> bool:
 
 
 def _is_within(array: Array, *, low: float, above: float) -> bool:
-    """True if all values are finite and in range; two reductions, through which NaN propagates."""
+    """True if all values are finite and in range; two reductions are enough because they propagate NaN."""
     if array.size == 0:
         return True
     smallest, largest = float(array.min()), float(array.max())

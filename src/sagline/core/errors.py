@@ -1,4 +1,4 @@
-"""Exceptions and warnings of sagline: one family, each with its data and a message of one line."""
+"""Exceptions and warnings of sagline: one class hierarchy; each has data fields and a one-line message."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
-_WORD: Final = 60  # letters of what was given that are looked at for a word that was meant
-LONGEST: Final = 299  # characters of a line on a terminal; more is not read, and floods it
+_WORD: Final = 60  # number of leading characters of the given text that are compared with known words
+LONGEST: Final = 299  # largest number of characters of a terminal line; longer messages are shortened
 HEAD: Final = "Error: "  # prefix of a message
 MOST: Final = LONGEST - len(HEAD)  # characters of a message
-LEAST: Final = 30  # of each of its parts that are kept, whatever the others take
+LEAST: Final = 30  # smallest number of characters kept of each part, regardless of the other parts
 
 
 class SaglineError(Exception):
-    """Base of everything sagline raises on purpose; its text says what to do next."""
+    """Base class of all exceptions that sagline raises on purpose; its text states the next step."""
 
 
 class SaglineWarning(UserWarning):
-    """Something that stands, but is to be taken with care; its text says why and what to do."""
+    """Valid result that needs care; the text states the reason and the next step."""
 
 
 class InvalidValueError(SaglineError, ValueError):
-    """A value that cannot be worked with.
+    """A value that is not allowed.
 
     Attributes:
-        item: Item of the value, in the user's words ("cable 3: linear_density").
-        value: The offending value, as text, with its unit.
-        allowed: The range or the kind of value that would do.
+        item: Name of the quantity, in the user's words ("cable 3: linear_density").
+        value: The refused value, as text, with its unit.
+        allowed: The allowed range or type of the value.
         next_step: Next step for the user.
     """
 
@@ -49,15 +49,15 @@ class InvalidValueError(SaglineError, ValueError):
 
 
 class CableGeometryError(InvalidValueError):
-    """The two ends of a cable are placed where no cable can be."""
+    """The two ends of a cable are at positions that no cable can have."""
 
 
 class NoSuchEntryError(InvalidValueError, IndexError):
-    """An index that names no entry of a batch."""
+    """An index outside a batch."""
 
 
 class NoBatchError(InvalidValueError, TypeError):
-    """A single pose, cable or equilibrium that was taken for a batch of them."""
+    """A single pose, cable or equilibrium was used as a batch."""
 
 
 class FileError(SaglineError):
@@ -66,7 +66,7 @@ class FileError(SaglineError):
     Attributes:
         path: The file or folder.
         reason: Description of the problem.
-        next_step: Action that solves it.
+        next_step: Action that solves the problem.
         item: Part of the file that is wrong ("cable 3: linear_density", "line 12"); the path if it is the whole file.
         value: Value of the item, as text with its unit; the reason if the value is not known.
         allowed: Allowed values of the item; empty if not known.
@@ -99,12 +99,12 @@ class FileError(SaglineError):
 
     @classmethod
     def not_installed(cls, package: str | None, needed: str, extra: str) -> FileError:
-        """A package that is not there, and how to have it.
+        """Error for a missing package, with the command that installs it.
 
         Args:
-            package: Its name.
-            needed: By whom, "Meshes need it" for instance.
-            extra: The extra of sagline that brings it.
+            package: Name of the package.
+            needed: Reason for the package, "Meshes need it" for instance.
+            extra: The extra of sagline that installs it.
 
         Returns:
             The error, to be raised.
@@ -118,10 +118,11 @@ class FileError(SaglineError):
 
 
 def printable(text: str, kept: str = "") -> str:
-    r"""A text as a terminal may be given it: nothing in it moves the cursor, hides a letter or cannot be written.
+    r"""Text that is safe on a terminal: no character moves the cursor, hides a letter or cannot be encoded.
 
-    text: any text, from a file for instance; kept: characters that may stay, line ends for instance. Returns the text,
-    with control characters, line ends, lone surrogates and all else that is not seen written out as Python writes them.
+    text: any text, from a file for instance; kept: characters that remain unchanged, line ends for instance. Returns
+    the text with control characters, line ends, lone surrogates and all other invisible characters as Python escape
+    sequences.
 
     Examples:
         >>> from sagline.core.errors import printable
@@ -136,15 +137,15 @@ def printable(text: str, kept: str = "") -> str:
 def is_seen(character: str) -> bool:
     """True for a character that is visible, or a space of any width.
 
-    Invisible formatting marks, such as U+200E and U+200B, are not printed.
+    False for invisible formatting marks, such as U+200E and U+200B.
     """
     return character.isprintable() or unicodedata.category(character) == "Zs"
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """The known word that was probably meant, for "Did you mean".
+    """The known word that was probably intended, for "Did you mean".
 
-    Returns the nearest known word; None where none is near.
+    Returns the nearest known word; None if no word is similar.
 
     Examples:
         >>> from sagline.core.errors import nearest
@@ -157,7 +158,7 @@ def nearest(word: str, known: Iterable[str]) -> str | None:
 
 
 def shortened(parts: Sequence[str], room: int) -> list[str]:
-    """Texts that fit together on one line: what does not print is written out, the middle of the longest left out."""
+    """Shorten texts to one line in total: escape invisible characters, omit the middle of the longest text."""
     texts = [printable(part) for part in parts]
     while (excess := sum(map(len, texts)) - room) > 0:
         k = max(range(len(texts)), key=lambda k: len(texts[k]))

@@ -1,9 +1,9 @@
-"""Fields of input types: name, default, unit and allowed range stand once, where the type declares the field.
+"""Fields of input types: name, default, unit and allowed range are defined once, where the type declares the field.
 
-A type is `attrs.frozen`; a field has a converter, from which a type checker knows what the constructor takes, and the
-arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks what is given; it is `check_fields`
-where each field declares its whole check. A dataclass of single numbers derives from `NumberFields` and declares its
-ranges in the same way.
+A type is `attrs.frozen`. Each field has a converter, from which a type checker infers the type of the constructor
+argument, and has the arguments of `sagline.core.arrays.checked` as metadata. `__attrs_post_init__` checks the values;
+it is `check_fields` if each field declares its complete check. A dataclass of single numbers derives from
+`NumberFields` and declares its ranges in the same way.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from sagline.core.arrays import Array, number
 
 
 def given(value: ArrayLike) -> Array:
-    """A value as it is: a converter that gives type checkers the type of the argument."""
+    """Return a value unchanged: a converter that gives type checkers the type of the argument."""
     return value  # type: ignore[return-value]
 
 
 def if_known(value: ArrayLike | None) -> Array | None:
-    """A value or None as it is: the converter of a field that need not be known."""
+    """Return a value or None unchanged: the converter of an optional field."""
     return value  # type: ignore[return-value]
 
 
 def given_or_none(value: ArrayLike | None) -> Array:
-    """A value or None as it is: the converter of a field whose check fills in what is missing."""
+    """Return a value or None unchanged: the converter of a field whose check supplies the missing value."""
     return value  # type: ignore[return-value]
 
 
 def given_by_name(value: Mapping[str, ArrayLike]) -> Mapping[str, Array]:
-    """Values by name as they are."""
+    """Return values by name unchanged."""
     return value  # type: ignore[return-value]
 
 
@@ -45,12 +45,12 @@ def rule(unit: str = "", **limits: Any) -> dict[str, Any]:
 
 
 def checked_by(check: Callable[..., Any], *arguments: Any, **limits: Any) -> dict[str, Any]:
-    """Metadata of a field: a check that is called with value, name and these arguments, as of `core.arguments`."""
+    """Metadata of a field: a check from `core.arguments`, called with value, name and these arguments."""
     return {"check": lambda value, item: check(value, item, *arguments, **limits)}
 
 
 def check_fields(made: Any) -> None:
-    """Check each field of a new object by its `checked_by`; None is allowed where it is the default."""
+    """Check each field of a new object by its `checked_by`; None is allowed if it is the default."""
     for about in fields(type(made)):
         value = getattr(made, about.name)
         if "check" in about.metadata and not (value is None and about.default is None):
@@ -58,9 +58,9 @@ def check_fields(made: Any) -> None:
 
 
 class NumberFields:
-    """Base of dataclasses whose fields are single numbers: those with a `rule` as metadata are checked when made.
+    """Base of dataclasses with single numbers as fields: fields with a `rule` as metadata are checked at construction.
 
-    A field whose rule has `most` is a whole number from 0 to that. None is allowed where it is the default.
+    A field whose rule has `most` is a whole number from 0 to `most`. None is allowed if it is the default.
     """
 
     __slots__ = ()
@@ -77,7 +77,7 @@ class NumberFields:
 
 
 def reduced(value: Any) -> tuple[Any, tuple[type[Any], dict[str, Any]]]:
-    """Reduction for pickle: through the constructor, so that a loaded value is checked and locked too."""
+    """Reduction for pickle through the constructor: a loaded value is also checked and locked."""
     kind = type(value)
     values = {about.name: getattr(value, about.name) for about in fields(kind)}
     return _constructed, (kind, {name: dict(own) if isinstance(own, Mapping) else own for name, own in values.items()})
@@ -88,5 +88,5 @@ def _constructed(kind: type[Any], values: dict[str, Any]) -> Any:
 
 
 def units(kind: type[Any]) -> dict[str, str]:
-    """Unit of each field of an input type, "" for none."""
+    """Unit of each field of an input type, "" if dimensionless."""
     return {field.name: field.metadata["unit"] for field in fields(kind)}

@@ -12,11 +12,11 @@ from sagline.core.errors import NoBatchError, NoSuchEntryError
 
 
 def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
-    """An index along the first axis of a batch, checked.
+    """Checked index along the first axis of a batch.
 
-    index: a number, which may count from the end; a slice; or numbers or booleans, in a list or an array; shape: of the
-    batch; () for a single entry; single: what a single entry is called, "single pose" for instance. Returns an integer,
-    a slice, or an array of integers or booleans.
+    index: a number (negative: from the end), a slice, or a list or array of numbers or booleans; shape: shape of the
+    batch; () for a single entry; single: name of a single entry, "single pose" for instance. Returns an integer, a
+    slice, or an array of integers or booleans.
     """
     if not shape:
         raise NoBatchError("index", brief(index), "none", f"A {single} cannot be indexed; take it as it is.")
@@ -30,13 +30,13 @@ def part_of(index: Any, shape: tuple[int, ...], single: str) -> Any:
     chosen = np.asarray(index) if isinstance(index, list | np.ndarray) else None
     if chosen is None or chosen.ndim != 1 or not _names_entries(chosen, shape[0]):
         raise _no_entry(index, shape[0])
-    return chosen if chosen.size else chosen.astype(np.int64)  # an empty list has no kind
+    return chosen if chosen.size else chosen.astype(np.int64)  # the array of an empty list has the wrong type
 
 
 def batch_length(shape: tuple[int, ...], single: str) -> int:
     """Number of entries along the first axis of a batch.
 
-    shape: of the batch; () for a single entry; single: what a single entry is called, "single pose" for instance.
+    shape: shape of the batch; () for a single entry; single: name of a single entry, "single pose" for instance.
     """
     if not shape:
         raise NoBatchError("this", f"a {single}", "a batch", f"A {single} has no length; take it as it is.")

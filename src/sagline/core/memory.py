@@ -1,4 +1,4 @@
-"""Free memory, checked before large allocations: a process that takes too much is killed without a message."""
+"""Free memory, checked before large allocations: the system kills a process that takes too much, without a message."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Final
 
 from sagline.core.errors import InvalidValueError
 
-UNASKED: Final = 1 << 26  # bytes: less is not worth asking how much is free
-_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory of a pose during its solution, and of each of its cables
-_BEHIND_BYTES = 72.0  # and what is behind each of them
+UNASKED: Final = 1 << 26  # bytes: smaller allocations are not checked
+_POSE_BYTES, _CABLE_BYTES = 400.0, 64.0  # measured memory per pose during its solution, and per cable of the pose
+_BEHIND_BYTES = 72.0  # measured memory for the routing of each cable
 _GROUPS: Final = (  # limit and use of a container
     ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
     ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
@@ -19,19 +19,20 @@ _GROUPS: Final = (  # limit and use of a container
 
 
 def check_memory(item: str, size: float, next_step: str) -> None:
-    """Refuse what would not fit into memory, before it is begun.
+    """Refuse an allocation that does not fit into memory, before it starts.
 
-    item: what asks for it, for the message: "a path of 2e+08 samples"; size: bytes that it needs at the peak; less than
-    64 MB are not asked about.
+    item: purpose of the memory, for the message: "a path of 2e+08 samples"; size: peak memory [bytes]; sizes below 64
+    MB are not checked.
     """
     if size > UNASKED and size > (free := free_memory()):
-        digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)  # in which the two differ
+        # the two numbers must differ in the message
+        digits = next((k for k in range(3, 17) if f"{size:.{k}g}" != f"{free:.{k}g}"), 17)
         wanted, left = f"{size / 1e9:.{digits}g} GB", f"<= {free / 1e9:.{digits}g} GB, which are free"
         raise InvalidValueError(f"the memory for {item}", wanted, left, next_step)
 
 
 def check_poses(count: int, cable_count: int, behind: bool) -> None:
-    """Refuse to solve, forward or inverse, for more poses than there is memory.
+    """Refuse a forward or inverse solution for more poses than fit into memory.
 
     cable_count: number of cables m of the robot.
     """
@@ -40,9 +41,10 @@ def check_poses(count: int, cable_count: int, behind: bool) -> None:
 
 
 def free_memory() -> float:
-    """Memory that this process can still take [bytes]; infinite where the system does not report it.
+    """Memory that is still available to this process [bytes]; infinite if the system does not report it.
 
-    Returns the least of what the machine has free, what its container is allowed and what the process is.
+    Returns the smallest of three values: free memory of the machine, and free memory within the limits of container and
+    process.
     """
     free = [float("inf")]
     with contextlib.suppress(OSError, ValueError, AttributeError):  # AttributeError: Windows has no sysconf

@@ -1,4 +1,4 @@
-"""Numbers as text: prefixes of units instead of exponents, and no digits that are rounding errors."""
+"""Numbers as text: unit prefixes instead of exponents; digits below the rounding error are omitted."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import re
 from math import floor, isfinite, log10
 from typing import SupportsFloat
 
-ROUNDING = 1e-12  # of the size of what a number is the difference of: what is smaller is rounding
+ROUNDING = 1e-12  # relative to the size of the operands: a smaller difference is rounding error
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
-HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # largest usual prefix; of other units all
-LONGEST_PLAIN = 1e7  # from here on a number without a prefix is written with a power of ten
+HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # power of ten of the largest usual prefix; other units use all prefixes
+LONGEST_PLAIN = 1e7  # a larger number without a prefix is written with a power of ten
 SPACE = "\N{NO-BREAK SPACE}"
-TIGHT = ("", "°")  # units that stand close
+TIGHT = ("", "°")  # units written without a space before them
 
-# the first unit of a product, with its prefix; one that is raised to a power has no prefix that reads well
+# First unit of a product, with its prefix; a unit raised to a power gets no prefix because it reads badly.
 _scaled = re.compile(r"([fpnµmkMG]?)(rad|Pa|m|g|s|N|J|W)(?![\w²³⁴⁻^])")
 _superscript = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -27,17 +27,17 @@ def n(
     uncertainty: SupportsFloat | None = None,
     size: SupportsFloat = 0.0,
 ) -> str:
-    """A number for a reader, with its unit.
+    """Number with its unit, for display.
 
-    From 0.1 to 1000 it stays in the unit it is given in; beyond that the unit takes the prefix with which it is between
-    1 and 1000, and where there is none a power of ten is written out. A minus is a true one, a space before a unit
-    does not break.
+    A number from 0.1 to 1000 keeps the given unit. Otherwise the unit gets the prefix that brings the number between 1
+    and 1000; without such a prefix, a power of ten is written. The minus sign is U+2212; the space before a unit does
+    not break.
 
-    value: the number, in the unit; "–" where it is not finite; form: how its digits are formatted, as in
-    `format`; not used with an uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" for none; uncertainty:
-    standard uncertainty, in the unit, written behind the last digits of the value to two digits: 43.98(10) is 43.98 ±
-    0.10. None for none; size: of what the value is a difference, in the unit: a value that is `ROUNDING` of it is "0
-    (rounding)".
+    value: the number, in the unit; "–" if not finite; form: format of the digits, as in `format`; not used with an
+    uncertainty; unit: its unit, such as "mm", "kg/m", "%"; "" if dimensionless; uncertainty: standard uncertainty, in
+    the unit, written in parentheses after the last digits of the value, with two digits: 43.98(10) is 43.98 ± 0.10.
+    None: not written; size: size of the operands whose difference is the value, in the unit: a value of at most
+    `ROUNDING` times the size is written as "0 (rounding)".
 
     Source:
         ISO 80000-1:2022, 7.2 (prefixes); JCGM 100:2008, 7.2.2 (uncertainty in parentheses).
@@ -60,10 +60,10 @@ def n(
 
 
 def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, prefixed: bool = True) -> str:
-    """A number with its standard error, both to the two digits of the error that count: "512 ± 12 kN".
+    """Number with its standard error, both rounded to two significant digits of the error: "512 ± 12 kN".
 
-    error: its standard error, in the unit; not finite: unknown; prefixed: whether
-    the unit takes the prefix it reads best with; in a column of a table none does.
+    error: its standard error, in the unit; not finite means unknown; prefixed: True if the unit gets the most readable
+    prefix; False in a column of a table.
     """
     number, own = float(value), float(error)
     if not (isfinite(number) and isfinite(own) and own > 0.0):
@@ -77,15 +77,15 @@ def plus_minus(value: SupportsFloat, error: SupportsFloat, unit: str = "", *, pr
 
 
 def counted(count: int, noun: str) -> str:
-    """A number of things, "1 pose" or "1,200 poses".
+    """Count with its noun, "1 pose" or "1,200 poses".
 
-    noun: one of them; several have an s, or es.
+    noun: singular; the plural adds s or es.
     """
     return f"{count:,} {noun}{'' if count == 1 else 'es' if noun.endswith(('ch', 'x')) else 's'}"
 
 
 def _prefixed(number: float, form: str, unit: str) -> tuple[int, str]:
-    """The power of ten that takes a number into the unit it reads best in, and that unit."""
+    """Power of ten that converts a number into its most readable unit, and this unit."""
     found = _scaled.match(unit)
     if found is None or number == 0.0 or _reads_well(number, form, 0.1):
         return 0, unit
@@ -109,18 +109,18 @@ def _digits(number: float, form: str) -> str:
     if exponent and abs(number) < LONGEST_PLAIN and int(exponent) > 0:
         mantissa, exponent = format(float(text.replace(",", "")), "+,.0f" if "+" in form else ",.0f"), ""
     if not any(digit in "123456789" for digit in mantissa):
-        mantissa = mantissa.lstrip("+-")  # no zero has a sign
+        mantissa = mantissa.lstrip("+-")  # a zero has no sign
     mantissa = mantissa.replace("-", "−")
     return f"{mantissa}{SPACE}×{SPACE}10{str(int(exponent)).translate(_superscript)}" if exponent else mantissa
 
 
 def _with_uncertainty(number: float, error: float) -> str:
-    """The value to the last digit of an uncertainty of two digits, and that uncertainty."""
+    """Value rounded to the last digit of its uncertainty (two digits), followed by the uncertainty."""
     places = 1 - int(f"{error:.1e}".partition("e")[2])
     if places <= 0:
         shown = f"({round(error, places):.0f})"
     elif f"{error:.{places}f}".startswith("0"):
         shown = "(" + f"{error:.{places}f}".lstrip("0.") + ")"
     else:
-        shown = f"({error:.{places}f})"  # it reaches over the decimal point, which is then written
+        shown = f"({error:.{places}f})"  # the uncertainty is 1 or more, so its decimal point is written
     return _digits(round(number, places), f",.{max(places, 0)}f") + shown

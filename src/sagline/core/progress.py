@@ -1,4 +1,4 @@
-"""Long work in blocks, between which an interrupt is handled and progress is reported."""
+"""Long calculations in blocks; between two blocks an interrupt is handled and progress is reported."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import TypeAlias
 
 from sagline.core.arrays import Array
 
-Progress: TypeAlias = Callable[[int, int], None]  # called after each block: how many are done, of how many
+Progress: TypeAlias = Callable[[int, int], None]  # called after each block: number done, total number
 
 
 def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[slice]:
-    """Slices of at most `size` of `count` rows; progress is reported after each."""
+    """Slices that divide `count` rows into blocks of at most `size`; progress is reported after each."""
     for first in range(0, count, size):
         part = slice(first, min(first + size, count))
         yield part
@@ -20,5 +20,5 @@ def blocks(count: int, size: int, progress: Progress | None = None) -> Iterator[
 
 
 def rows_of(array: Array, part: slice) -> Array:
-    """A block of an array with one row for all or one row each."""
+    """Block of an array that has either one row for all or one row each."""
     return array if len(array) == 1 else array[part]

@@ -12,9 +12,9 @@ import numpy as np
 
 from sagline.core.arrays import locked
 
-# The ring that draws is far out, and loads when something is shown, by its name: an import would close a circle here.
+# Imported by name at the first display: a normal import would be circular.
 _PAGES = "sagline.notebook.html"
-# Files know all results, so no result imports them: the module is loaded by its name when a result is saved.
+# The file formats import all results; a result imports them by name when it is saved, to avoid a circular import.
 _FORMATS: Final = "sagline.files.format"
 
 
@@ -30,38 +30,38 @@ def set_fields(target: object, **values: Any) -> None:
 
 
 class Shown:
-    """Something that Jupyter shows with its verdict and a figure; elsewhere it is its ordinary text."""
+    """Base class for display in Jupyter as a summary with a figure; elsewhere the ordinary text is displayed."""
 
     __slots__ = ()
 
     def _repr_html_(self) -> str | None:
-        """The verdict, and a figure inside; None, whereupon the ordinary text is shown, where there is nothing more."""
-        with suppress(Exception):  # a notebook's cell has done its work: how that looks must not spoil it
+        """Summary and figure as HTML; None if not available: Jupyter then displays the ordinary text."""
+        with suppress(Exception):  # an error during display must not make a finished cell fail
             shown: str | None = import_module(_PAGES).html_of(self)
             return shown
         return None
 
 
 class ByFields:
-    """A frozen dataclass that is pickled by its fields, and whose arrays are write-locked where it is loaded or copied.
+    """Frozen dataclass that is pickled by its fields; its arrays are write-locked after loading or copying.
 
-    What is loaded is what was saved: it does not go through a constructor that takes other words.
+    Loading restores the saved fields without the constructor, whose arguments may differ from the fields.
     """
 
     __slots__ = ()
 
     def __reduce__(self) -> tuple[Any, tuple[type[ByFields], dict[str, Any]]]:
-        """Pickle by fields, so that the arrays of what is loaded are locked too."""
+        """Pickle by fields, so that the arrays of the loaded object are locked too."""
         return _again, (type(self), {field.name: getattr(self, field.name) for field in fields(self)})  # type: ignore[arg-type]
 
 
 class Result(ByFields, Shown):
-    """A result, which cannot be changed, also after pickling."""
+    """An immutable result, also after pickling."""
 
     __slots__ = ()
 
     def __repr__(self) -> str:
-        """The first line of the text, for results whose arrays are too long to be read: `dataclass(repr=False)`."""
+        """First line of the text; for results with long arrays, together with `dataclass(repr=False)`."""
         return f"<{type(self).__name__}: {str(self).splitlines()[0]}>"
 
 
@@ -79,13 +79,13 @@ class Saved:
         `load_path` reads calibration poses; xarray opens frequency maps and NetCDF files of executions.
 
         Args:
-            file: The file; a regular file that exists is replaced, anything else is refused.
+            file: The file; an existing regular file is replaced, any other existing object is refused.
 
         Raises:
             InvalidValueError: If the result cannot be read back: a plan of several robots, or a cable model, tension
                 method or criterion of your own.
-            FileError: If the suffix is wrong, a package is missing or the file cannot be written; the former file is
-                unchanged.
+            FileError: If the suffix is wrong, a package is missing or the file cannot be written; an existing file
+                remains unchanged.
         """
         formats().save(self, file)
 

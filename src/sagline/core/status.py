@@ -1,4 +1,4 @@
-"""Base class of status codes: an integer that kernels return, with a sentence about it."""
+"""Base class of status codes: an integer returned by a kernel, with an explanatory sentence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Self
 
 
 class Status(IntEnum):
-    """End of a calculation; a member is written as its code and its sentence.
+    """Outcome of a calculation; the text of a member is its code and its sentence.
 
     Attributes:
         text: Meaning and next step, one sentence.
@@ -16,7 +16,7 @@ class Status(IntEnum):
     text: str
 
     def __new__(cls, code: int, text: str = "") -> Self:
-        """A member that is the code."""
+        """Create a member with its code as value."""
         member = int.__new__(cls, code)
         member._value_ = code
         member.text = text

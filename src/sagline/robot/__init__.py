@@ -1,1 +1,1 @@
-"""The robot as data: geometry, cables, mass, limits, poses and the presets."""
+"""Data of the robot: geometry, cables, mass, limits, poses and presets."""

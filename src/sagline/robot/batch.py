@@ -1,4 +1,4 @@
-"""One robot for all poses, or one robot a pose: what the robots of a batch share, and how to take some of them."""
+"""One robot for all poses, or one robot per pose: common properties of all robots of a batch, and selections."""
 
 from __future__ import annotations
 
@@ -15,23 +15,24 @@ from sagline.core.errors import InvalidValueError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-Robots: TypeAlias = Robot | tuple[Robot, ...]  # `together` makes it from what a caller gives
-Index: TypeAlias = int | slice | NDArray[Any]  # of a batch
+Robots: TypeAlias = Robot | tuple[Robot, ...]  # type after `together`
+Index: TypeAlias = int | slice | NDArray[Any]  # index of a batch
 
-_ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gravity": " m/s^2"}  # and their units
+# common properties and their units
+_ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gravity": " m/s^2"}
 
 
 def together(robot: Robot | Sequence[Robot]) -> Robots:
-    """The one robot of all poses as it is, or several as a tuple, checked against each other.
+    """Check a robot, or several robots against each other; several are returned as a tuple.
 
-    Several robots may differ in anything but what a batch has once: number of cables, motion pattern with its plane,
-    the tension that is limited, and gravity.
+    Several robots must have the same number of cables, motion pattern with plane normal, type of limited tension, and
+    gravity. All other properties may differ.
 
     robot: a robot, or a sequence of them.
     """
     if isinstance(robot, Robot):
         return robot
-    given: Any = robot  # a caller without types gives anything
+    given: Any = robot  # a caller without type checks may give anything
     robots: tuple[Any, ...] = ()
     if isinstance(given, Sequence | np.ndarray) and not isinstance(given, str):
         robots = tuple(given)
@@ -47,7 +48,7 @@ def together(robot: Robot | Sequence[Robot]) -> Robots:
 
 
 def check_count(robot: Robots, poses: int | None) -> None:
-    """Refuse several robots that are not one a pose; poses: their number, None for a single one without batch axis."""
+    """Refuse a tuple of robots unless it has one robot per pose; poses: their number, None for a single pose."""
     if isinstance(robot, Robot) or len(robot) == poses:
         return
     allowed = "one robot" if poses is None else f"one robot, or a sequence of {poses}"
@@ -56,14 +57,14 @@ def check_count(robot: Robots, poses: int | None) -> None:
 
 
 def one_a_pose(robot: Robot | Sequence[Robot], poses: int | None) -> Robots:
-    """The robot, or several as a tuple of one a pose: `together` and `check_count` in one."""
+    """Check the robot, or the tuple with one robot per pose: `together` and `check_count` in one call."""
     robots = together(robot)
     check_count(robots, poses)
     return robots
 
 
 def first_of(robot: Robots) -> Robot:
-    """The robot, or the first of several, for what all of them share; refuses an empty selection."""
+    """The robot, or the first of several, for properties common to all; refuses an empty selection."""
     if isinstance(robot, Robot):
         return robot
     if not robot:
@@ -72,7 +73,7 @@ def first_of(robot: Robots) -> Robot:
 
 
 def robots_at(robot: Robots, index: Index) -> Robots:
-    """The robot of all poses, or of several those of the poses that an index names."""
+    """The robot of all poses, or the robots at the poses of an index."""
     if isinstance(robot, Robot):
         return robot
     chosen = np.arange(len(robot))[index]
@@ -85,7 +86,7 @@ def robot_at(robot: Robots, pose: int) -> Robot:
 
 
 def cables_of(robot: Robots) -> Cable:
-    """Material of the cables, (m,), or (N, m) for several robots; of these a field is known where all know it."""
+    """Material of the cables, (m,), or (N, m) for several robots; an optional field is known if all robots have it."""
     if isinstance(robot, Robot):
         return robot.cables
     materials = [one.cables.known() for one in robot]
@@ -94,17 +95,17 @@ def cables_of(robot: Robots) -> Cable:
 
 
 def has_routing(robot: Robots) -> bool:
-    """True if any cable runs over a pulley, or has a dead length behind its frame anchor."""
+    """True if any cable runs over a pulley or has a dead length."""
     robots = (robot,) if isinstance(robot, Robot) else robot
     return any(one.winches is not None and one.winches.anything_behind for one in robots)
 
 
 class _Bodies(NamedTuple):
-    """Inertia of the platform, once for all poses or, for several robots, with a leading axis N."""
+    """Inertia of the platform, one for all poses or, for several robots, with a leading axis N."""
 
     mass: Array  # [kg], shape () or (N,)
     center_of_mass: Array  # in the platform frame [m], shape (3,) or (N, 3)
-    inertia: Array  # about the center of mass in the platform frame [kg m^2], shape (3, 3) or (N, 3, 3)
+    inertia: Array  # about the center of mass, in the platform frame [kg m^2], shape (3, 3) or (N, 3, 3)
 
 
 def bodies_of(robot: Robots) -> _Bodies:
@@ -125,10 +126,10 @@ def anchors_of(robot: Robots) -> _Anchors:
 
 
 class _Pulleys(NamedTuple):
-    """The pulleys of the cables; of radius 0, and entered from below, where there are none."""
+    """The pulleys of the cables; without pulleys, the radius is 0 and the entry is from below."""
 
     radius: Array  # R [m], shape (m,) or, for several robots, (N, m)
-    entry: Array  # +1 where a cable comes from below, -1 from above, of the same shape
+    entry: Array  # +1 where a cable enters from below, -1 from above, of the same shape
 
 
 def pulleys_of(robot: Robots) -> _Pulleys:
@@ -155,7 +156,7 @@ def limits_of(robot: Robots) -> _Limits:
 
 
 def _each(robot: Robots, own: Callable[[Robot], tuple[Array, ...]]) -> tuple[Array, ...]:
-    """Arrays of a robot as they are; those of several robots stacked, with a leading axis N."""
+    """Arrays of one robot unchanged; arrays of several robots stacked, with a leading axis N."""
     if isinstance(robot, Robot):
         return own(robot)
     return tuple(np.stack(arrays) for arrays in zip(*(own(one) for one in robot), strict=True))
@@ -171,7 +172,8 @@ def _check_alike(first: Robot, other: Robot, index: int) -> None:
         value, wanted = getattr(other, name), getattr(first, name)
         if value != wanted:
             raise InvalidValueError(f"robot[{index}]: {name}", f"{value}{unit}", f"{wanted}{unit}, as robot[0]", step)
-    normal, wanted = other.plane_normal, first.plane_normal  # both or neither: the pattern says which
+    # both are given or both are None, because the motion pattern is common
+    normal, wanted = other.plane_normal, first.plane_normal
     if normal is not None and wanted is not None and not np.array_equal(normal, wanted):
         raise InvalidValueError(f"robot[{index}]: plane_normal", normal, f"{wanted}, as robot[0]", step)
 
@@ -189,11 +191,11 @@ def outward(robot: Robots, pose: Pose) -> Array:
 
 
 def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
-    """Points on the pulleys, from where the cables enter them.
+    """Points on the pulleys, measured along the cables from the entry points.
 
-    pose: one pose, or a batch of N: the pulleys have turned towards the platform ends; angle: along the cable from the
+    pose: one pose, or a batch of N: it defines the swivel angles of the pulleys; angle: angle along the cable from the
     frame anchor [rad], shape (..., m); the wrap angle gives the exit point. Returns points in the world [m], shape
-    (..., m, 3); frame anchors where there is no pulley.
+    (..., m, 3); the frame anchors where there is no pulley.
     """
     radius, entry = pulleys_of(robot)
     away = outward(robot, pose) * (radius * (1.0 - np.cos(angle)))[..., None]
@@ -202,14 +204,14 @@ def points_on_pulleys(robot: Robots, pose: Pose, angle: Array) -> Array:
 
 
 def pulley_centers(robot: Robot, pose: Pose) -> Array:
-    """Middles of the pulleys [m], shape (m, 3): beside the frame anchors, at their height."""
+    """Centers of the pulleys [m], shape (m, 3): at the height of the frame anchors, one radius away horizontally."""
     centers = robot.frame_anchors.copy()
     centers[:, :2] += pulleys_of(robot).radius[:, None] * outward(robot, pose)
     return locked(centers)
 
 
 def dead_cable(robot: Robots) -> Array:
-    """Length of each cable between pulley and drum [m], (m,) or (N, m): the least length off the drum."""
+    """Length of each cable between pulley and drum [m], (m,) or (N, m): the smallest possible length off the drum."""
     if not isinstance(robot, Robot):
         return np.stack([dead_cable(one) for one in robot])
     return np.zeros(robot.cable_count) if robot.winches is None else robot.winches.dead_cable

@@ -1,4 +1,4 @@
-"""Robots that come with sagline, and a first robot from a few numbers."""
+"""Robot presets of sagline, and an initial robot design from a few numbers."""
 
 from __future__ import annotations
 
@@ -50,21 +50,21 @@ def preset_text(name: str) -> str:
 
 LAYOUTS: Final = ("top", "mixed", "bottom")
 COUNTS: Final = {"top": (8, 6), "mixed": (8, 7)}
-THINNEST, THICKEST = 0.0003, 0.08  # m, of ropes for cable robots
-SLACK_LIMIT = 0.05  # lowest tension, of the platform's weight
-_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, of the edges
+THINNEST, THICKEST = 0.0003, 0.08  # m, allowed diameters of ropes for cable robots
+SLACK_LIMIT = 0.05  # lowest tension, relative to the weight of the platform
+_CORNERS = np.array([[0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5], [0.5, -0.5]])  # counter-clockwise, relative to the edges
 _POSTS = np.array([[0.5, -0.5], [-0.5, -0.5], [0.0, 0.5]])  # a triangle in the same rectangle
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Design:
-    """Data of a first robot.
+    """Data of an initial robot design.
 
     Attributes:
-        name: Name of the robot.
+        frame: Edges of the frame [m], shape (3,); it is on the floor, centered at the origin.
         frame: Edges of the frame [m], shape (3,); on the floor, around the origin.
         platform: Edges of the platform [m], shape (3,).
-        mass: Mass of the platform with its load [kg].
+        mass: Mass of the platform with its payload [kg].
         rope: Name in the catalogue of ropes.
         diameter: Diameter of the rope [m].
         cables: Number of cables, 6 to 8.
@@ -91,20 +91,20 @@ class Design:
         cables: int = 8,
         layout: str = "top",
     ) -> None:
-        """Check what the robot itself would not, or would say in other words.
+        """Check the data that the robot itself does not check, or reports in other terms.
 
         Args:
             name: Name of the robot.
             frame: Edges of the frame [m], shape (3,).
-            platform: Edges of the platform [m], shape (3,), smaller.
-            mass: Mass of the platform with its load [kg].
+            platform: Edges of the platform [m], shape (3,), smaller than those of the frame.
+            mass: Mass of the platform with its payload [kg].
             rope: Name in the catalogue of ropes.
             diameter: Diameter of the rope [m], 0.3 mm to 80 mm.
             cables: Number of cables, 6 to 8.
             layout: "top" or "mixed".
 
         Raises:
-            InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot carry a load,
+            InvalidValueError: If a size is not positive, the platform does not fit, the layout cannot support a load,
                 or there is no such rope.
         """
         outer = checked(frame, "frame", "m", shape=(3,), above=0.0)
@@ -134,13 +134,13 @@ class Design:
             object.__setattr__(self, field.name, value)
 
     def robot(self) -> Robot:
-        """The robot, its limits from its weight and its ropes.
+        """The robot; its tension limits follow from the weight of the platform and the strength of the ropes.
 
         Returns:
-            Robot; what was assumed is marked as such.
+            Robot; assumed values are marked in its field `assumed`.
 
         Raises:
-            InvalidValueError: If the ropes are too weak for any tension between the limits, or a number is wrong.
+            InvalidValueError: If the ropes are too weak for any tension between the limits, or a value is wrong.
         """
         rope = ROPES[self.rope]
         cable = rope.cable(self.diameter)
@@ -172,9 +172,9 @@ class Design:
         )
 
     def placed(self, share: float) -> PoseBox:
-        """The middle of the frame, a share of each of its edges.
+        """Box of platform positions around the center of the frame.
 
-        share: of each edge of the frame that the platform leaves free, 0 to 1.
+        share: edges of the box relative to the free edges, frame minus platform, 0 to 1.
         """
         middle = np.array([0.0, 0.0, 0.5 * self.frame[2]])
         half = 0.5 * share * (self.frame - self.platform)
@@ -193,7 +193,7 @@ class Design:
 
 
 def _at(plane: Array, height: float) -> Array:
-    """Points of a plane at a height."""
+    """Points of a horizontal plane at a given height."""
     return np.column_stack((plane, np.full(len(plane), height)))
 
 
@@ -205,13 +205,13 @@ def _crossed() -> tuple[Array, Array]:
 
 
 def _octahedron() -> tuple[Array, Array]:
-    """Two cables from each of three posts, to the two nearest corners of a triangle turned by half a turn."""
+    """Two cables from each of three posts, to the two nearest corners of a triangle rotated by 180 degrees."""
     frame = np.repeat(_at(_POSTS, 0.5), 2, axis=0)
     triangle = _at(-_POSTS, 0.5)  # corner k lies opposite post k
     return frame, triangle[[1, 2, 2, 0, 0, 1]]
 
 
 def _mixed(below: Array) -> tuple[Array, Array]:
-    """From each top corner to the lower platform corner next to it, from points of the floor to upper ones."""
+    """Cables from each top corner to the adjacent lower platform corner, and from floor points to upper ones."""
     frame = np.concatenate((_at(_CORNERS, 0.5), _at(below, -0.5)))
     return frame, np.concatenate((_at(_CORNERS, -0.5), _at(below, 0.5)))

@@ -14,11 +14,12 @@ from sagline.robot.pose import unit
 from sagline.robot.winch import Winch
 
 _SYMMETRY = 1e-9  # largest difference of mirrored elements, relative to the largest element
-_ROUNDED = 0.01  # tolerance of moments printed with three digits: the largest of a thin plate is the sum of the others
+# tolerance for moments given with three digits: for a thin plate the largest moment equals the sum of the others
+_ROUNDED = 0.01
 
 
 def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
-    """Frame and platform anchors [m], (m, 3) each, one pair a cable, no pair twice."""
+    """Frame and platform anchors [m], (m, 3) each, one pair per cable, no pair twice."""
     pair = []
     for value, item in ((frame, "frame_anchors"), (platform, "platform_anchors")):
         array = checked(value, item, "m", shape=(None, 3))
@@ -37,7 +38,7 @@ def anchors(frame: ArrayLike, platform: ArrayLike) -> tuple[Array, Array]:
 
 
 def _refuse_twins(ends: Array) -> None:
-    if len({row.tobytes() for row in ends + 0.0}) == len(ends):  # no -0.0
+    if len({row.tobytes() for row in ends + 0.0}) == len(ends):  # adding 0.0 removes negative zeros
         return
     _, first, which = np.unique(ends, axis=0, return_index=True, return_inverse=True)
     twin_of = first[which.reshape(-1)]
@@ -53,7 +54,7 @@ def _refuse_twins(ends: Array) -> None:
 
 
 def cables(given: Cable, count: int) -> Cable:
-    """The cables' material with fields of shape (m,); each weighs something."""
+    """The material of the cables with fields of shape (m,); each linear density is positive."""
     instance(given, Cable, "cables")
     fields = {name: per_cable(field, f"cables: {name}", count) for name, field in given.known().items()}
     if not (density := fields["linear_density"]).all():
@@ -67,20 +68,20 @@ def cables(given: Cable, count: int) -> Cable:
 
 
 def winch_of_each_cable(given: Winch | None, frame: Array) -> Winch | None:
-    """The winches, one a cable, or None; the dead length follows from guides that lead to the frame anchors (m, 3)."""
+    """The winches, one per cable, or None; guides that lead to the frame anchors (m, 3) define the dead length."""
     winch = optional(given, Winch, "winches")
     return None if winch is None else winch.per_cable(len(frame))._run_to(frame)
 
 
 def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Array:
-    """Inertia about the center of mass: symmetric, no moment negative, positive about each axis that is turned about.
+    """Inertia about the center of mass: symmetric, no negative moment, positive about each free rotation axis.
 
-    A body that turns about every axis obeys the triangle inequality too: none of its principal moments is larger than
-    the other two together. What a planar platform has about the axes in its plane may be zero, as other tools write it;
-    so may everything where nothing turns.
+    A body with three free rotations must also satisfy the triangle inequality: each principal moment is at most the sum
+    of the other two. The moments of a planar platform about the axes in its plane may be zero, as other tools write
+    them; without rotations all moments may be zero.
 
-    given: inertia [kg m^2], or None; pattern: the motion pattern, which says whether the platform turns; normal: unit
-    normal of the plane of a planar pattern, shape (3,); None for the others. Returns matrix of shape (3, 3).
+    given: inertia [kg m^2], or None; pattern: the motion pattern, which defines the free rotations; normal: unit normal
+    of the plane of a planar pattern, shape (3,); None for the other patterns. Returns a matrix of shape (3, 3).
     """
     if given is None and pattern in ROTATING:
         raise InvalidValueError(
@@ -111,7 +112,7 @@ def inertia(given: ArrayLike | None, pattern: str, normal: Array | None) -> Arra
 
 
 def _check_moments(moments: Array, *, everywhere: bool) -> None:
-    """Refuse principal moments, in rising order [kg m^2], that no body has; everywhere: it turns about every axis."""
+    """Refuse impossible principal moments (increasing order) [kg m^2]; everywhere: True if all rotations are free."""
     least = 0.0 if everywhere else np.nextafter(-_SYMMETRY * abs(moments[2]), -1.0)
     if moments[0] <= least:
         raise InvalidValueError(
@@ -130,7 +131,7 @@ def _check_moments(moments: Array, *, everywhere: bool) -> None:
 
 
 def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
-    """Unit normal of the plane a planar platform moves in, of any length but zero as given; None for the others."""
+    """Unit normal of the plane of motion of a planar platform, from any nonzero vector; None for other patterns."""
     if (given is None) == (pattern in PLANAR):
         has = "not given" if given is None else "given"
         allowed = "a vector of three numbers" if given is None else "nothing"
@@ -146,7 +147,7 @@ def plane_normal(given: ArrayLike | None, pattern: str) -> Array | None:
 
 
 def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[Array, Array]:
-    """Lower and upper tension limits [N], (m,); none negative, no lower one above its upper one."""
+    """Lower and upper tension limits [N], (m,); not negative, each lower limit at most its upper limit."""
     lower = per_cable(checked(low, "tension_min", "N", low=0.0), "tension_min", count)
     upper = per_cable(checked(high, "tension_max", "N", low=0.0, infinite=True), "tension_max", count)
     crossed = np.flatnonzero(lower > upper)
@@ -162,7 +163,7 @@ def limits_of_each_cable(low: ArrayLike, high: ArrayLike, count: int) -> tuple[A
 
 
 def per_cable(array: Array, item: str, count: int) -> Array:
-    """One value a cable, (m,), from that or from one value for all."""
+    """One value per cable, (m,), from one value per cable or one value for all."""
     if array.shape not in ((), (1,), (count,)):
         raise InvalidValueError(item, f"of shape {array.shape}", f"shape () or ({count},)", "Give one value a cable.")
     return array if array.shape == (count,) else locked(np.full(count, array))

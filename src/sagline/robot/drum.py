@@ -1,4 +1,4 @@
-"""Drums of a robot: between the length of cable off a drum, its turns, and the counts of its encoder."""
+"""Drums of a robot: conversion between cable length off the drum, drum turns and encoder counts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sagline.robot.routing import actual_routing, differs
 from sagline.robot.winch import Winch
 
 MOST_LAYERS: Final = 1000
-ROUNDING: Final = 1e-6  # turns by which a drum may be more than full, or emptier than empty
+ROUNDING: Final = 1e-6  # tolerance in turns beyond a full or an empty drum
 _ZERO_STEP: Final = (
     "Give it in the robot file, or find it with home(robot, pose, frame_end_tension) and save the robot it returns; "
     "then plan again."
@@ -29,15 +29,15 @@ _ZERO_STEP: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drums:
-    """The drums of m cables. Lengths are those off the drum, at the tension of winding.
+    """The drums of m cables. Lengths are lengths off the drums, at the winding tension.
 
     Attributes:
-        winches: Their data, fields of shape (m,).
-        table: As kernels take them, shape (m, DRUM_COLUMNS).
-        starts: Length off the drum where each layer begins [m], shape (m, layers + 1); -inf where there is no end.
+        winches: The winch data, fields of shape (m,).
+        table: Drum data in the form for kernels, shape (m, DRUM_COLUMNS).
+        starts: Length off the drum where each layer begins [m], shape (m, layers + 1); -inf for a layer without an end.
         rest_strain: Strain of the cable on the drum, shape (m,).
-        fewest: Turns on the empty drum, shape (m,): 0, or -inf where it is not known how much cable there is.
-        most: Turns on the full drum, shape (m,); inf where that is not known.
+        fewest: Turns on the empty drum, shape (m,): 0, or -inf if the length of the cable is not known.
+        most: Turns on the full drum, shape (m,); inf if not known.
     """
 
     winches: Winch
@@ -48,10 +48,10 @@ class Drums:
     most: Array
 
     def turns(self, length: Array) -> tuple[Array, Array]:
-        """Turns on the drums, and their travel.
+        """Turns on the drums, and cable length per turn.
 
-        length: lengths off the drums [m], shape (N, m); NaN is answered by NaN. Returns turns, and by how much one of
-        them changes the length [m], both of shape (N, m).
+        length: lengths off the drums [m], shape (N, m); NaN gives NaN. Returns turns, and change of length per turn
+        [m], both of shape (N, m).
         """
         turns, travel = self._turns(length)
         if (wrong := self._off(turns)) is not None:
@@ -63,20 +63,20 @@ class Drums:
         return turns, travel
 
     def lengths(self, turns: Array) -> Array:
-        """Lengths off the drums [m] at so many turns on them, shape (N, m)."""
+        """Lengths off the drums [m] at given turns on the drums, shape (N, m)."""
         length = np.empty(turns.shape)
         drum.lengths_of_turns(self.table, self.starts, kernel_input(turns, turns.shape), length)
         return length
 
     def counts(self, length: Array) -> Array:
-        """Counts of the encoders at lengths off the drums, both of shape (N, m), not rounded."""
+        """Encoder counts at lengths off the drums, both of shape (N, m), not rounded."""
         zero, rate = self.zero_and_rate()
         turns, _ = self.turns(length)
         found: Array = self.winches.count_zero + (zero - turns) * rate
         return found
 
     def lengths_at(self, counts: Array) -> Array:
-        """Lengths off the drums [m] at counts of the encoders, both of shape (N, m)."""
+        """Lengths off the drums [m] at encoder counts, both of shape (N, m)."""
         zero, rate = self.zero_and_rate()
         turns = zero - (counts - self.winches.count_zero) / rate
         if (wrong := self._off(turns)) is not None:
@@ -87,7 +87,7 @@ class Drums:
         return self.lengths(turns)
 
     def zero_and_rate(self) -> tuple[Array, Array]:
-        """Turns on the drums at the zeros of their counts, and counts for a turn let out.
+        """Turns on the drums at zero counts, and counts per turn of cable paid out.
 
         Returns both of shape (m,).
         """
@@ -105,7 +105,7 @@ class Drums:
         return turns, travel
 
     def _off(self, turns: Array) -> tuple[int, int] | None:
-        """The first sample and cable that is on no drum."""
+        """The first sample and cable whose length is outside the range of its drum."""
         wrong = (turns > self.most + ROUNDING) | (turns < self.fewest - ROUNDING)
         if not wrong.any():
             return None
@@ -113,7 +113,7 @@ class Drums:
         return int(sample), int(cable)
 
     def _ends(self, cable: int) -> Array:
-        """Least and greatest length off a drum [m]."""
+        """Smallest and largest length off a drum [m]."""
         most = float(self.most[cable])
         low = self.lengths(np.full((1, len(self.most)), most))[0, cable] if most < np.inf else 0.0
         return np.array([max(low, 0.0), self.starts[cable, 0]])
@@ -132,8 +132,8 @@ class Drums:
 def drums_of(robot: Robot) -> Drums:
     """The drums of a robot.
 
-    robot: the robot. Its winches need drum_radius and groove_pitch, its cables a diameter; several layers need
-    drum_width too, and these or a wandering exit cable_length.
+    robot: the robot. Its winches need drum_radius and groove_pitch, its cables a diameter. Several layers also need
+    drum_width. Several layers or a wandering exit also need cable_length.
     """
     winches, diameter = robot.winches, robot.cables.diameter
     names = ["drum_radius", "groove_pitch"]
@@ -151,10 +151,10 @@ def drums_of(robot: Robot) -> Drums:
 
 
 def not_given(names: Sequence[str]) -> tuple[str, str]:
-    """Item and value of a message on missing data.
+    """Item and value of a message about missing data.
 
-    names: of one or more, "winches: drum_radius" for instance, those of one kind in a row. Returns item and value: of
-    several the kind is named once.
+    names: names of the missing fields, "winches: drum_radius" for instance, grouped by type. Returns item and value;
+    the type of several fields is named once.
     """
     if len(names) == 1:
         return names[0], "not given"
@@ -164,7 +164,7 @@ def not_given(names: Sequence[str]) -> tuple[str, str]:
 
 
 def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
-    """The drums as kernels take them, and where their layers begin."""
+    """The drums in the form for kernels, and the lengths where their layers begin."""
     pitch, width = _given(winches, "groove_pitch"), winches.drum_width
     _check_width(winches, pitch)
     if (winches.layers > MOST_LAYERS).any():
@@ -173,7 +173,7 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
         raise InvalidValueError(f"winches: layers[{i}]", many, f"1 to {MOST_LAYERS}", "Correct it.")
     table = np.empty((len(pitch), drum.DRUM_COLUMNS))
     table[:, drum.PITCH_RADIUS] = _given(winches, "drum_radius") + 0.5 * diameter
-    table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies between two of those below
+    table[:, drum.LAYER_RISE] = 0.5 * math.sqrt(3.0) * diameter  # each turn lies between two turns of the layer below
     table[:, drum.GROOVE_PITCH] = pitch
     table[:, drum.LAYER_TURNS] = np.inf if width is None else width / pitch
     table[:, drum.LAYERS] = winches.layers
@@ -183,10 +183,10 @@ def _tables(winches: Winch, diameter: Array) -> tuple[Array, Array]:
 
 
 def _layer_starts(winches: Winch, table: Array) -> Array:
-    """Lengths at which layers begin: all the cable less that of the layers below and the slant of the run."""
+    """Lengths at which layers begin: cable length minus the length on the layers below and the slant of the run."""
     count = np.arange(int(winches.layers.max()) + 1)
     known = winches.cable_length if winches.cable_length is not None else winches.length_zero
-    whole = np.zeros(len(table)) if known is None else known  # without cable_length, turns count from length_zero
+    whole = np.zeros(len(table)) if known is None else known  # without cable_length, turns are counted from length_zero
     circle = 2.0 * np.pi * (table[:, drum.PITCH_RADIUS] + count[:, None] * table[:, drum.LAYER_RISE])
     layer = np.hypot(circle, table[:, drum.GROOVE_PITCH]) * table[:, drum.LAYER_TURNS]
     below = np.concatenate((np.zeros((1, len(table))), np.cumsum(layer[:-1], axis=0)))
@@ -197,7 +197,7 @@ def _layer_starts(winches: Winch, table: Array) -> Array:
 
 
 def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
-    """Strain of the cable on the drums, and turns on the empty and the full ones."""
+    """Strain of the cable on the drums, and turns on the empty and the full drums."""
     strain = locked(winches.winding_tension / robot.cables.axial_stiffness)
     if winches.cable_length is None:
         endless = np.full(strain.shape, np.inf)
@@ -207,13 +207,13 @@ def _limits(winches: Winch, robot: Robot) -> tuple[Array, Array, Array]:
 
 
 def drum_tension(state: Equilibrium) -> Array:
-    """Tension of the cables where they leave the drum, with friction where the state's contact knows the winding.
+    """Tension of the cables where they leave the drum, with friction if the state has winding directions.
 
     Along an exact cable without friction T + T^2/(2 EA) - w z is constant, z the height. Cables of the other models
-    weigh nothing behind their pulleys, and have the chord tension there.
+    have no weight between pulley and drum; their tension there is the chord tension.
 
-    Returns tensions [N], shape (m,) or (N, m); negative where a slack cable leaves a drum downward, NaN where one would
-    be pressed to less than no length.
+    Returns tensions [N], shape (m,) or (N, m); negative where a slack cable leaves a drum downward; NaN where a cable
+    would have to be compressed to a negative length.
 
     Source:
         docs/model.md, section 10.
@@ -235,10 +235,10 @@ def drum_tension(state: Equilibrium) -> Array:
 
 
 def warmth(robot: Robot, temperature: Any) -> Array | float:
-    """Factor of thermal elongation of the cables.
+    """Factor of thermal expansion of the cables.
 
-    temperature: difference to there [K], a number or one a cable. Returns 1 + expansion times the difference, shape
-    (m,) or a number.
+    temperature: difference to the reference temperature [K], one number or one per cable. Returns 1 + expansion times
+    the difference, shape (m,) or a number.
     """
     difference = checked(temperature, "temperature", "K")
     if difference.shape not in ((), (robot.cable_count,)):
@@ -279,10 +279,10 @@ def _at(item: str, sample: int, cable: int, samples: int) -> str:
 
 
 def drum_lever(robot: Robot, length: Array) -> Array:
-    """Length of cable for a radian of its drum, at given lengths off the drums [m].
+    """Cable length per radian of drum rotation, at given lengths off the drums [m].
 
-    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns that of the layer at these lengths where the
-    drums are known, else drum_radius and half the cable's diameter; of the shape of the lengths.
+    length: unstrained lengths off the drums [m], (m,) or (N, m). Returns the lever of the layer at these lengths if the
+    drums are known, else drum_radius plus half the cable diameter; same shape as the lengths.
     """
     winch = robot.winches
     if winch is None or winch.drum_radius is None:

@@ -35,10 +35,10 @@ class Contact(Result):
         wrap_angle: Psi, the angle over which a cable lies on its pulley [rad].
         wrapped_length: Unstrained length on the pulley [m].
         dead_length: Unstrained length between pulley and drum [m].
-        chord_tension: T_x/cos phi along the chord that touches the pulley and ends at the platform end [N]: the tension
-            that is shared and limited. The free span's own chord starts where the cable really leaves.
-        chord_sine: sin phi of that chord.
-        winding: The direction of friction: +1 winding in, -1 paying out, 0 standing; None: nothing rubs.
+        chord_tension: T_x/cos phi along the chord that is tangent to the pulley and ends at the platform end [N]: the
+            tension that is distributed and limited. The chord of the free span itself starts at the actual exit point.
+        chord_sine: sin phi of the tangent chord.
+        winding: The direction of friction: +1 winding in, -1 paying out, 0 at rest; None: no friction.
     """
 
     wrap_angle: Array
@@ -51,7 +51,7 @@ class Contact(Result):
     def part(self, index: Index) -> Contact:
         """Contact of a part of a batch.
 
-        Returns contact of the poses that the index names.
+        Returns the contact at the poses of the index.
         """
         known = {name: field for name in self.__slots__ if (field := getattr(self, name)) is not None}
         return Contact(**{name: locked(field[index, ...]) for name, field in known.items()})
@@ -59,20 +59,20 @@ class Contact(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equilibrium(Result):
-    """The one type that stiffness, modes, the viewer and the files take.
+    """Common input type for stiffness, modes, the viewer and files.
 
-    A batch is indexed like an array: `state[3]` is one of its poses, `state[2:5]` and `state[mask]` are batches;
-    slices share the batch's memory.
+    A batch is indexed like an array: `state[3]` is one of its poses, `state[2:5]` and `state[mask]` are batches; slices
+    share the memory of the batch.
 
     Attributes:
-        robot: The robot; or a tuple of N, one a pose, where a sequence of robots was solved.
+        robot: The robot; or a tuple of N, one per pose, if a sequence of robots was solved.
         pose: Pose of the platform, single or a batch of N.
         wrench: External plus inertial wrench on the platform about its center of mass, world axes, without
             gravity: force [N], moment [N m], shape (6,) or (N, 6).
         cables: State of the free spans, from where they leave the frame to their platform ends, fields of shape
             (m,) or (N, m).
-        contact: Wrapped and dead lengths behind them; None without any: a cable then starts at its frame anchor, and
-            its length is all off the drum.
+        contact: Wrapped and dead lengths of the cables; None if there are none: each cable then starts at its frame
+            anchor, and its whole length is off the drum.
     """
 
     robot: Robot | tuple[Robot, ...]
@@ -83,7 +83,7 @@ class Equilibrium(Result):
 
     @property
     def unstrained_length(self) -> Array:
-        """L: all cable off the drum: free, wrapped and dead length [m], shape (m,) or (N, m)."""
+        """L: whole unstrained length off the drum: free, wrapped and dead length [m], shape (m,) or (N, m)."""
         if self.contact is None:
             return self.cables.unstrained_length
         return locked(self.free_length + (self.contact.wrapped_length + self.contact.dead_length))
@@ -95,15 +95,15 @@ class Equilibrium(Result):
 
     @property
     def chord_tension(self) -> Array:
-        """Tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley phi is that of the tangent from the platform end.
+        """Tau = T_x/cos phi [N], shape (m,) or (N, m); over a pulley, phi is the angle of the tangent chord.
 
-        The tension that is shared, and that limits on the chord name.
+        This tension is distributed, and limited by limits on the chord.
         """
         return self.cables.chord_tension if self.contact is None else self.contact.chord_tension
 
     @property
     def pull(self) -> Array:
-        """Sag force of the cables: vertical force at their ends by their weight, T_z - tau sin phi [N]."""
+        """Sag force of the cables: vertical force at the platform end due to their weight, T_z - tau sin phi [N]."""
         cables = self.cables
         sine = cables.rise / cables.chord if self.contact is None else self.contact.chord_sine
         return locked(cables.vertical_force - self.chord_tension * sine)
@@ -117,10 +117,10 @@ class Equilibrium(Result):
 
     @property
     def one_robot(self) -> Robot:
-        """The robot, where it is the same at all poses.
+        """The robot, if it is the same at all poses.
 
         Raises:
-            InvalidValueError: If there is one a pose.
+            InvalidValueError: If there is one robot per pose.
         """
         if isinstance(self.robot, Robot):
             return self.robot
@@ -139,11 +139,11 @@ class Equilibrium(Result):
         """One pose of a batch, or a part of the batch.
 
         Args:
-            index: A number, which may count from the end; a slice; or an array of numbers or of N booleans.
+            index: A number (negative: from the end), a slice, or an array of numbers or of N booleans.
 
         Raises:
-            NoBatchError: If the equilibrium is a single one; it is a TypeError too.
-            NoSuchEntryError: If there is no such pose; it is an IndexError too.
+            NoBatchError: If the equilibrium is a single one (also a TypeError).
+            NoSuchEntryError: If there is no such pose (also an IndexError).
         """
         part = part_of(index, self.pose.shape, "single equilibrium")
         contact = None if self.contact is None else self.contact.part(part)
@@ -156,15 +156,15 @@ class Equilibrium(Result):
 
     @property
     def limited_tension(self) -> Array:
-        """The tension that the robot's limits name [N], shape (m,) or (N, m): along the chord, or at the frame end."""
+        """The limited tension [N], shape (m,) or (N, m): chord tension or frame-end tension."""
         return limited_tension(self.robot, self.cables, self.contact)
 
 
 def limited_tension(robot: Robots, cables: CableState, contact: Contact | None = None) -> Array:
-    """The tension that a robot's limits name: along the chord, or at the frame end.
+    """The tension to which the limits of a robot apply: along the chord, or at the frame end.
 
-    robot: the robot, or several that fit together; cables: state of their cables, fields of shape (m,) or (N, m);
-    contact: what is behind them, or None. Returns tensions [N], of the shape of the cables' fields.
+    robot: the robot, or several with common properties; cables: state of their cables, fields of shape (m,) or (N, m);
+    contact: pulleys and dead lengths, or None. Returns tensions [N], of the shape of the cable fields.
     """
     if first_of(robot).tension_limits_of == "frame_end":
         return cables.frame_end_tension
@@ -174,7 +174,7 @@ def limited_tension(robot: Robots, cables: CableState, contact: Contact | None =
 def cables_of_results(
     robot: Robots, model: CableModel, results: Array, status: Codes, shape: tuple[int, ...]
 ) -> tuple[CableState, Contact | None]:
-    """State of the free spans of solved poses, and of their routing, or None without pulleys and dead lengths.
+    """States of the free spans of solved poses, and their contact, which is None without pulleys and dead lengths.
 
     results: rows as in `sagline.kernels.tables`, (RESULT_ROWS, N, m); status: status of each cable, (N, m); shape: ()
     for a single pose, (N,) for a batch.
@@ -207,7 +207,7 @@ def cables_of_results(
 
 
 def _free_chord_tension(span: Array, rise: Array, horizontal: Array, tension: Array) -> Array:
-    """Chord tensions of the free spans; on a vertical one that of the given chord."""
+    """Chord tensions of the free spans; on a vertical span the given chord tension."""
     level = np.where(span > 0.0, span, 1.0)
     own: Array = np.where(span > 0.0, horizontal * (np.hypot(span, rise) / level), tension)
     return own

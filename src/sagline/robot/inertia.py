@@ -1,4 +1,4 @@
-"""Inertia of simple bodies, and robots with another mass or fewer cables."""
+"""Inertia of simple bodies; variants of a robot with another mass or fewer cables."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
-    """A solid box, its edges along the platform's axes.
+    """Inertia of a solid box whose edges are along the platform axes.
 
     mass: [kg]; x: edge along x [m]; y: edge along y [m]; z: edge along z [m]. Returns inertia about the center of mass
     [kg m^2], shape (3, 3).
@@ -25,7 +25,7 @@ def box_inertia(mass: float, x: float, y: float, z: float) -> Array:
 
 
 def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
-    """A solid cylinder, its axis along the platform's z.
+    """Inertia of a solid cylinder whose axis is along the z axis of the platform.
 
     mass: [kg]; radius: [m]; height: [m]. Returns inertia about the center of mass [kg m^2], shape (3, 3).
     """
@@ -34,25 +34,25 @@ def cylinder_inertia(mass: float, radius: float, height: float) -> Array:
 
 
 def with_mass(robot: Robot, mass: float) -> Robot:
-    """A robot with another mass, spread as its own is: the inertia grows in proportion.
+    """Copy of a robot with another mass; the inertia is scaled in proportion.
 
-    mass: of the platform with its load [kg], > 0.
+    mass: mass of the platform with its payload [kg], > 0.
     """
     return robot.replace(mass=mass, inertia=robot.inertia * (mass / robot.mass))
 
 
 def without_cables(robot: Robot, *cables: int) -> Robot:
-    """The robot that is left when cables break: what they weighed on the platform is left out too.
+    """Robot after the failure of some cables; their weight on the platform is removed too.
 
     Args:
         robot: The whole robot.
         cables: Indices of the broken cables, 0 to m - 1.
 
     Returns:
-        A robot with the other cables, in their order; everything else unchanged.
+        A robot with the remaining cables, in their order; everything else is unchanged.
 
     Raises:
-        InvalidValueError: If an index names no cable, or no cable is left.
+        InvalidValueError: If an index is out of range, or no cable remains.
 
     Examples:
         >>> import sagline as sl

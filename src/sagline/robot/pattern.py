@@ -16,12 +16,12 @@ _SPATIAL: Final = {"3R3T": locked(np.eye(6)), "3T": locked(np.eye(3, 6))}
 
 
 def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
-    """Rows that pick the free motions out of (force, moment) or (velocity, angular velocity), world axes.
+    """Matrix that selects the free motions from (force, moment) or (velocity, angular velocity), world axes.
 
     pattern: "3R3T" (all six), "3T" (a point mass), "1R2T" (a plane), "2T" (a plane without rotation); plane_normal:
     unit normal of the plane, shape (3,); None for the spatial patterns. Returns array of shape (n, 6) with orthonormal
-    rows. A planar pattern's translations are e1 and e2 with e1 x e2 = plane_normal, e1 horizontal and e2 as far up as
-    the plane allows, then the rotation about the normal.
+    rows. The translations of a planar pattern are e1 and e2 with e1 x e2 = plane_normal; e1 is horizontal and e2 points
+    upward as steeply as the plane allows. The rotation about the normal is the last row.
     """
     if plane_normal is None:
         return _SPATIAL[pattern]
@@ -34,7 +34,7 @@ def freedom_matrix(pattern: MotionPattern, plane_normal: Array | None) -> Array:
 def _plane_axes(normal: Array) -> Array:
     horizontal = np.cross((0.0, 0.0, 1.0), normal)  # its length is the sine of the normal's angle to the vertical
     length = float(np.linalg.norm(horizontal))
-    if length < 1e-12:  # a level plane, up to rounding: every direction is horizontal, x is as good as any
+    if length < 1e-12:  # horizontal plane, up to rounding: every direction is horizontal, so x is chosen
         horizontal = np.array([1.0, 0.0, 0.0]) - normal[0] * normal
         length = float(np.linalg.norm(horizontal))
     first = horizontal / length

@@ -20,16 +20,17 @@ from sagline.core.memory import check_memory
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-# Rounding leaves a freshly normalized vector of 3 or 4 numbers within 2.5 eps of length 1.
+# Rounding error: the length of a normalized vector of 3 or 4 numbers differs from 1 by at most 2.5 eps.
 _ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def unit(vectors: Array) -> Array:
-    """Scale vectors along the last axis to length 1; those that have it to rounding keep every bit.
+    """Normalize vectors along the last axis; vectors of length 1 up to rounding stay unchanged in every bit.
 
-    Files, pickles and copies pass here again and must not drift. Zero vectors give NaN: check lengths first.
+    Files, pickles and copies normalize again, and their values must not drift. Zero vectors give NaN: check lengths
+    first.
 
-    vectors: shape (..., k). Returns array of the same shape; the same array where nothing was to be done.
+    vectors: shape (..., k). Returns array of the same shape; the given array itself if all lengths are 1.
     """
     length = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., np.newaxis]
     if (np.abs(length - 1.0) <= _ROUNDING).all():
@@ -40,7 +41,7 @@ def unit(vectors: Array) -> Array:
 
 @frozen(eq=False, weakref_slot=False)
 class PoseBox:
-    """Positions of the platform origin in a box, tilted about any axis by up to an angle.
+    """Positions of the platform origin in a box, with rotations about any axis up to a tilt angle.
 
     Attributes:
         low: Lowest position of the platform origin [m], shape (3,).
@@ -48,8 +49,8 @@ class PoseBox:
         tilt: Largest angle of rotation [rad], 0 to pi.
 
     Raises:
-        InvalidValueError: If a number is not finite, a corner has not three numbers, high is below low, or the tilt is
-            more than half a turn.
+        InvalidValueError: If a number is not finite, a corner does not have three numbers, high is below low, or the
+            tilt is more than pi.
     """
 
     low: Array = field(converter=given, metadata=rule("m", shape=(3,)))
@@ -57,7 +58,7 @@ class PoseBox:
     tilt: float = 0.0
 
     def __attrs_post_init__(self) -> None:
-        """Check the three."""
+        """Check the three fields."""
         for about in fields(PoseBox)[:2]:
             item = f"test_box: {about.name}"
             object.__setattr__(self, about.name, checked(getattr(self, about.name), item, **about.metadata))
@@ -79,8 +80,8 @@ class PoseBox:
     __reduce__ = reduced
 
 
-_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 of what still counts as a rotation
-_QUATERNION_TOLERANCE = 1e-6  # a quaternion printed with seven digits still counts as one
+_MATRIX_TOLERANCE = 1e-9  # largest element of Q Q^T - 1 of an accepted rotation matrix
+_QUATERNION_TOLERANCE = 1e-6  # accepts a quaternion written with seven digits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,14 +97,14 @@ class Pose:
     quaternion: Array
 
     def __init__(self, position: ArrayLike, rotation: Rotation | ArrayLike) -> None:
-        """Check both and broadcast one against the other.
+        """Check position and rotation and broadcast them.
 
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
             rotation: scipy Rotation, or rotation matrices of shape (3, 3) or (N, 3, 3).
 
         Raises:
-            InvalidValueError: If a number is not finite, a matrix is no rotation, or the counts differ.
+            InvalidValueError: If a number is not finite, a matrix is not a rotation, or the counts differ.
         """
         quaternion = _quaternion_of(rotation)
         self._fill(checked(position, "position", "m", shape=(3,)), quaternion)
@@ -148,7 +149,7 @@ class Pose:
 
         Args:
             position: Position of the platform frame's origin [m], shape (3,) or (N, 3).
-            quaternion: Of length 1 to 1e-6 (what is left is normalized away), shape (4,) or (N, 4).
+            quaternion: Unit quaternion, length 1 within 1e-6 (then normalized), shape (4,) or (N, 4).
 
         Returns:
             Pose, single or a batch of N.
@@ -163,7 +164,7 @@ class Pose:
 
     @classmethod
     def _adopt(cls, position: Array, quaternion: Array) -> Pose:
-        """A pose around arrays of our own making: no copy; only their counts are checked."""
+        """Pose from arrays that sagline created: without a copy; only the counts are checked."""
         pose = object.__new__(cls)
         pose._fill(position, quaternion)
         return pose
@@ -185,14 +186,14 @@ class Pose:
 
     @property
     def rotation(self) -> Rotation:
-        """Rotation from platform to world, as scipy has it."""
-        from scipy.spatial.transform import Rotation  # takes a third of the time that sagline takes to load
+        """Rotation from platform to world, as a scipy Rotation."""
+        from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
         return Rotation.from_quat(self.quaternion)
 
     @property
     def matrix(self) -> Array:
-        """Rotation matrix from platform to world, shape (..., 3, 3); NaN for a pose that was not found."""
+        """Rotation matrix from platform to world, shape (..., 3, 3); NaN for a pose without a solution."""
         x, y, z, w = np.moveaxis(self.quaternion, -1, 0)
         rows = (
             (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
@@ -202,9 +203,9 @@ class Pose:
         return locked(np.stack([np.stack(row, axis=-1) for row in rows], axis=-2))
 
     def transform(self, points: ArrayLike) -> Array:
-        """Points of the platform frame in the world.
+        """Transform points from the platform frame to the world.
 
-        Every point is taken along by every pose. Points that differ from pose to pose are transformed pose by pose:
+        Every pose transforms every point. If each pose has its own points, transform them pose by pose:
         `pose[i].transform(points[i])`.
 
         Args:
@@ -212,7 +213,7 @@ class Pose:
 
         Returns:
             Coordinates in the world [m]: shape (..., 3) for a single pose, (N, ..., 3) for a batch of N. NaN for a pose
-            that was not found.
+            without a solution.
 
         Raises:
             InvalidValueError: If a coordinate is not finite, or the last axis is not x, y, z.
@@ -240,14 +241,14 @@ class Pose:
         return batch_length(self.shape, "single pose")
 
     def __getitem__(self, index: int | slice | NDArray[Any]) -> Pose:
-        """One pose of a batch, or a part of the batch; slices share the batch's memory where they can.
+        """One pose of a batch, or a part of the batch; a slice shares the memory of the batch if possible.
 
         Args:
-            index: A number, which may count from the end; a slice; or an array of numbers or of N booleans.
+            index: A number (negative: from the end), a slice, or an array of numbers or of N booleans.
 
         Raises:
-            NoBatchError: If the pose is a single one; it is a TypeError too.
-            NoSuchEntryError: If there is no such pose; it is an IndexError too.
+            NoBatchError: If the pose is a single one (also a TypeError).
+            NoSuchEntryError: If there is no such pose (also an IndexError).
         """
         part = part_of(index, self.shape, "single pose")
         return Pose._adopt(self.position[part], self.quaternion[part])

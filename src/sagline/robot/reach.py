@@ -1,4 +1,4 @@
-"""Poses that a robot's motion pattern has: a platform that does not turn is asked for no turn."""
+"""Checks that poses fit the motion pattern of a robot: without a free rotation, no rotation may be requested."""
 
 from __future__ import annotations
 
@@ -14,17 +14,18 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
-ROUNDING = 1e-6  # rad and m: what is printed with seven digits still counts as none
+# rad and m: a smaller deviation counts as zero; it is the rounding of numbers written with seven digits
+ROUNDING = 1e-6
 
 
 def check_reach(robot: Robot, pose: Pose, item: str) -> None:
-    """Refuse poses between which the robot's motion pattern does not lead.
+    """Refuse poses that the motion pattern of the robot does not connect.
 
-    A platform that does not turn keeps its orientation, whichever that is; a planar one turns about the normal of its
-    plane alone, and stays in one plane, whichever of the parallel ones.
+    A platform without rotations keeps its orientation, which is arbitrary. A planar platform rotates only about the
+    normal of its plane and stays in one of the parallel planes.
 
-    robot: the robot, or the first of several that share their pattern; pose: one pose, which is always in reach, or a
-    batch; NaN passes.
+    robot: the robot, or the first of several with a common pattern; pose: one pose, which is always accepted, or a
+    batch; NaN is accepted.
     """
     pattern, normal = robot.motion_pattern, robot.plane_normal
     if pattern == "3R3T" or len(pose.shape) == 0 or len(pose) == 0:
@@ -46,7 +47,7 @@ def check_reach(robot: Robot, pose: Pose, item: str) -> None:
 
 
 def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
-    """The part of the rotation from an orientation to that of each pose that the robot's motion pattern does not have.
+    """Component of the rotation from an orientation to each pose that is not free in the motion pattern of the robot.
 
     pose: one pose or a batch of N; other: the orientation, a unit quaternion, shape (4,). Returns sine of half the
     angle times the axis, shape (N, 3); zeros where all motions are free.
@@ -61,9 +62,9 @@ def forbidden_turn(robot: Robot, pose: Pose, other: Array) -> Array:
 
 
 def turn_in_words(turn: Array) -> str:
-    """A turn as a person reads it.
+    """Description of a rotation for a message.
 
-    turn: sine of half the angle times the axis, shape (3,), more than zero.
+    turn: sine of half the angle times the axis, shape (3,), not zero.
     """
     sine = float(np.linalg.norm(turn))
     axis = ", ".join(f"{x:.3g}" for x in np.round(turn / sine, 9) + 0.0)
@@ -71,10 +72,10 @@ def turn_in_words(turn: Array) -> str:
 
 
 def out_of_plane(robot: Robot, pose: Pose) -> Array:
-    """Distance of the cables of a planar robot, if they lie in one plane, from it.
+    """Distance of the platform ends of a planar robot from the plane of its frame ends.
 
-    pose: one pose or a batch of N. Returns distance of the platform ends from the plane of the frame ends [m], shape
-    (N,); zeros where the robot is not planar, or its ends are not in one plane each.
+    pose: one pose or a batch of N. Returns signed distance of the platform ends from the plane of the frame ends [m],
+    shape (N,); zeros if the robot is not planar, or its frame or platform ends are not in one plane.
     """
     away = np.zeros(len(np.atleast_2d(pose.position)))
     if robot.plane_normal is None:
@@ -86,14 +87,14 @@ def out_of_plane(robot: Robot, pose: Pose) -> Array:
     return distance
 
 
-_FLAT: Final = 0.05  # anchors that differ in height by less than this, of the robot's size, are all at the top
+_FLAT: Final = 0.05  # relative to the robot's size: anchors whose heights differ by less are all at the top
 
 
 def bounds(robot: Robot) -> tuple[Array, Array]:
     """Lowest and highest corner of the box around the robot [m]: its frame, or the range of its anchors.
 
-    Frames stand: their top is where the highest anchors are. Where all anchors are at the top and no frame is given,
-    the box reaches down to the floor, or to the lowest pose that the robot is meant for.
+    The top of the frame is at the height of the highest anchors. If all anchors are at the top and no frame is given,
+    the box extends down to the floor, or to the lowest pose of the test box.
 
     Returns the two corners, shape (3,) each.
     """
@@ -109,6 +110,6 @@ def bounds(robot: Robot) -> tuple[Array, Array]:
 
 
 def home_pose(robot: Robot) -> Pose:
-    """The middle of the poses that a robot is meant for, or of its box."""
+    """Center of the test box of a robot, or of the box around it."""
     low, high = bounds(robot) if robot.test_box is None else (robot.test_box.low, robot.test_box.high)
     return Pose(0.5 * (low + high), np.eye(3))

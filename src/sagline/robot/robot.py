@@ -1,4 +1,4 @@
-"""The robot: where its cables are fixed, what they are made of, and what they carry."""
+"""The robot: geometry, material of its cables, winches and platform."""
 
 from __future__ import annotations
 
@@ -32,35 +32,33 @@ class Robot(Shown):
         name: Name of the robot.
         frame_anchors: Frame ends of the cables in the world [m], z up, shape (m, 3).
         platform_anchors: Platform ends of the cables in the platform frame [m], shape (m, 3).
-        cables: Material of the cables, one for all or one a cable; fields of shape (m,).
-        winches: Pulleys, dead lengths, drums and motors behind the frame anchors, one for all cables or one a cable,
-            fields of shape (m,); None where cables start at the frame anchors and their lengths are given to them
-            directly.
+        cables: Material of the cables, one for all or one per cable; fields of shape (m,).
+        winches: Pulleys, dead lengths, drums and motors, one for all cables or one per cable, fields of shape (m,);
+            None if cables start at the frame anchors and their lengths are prescribed directly.
         mass: Mass of the platform [kg], > 0.
-        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3): positive
-            definite, no principal moment larger than the other two together. Only the moment about plane_normal need
-            be positive in a planar pattern, and none where the motion pattern has no rotation: there it may be left
-            out.
+        inertia: Inertia about the center of mass in the platform frame [kg m^2], shape (3, 3): positive definite, no
+            principal moment larger than the sum of the other two. A planar pattern requires only a positive moment
+            about plane_normal. A pattern without rotation requires no inertia; it may be omitted.
         center_of_mass: Center of mass in the platform frame [m], shape (3,).
         gravity: Gravitational acceleration along -z [m/s^2], >= 0.
         motion_pattern: "3R3T", "3T" (point mass), "1R2T" (planar) or "2T" (planar without rotation).
-        plane_normal: Normal of the plane of a planar pattern, world axes, shape (3,), given with any length but zero
-            and kept with length 1; None for the others.
-        tension_min: Lower tension limits [N], >= 0, one for all or one a cable, shape (m,).
-        tension_max: Upper tension limits [N], may be infinite, one for all or one a cable, shape (m,).
+        plane_normal: Normal of the plane of a planar pattern, world axes, shape (3,), of any length but zero, stored
+            with length 1; None for the other patterns.
+        tension_min: Lower tension limits [N], >= 0, one for all or one per cable, shape (m,).
+        tension_max: Upper tension limits [N], may be infinite, one for all or one per cable, shape (m,).
         tension_limits_of: The tension that is limited, "chord" or "frame_end".
         platform_size: Edges of the platform, for drawing [m], shape (3,), or None.
         frame_size: Edges of the frame, for drawing [m], shape (3,), or None.
-        test_box: Poses of which nearly all are wrench-feasible, or None.
+        test_box: Box of poses, nearly all of them wrench-feasible, or None.
         source: Source of the numbers.
-        assumed: Field name -> why; the fields whose values the source does not give.
+        assumed: Field name -> reason; the fields whose values are not from the source.
         notes: Further remarks for users.
-        tolerances: Name of a number -> standard deviation of it [SI], > 0, infinite where nothing is known: how far
-            the value given here may be off, as a drawing or a data sheet says. One for all of the field, one along
-            each axis where it has three, or the whole field, whose shape it gets. Names: frame_anchors,
-            platform_anchors, center_of_mass (with three components each), mass, and of every cable length_zero,
-            drum_radius, linear_density, axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
-        calibration: The calibration that found some of the numbers, with their standard errors; None for none.
+        tolerances: Name of a quantity -> standard deviation of its value given here [SI], > 0, from a drawing or data
+            sheet; infinite if nothing is known. Give one number for the whole field, one per axis for a quantity with
+            three components, or an array of the shape of the field. Names: frame_anchors, platform_anchors,
+            center_of_mass (with three components each), mass, and per cable length_zero, drum_radius, linear_density,
+            axial_stiffness, pulley_radius, dead_cable, load_cell_gain, load_cell_bias.
+        calibration: The calibration that identified some of the values, with their standard errors; or None.
 
     Raises:
         InvalidValueError: If a field is wrong; the message names it, with its index.
@@ -104,7 +102,7 @@ class Robot(Shown):
     calibration: Provenance | None = field(default=None, kw_only=True)
 
     def __attrs_post_init__(self) -> None:
-        """Check every field once; values for all cables at once are spread over the cables."""
+        """Check every field once; expand values for all cables to one value per cable."""
         frame, platform = checks.anchors(self.frame_anchors, self.platform_anchors)
         pattern = choice(self.motion_pattern, "motion_pattern", MOTION_PATTERNS)
         normal = checks.plane_normal(self.plane_normal, pattern)
@@ -148,20 +146,20 @@ class Robot(Shown):
 
     @property
     def freedom(self) -> Array:
-        """Rows that pick the free motions out of a wrench or twist in world axes, shape (n, 6), orthonormal."""
+        """Matrix that selects the free motions from a wrench or twist in world axes, shape (n, 6), orthonormal rows."""
         return freedom_matrix(self.motion_pattern, self.plane_normal)
 
     def replace(self, **changes: Any) -> Robot:
         """A robot with some fields changed, checked like a new one.
 
-        Tolerances stay as they are. Of a calibration the standard errors stay of the numbers that stay: one that is
-        replaced is none that the calibration found.
+        The tolerances remain unchanged. The standard errors of a calibration are kept only for values that are not
+        replaced.
 
         Args:
             changes: Fields of `Robot` and their new values.
 
         Returns:
-            A new robot; this one stays as it is.
+            A new robot; this one remains unchanged.
 
         Raises:
             InvalidValueError: If there is no such field, or the constructor does not accept the new values.
@@ -176,11 +174,11 @@ class Robot(Shown):
             choice(name, "field", Robot.__slots__)
         guides = None if self.winches is None else self.winches.guides
         if self.winches is not None and guides is not None and "frame_anchors" in changes and "winches" not in changes:
-            changes["winches"] = self.winches.replace(guides=guides)  # the dead length follows again
+            changes["winches"] = self.winches.replace(guides=guides)  # the robot computes the dead length again
         return evolve(self, **changes)._kept(self) if "calibration" not in changes else evolve(self, **changes)
 
     def _kept(self, before: Robot) -> Robot:
-        """This robot without the standard errors of what is not as the calibration left it."""
+        """This robot with standard errors only for the values that the calibration identified."""
         if self.calibration is None:
             return self
         errors = self.calibration.standard_error

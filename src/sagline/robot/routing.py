@@ -1,12 +1,12 @@
-"""Routing behind the exit points of pulleys: friction, and catenary spans between guides.
+"""Routing between the pulleys' exit points and the drums: friction, and catenary spans between guides.
 
-Kernels take it as a straight, guided run without friction, in the energy and the stiffness too. This module gives the
-difference of unstrained length between the actual routing and that run; docs/model.md, section 10.
+Kernels model this routing as a straight, guided run without friction, also in energy and stiffness. This module
+computes the difference of unstrained length between the actual routing and that run; docs/model.md, section 10.
 
-Friction: over a bend of the angle psi tensions differ by exp(mu psi), and the pulley's bearing takes the share f; both
-are larger toward the drum while winding in. What the weight on the pulley changes is kept to first order: as if nothing
-rubbed. Between guides a cable is a catenary: its far end's tension follows, so that T + T^2/(2 EA) - w z is the
-same number along all of it where nothing rubs.
+Friction: over a bend of angle psi the tensions differ by the factor exp(mu psi), and the pulley's bearing takes the
+share f of the tension. While winding in, both increase the tension toward the drum. The effect of the weight of the
+cable on the pulley is kept to first order, as without friction. Between guides a cable is a catenary: the tension of
+its far end follows from T + T^2/(2 EA) - w z, which is constant along the whole cable without friction.
 """
 
 from __future__ import annotations
@@ -25,39 +25,40 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
-PASSES: Final = 40  # of bends that follow from tensions, and tensions from bends; each gains a digit or more
-STEPS: Final = 60  # of Newton's method for one span
-_TOLERANCE: Final = 1e-15  # change of a length, of that length
-_TENSION_TOLERANCE: Final = 1e-14  # change of a tension, of that tension
+# iterations between bend angles and tensions, which depend on each other; each gains a digit or more
+PASSES: Final = 40
+STEPS: Final = 60  # iterations of Newton's method for one span
+_TOLERANCE: Final = 1e-15  # relative change of a length
+_TENSION_TOLERANCE: Final = 1e-14  # relative change of a tension
 _BALANCED: Final = 1e-12  # relative tolerance of tensions
-_STEP: Final = 1e-6  # of the tension, for its slope
+_STEP: Final = 1e-6  # relative step of the tension for its numerical derivative
 _TINY: Final = 1e-300
 
 
 class _Routing(NamedTuple):
-    """Cable behind the exit points, arrays of shape (N, m)."""
+    """Results of the routing: cable from the exit points to the drums, arrays of shape (N, m)."""
 
     wrapped: Array  # unstrained length on the pulleys [m]
-    dead: Array  # unstrained length between pulleys and drums [m]; NaN where the cable is too slack for a catenary
+    dead: Array  # unstrained length between pulleys and drums [m]; NaN if the cable is too slack for a catenary
     drum_tension: Array  # tension at the drums [N]
 
 
 class _ExitState(NamedTuple):
-    """Cables where they leave their pulleys, arrays of shape (K,) for those that are looked at."""
+    """Cables where they leave their pulleys, arrays of shape (K,) for the K cables of the calculation."""
 
-    tension: Array  # T_A at P [N]
-    weight: Array  # w [N/m]; 0 where the model has no weight there
+    tension: Array  # T_A at the exit point P [N]
+    weight: Array  # w [N/m]; 0 if the model has no weight there
     stiffness: Array  # EA [N]
     wrap: Array  # psi [rad]
     sine: Array  # sin psi
-    tangent: Array  # unit tangent there, toward the platform, shape (K, 3)
+    tangent: Array  # unit tangent at P, toward the platform, shape (K, 3)
     radius: Array  # R [m]
-    entry: Array  # +1 where a cable comes from below, -1 from above
+    entry: Array  # +1 where a cable enters from below, -1 from above
     friction: Array  # mu, with the sign of the winding
-    rolling: Array  # 1 + f while winding in, 1 - f while paying out, else 1
+    rolling: Array  # 1 + f while winding in, 1 - f while paying out, 1 at rest
 
     def entering(self, bend: Array) -> Array:
-        """Tension behind the pulley [N], after a further bend of its frame anchor [rad]."""
+        """Tension before the pulley, on the drum side [N], with an additional bend at the frame anchor [rad]."""
         rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
         drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
         return _tension_after(rubbed, drop, self.stiffness)
@@ -77,11 +78,11 @@ def differs(robot: Robot | tuple[Robot, ...], winding: Array | None) -> bool:
 
 
 def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
-    """An equilibrium of the kernels with the actual routing behind its pulleys.
+    """Equilibrium of the kernels, corrected for the actual routing between exit points and drums.
 
-    state: robot, pose and cables as kernels have them; winding: +1 winding in, -1 paying out, 0 standing, shape (m,) or
-    (N, m); None: nothing rubs. Returns the equilibrium with other wrapped and dead lengths, NaN where a cable is too
-    slack for a catenary between guides; the same one where nothing is behind its frame anchors.
+    state: robot, pose and cables in the model of the kernels; winding: +1 winding in, -1 paying out, 0 at rest, shape
+    (m,) or (N, m); None: no friction. Returns the equilibrium with corrected wrapped and dead lengths, NaN where a
+    cable is too slack for a catenary between guides; the given equilibrium itself if there is no routing.
     """
     if state.contact is None or (winding is None and not differs(state.robot, None)):
         return state
@@ -94,7 +95,7 @@ def with_routing(state: Equilibrium, winding: Array | None) -> Equilibrium:
 
 
 def kernel_length(state: Equilibrium) -> Array:
-    """Unstrained lengths with which kernels find an equilibrium: those behind a straight guided run [m]."""
+    """Unstrained lengths for the kernels: computed for a straight guided run [m]."""
     contact = state.contact
     if contact is None or not differs(state.robot, contact.winding) or state.cables.model.code == codes.STRAIGHT:
         return state.unstrained_length
@@ -104,15 +105,15 @@ def kernel_length(state: Equilibrium) -> Array:
 
 
 def actual_routing(state: Equilibrium) -> _Routing:
-    """The part behind the pulleys, with its guides, and friction where the state's contact knows the winding.
+    """The actual routing with guides, and with friction if the contact of the state has winding directions.
 
-    state: an equilibrium with something behind its frame anchors. Returns routing, of the shape of the state's cables.
+    state: an equilibrium with pulleys or dead lengths. Returns the routing, of the shape of the state's cables.
     """
     return _routing(state, guided=False)
 
 
 def _routing(state: Equilibrium, *, guided: bool) -> _Routing:
-    """The part behind; of several robots one by one. guided: as if it were a straight guided run."""
+    """The routing; several robots are evaluated one by one. guided: True for a straight guided run."""
     if isinstance(state.robot, Robot):
         return _routing_of_robot(state, state.robot, guided=guided)
     parts = [_routing_of_robot(state[i], one, guided=guided) for i, one in enumerate(state.robot)]
@@ -124,7 +125,7 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
     assert contact is not None
     if winches is None or not winches.anything_behind:
         return _Routing(np.zeros(shape), np.zeros(shape), _exit_tension(state))
-    if state.cables.model.code == codes.STRAIGHT:  # does not stretch, whatever rubs
+    if state.cables.model.code == codes.STRAIGHT:  # inextensible: lengths do not depend on friction
         dead = np.broadcast_to(winches.dead_cable, shape)
         return _Routing(winches.pulley_radius * contact.wrap_angle, dead, _exit_tension(state))
     found = _Routing(*(np.full(shape, np.nan) for _ in _Routing._fields))
@@ -144,7 +145,7 @@ def _routing_of_robot(state: Equilibrium, robot: Robot, *, guided: bool) -> _Rou
 
 
 def _exit_tension(state: Equilibrium) -> Array:
-    """Tensions at P as kernels have them there [N]: only the exact cable's differ along it."""
+    """Tensions at P in the model of the kernels [N]: they vary along the cable only in the exact model."""
     cables = state.cables
     return cables.frame_end_tension if cables.model.code == codes.CATENARY else state.chord_tension
 
@@ -177,7 +178,7 @@ def _exit_state(state: Equilibrium, robot: Robot, winches: Winch, known: Flags, 
 
 
 def _tension_after(tension: Array, drop: Array, stiffness: Array) -> Array:
-    """Tension [N] where (1 + e)^2 is smaller by a drop: T + T^2/(2 EA) - w z is constant."""
+    """Tension [N] where (1 + e)^2 is smaller by a given drop: T + T^2/(2 EA) - w z is constant."""
     strain = tension / stiffness
     gained = strain * (2.0 + strain) - drop  # (1 + strain)^2 - 1
     with np.errstate(invalid="ignore"):
@@ -192,7 +193,7 @@ def _wrapped_length(at: _ExitState) -> Array:
     falls = at.entry * beta * (1.0 - np.cos(at.wrap) - at.wrap * at.sine)
     rubs = at.friction != 0.0
     friction = np.where(rubs, at.friction, 1.0)
-    # ln((1 + e exp(mu psi))/E)/mu, and what it is without friction, psi e/E
+    # ln((1 + e exp(mu psi))/E)/mu with friction; psi e/E without
     stretched = np.log1p(strain / strained * np.expm1(friction * at.wrap)) / friction
     stretched = np.where(rubs, stretched, at.wrap * strain / strained)
     return np.asarray(at.radius * (at.wrap - stretched - falls / strained**3))
@@ -208,14 +209,15 @@ def _straight_run(at: _ExitState, length: Array, rise: Array) -> tuple[Array, Ar
 def _guided_spans(
     at: _ExitState, points: Array, winches: Winch, robot: Robot, model: CableModel, cable: Indices
 ) -> tuple[Array, Array]:
-    """Unstrained length between pulley and drum [m], and the tension at the drum [N]; points (K, k + 1, 3) from A on.
+    """Unstrained length between pulley and drum [m], and tension at the drum [N]; points (K, k + 1, 3), starting at A.
 
-    Tensions need the bends, which follow from the spans that they carry: both are improved in turn.
+    Tensions depend on the bend angles, and bend angles on the tensions: both are iterated alternately.
     """
     hanging = Catenary() if model.code == codes.CATENARY else Elastic()
     material = Cable(robot.cables.linear_density[cable], robot.cables.axial_stiffness[cable])
     axis, eyelet = winches.swivel_axis[cable], at.radius == 0.0
-    # an eyelet at the frame anchor is one bend, from the span behind it to the cable; a pulley begins along its axis
+    # An eyelet at the frame anchor is one bend, from the drum-side span to the cable; at a pulley the span begins along
+    # the swivel axis.
     onward = np.where(eyelet[:, None], at.tangent, axis)
     at = at._replace(wrap=np.where(eyelet, 0.0, at.wrap))
     steps = points[:, :-1] - points[:, 1:]
@@ -240,9 +242,9 @@ def _guided_spans(
 
 
 def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity: float) -> CableState:
-    """Catenaries over steps (K, 3) with a given tension at their upper, "platform", ends; NaN where none does.
+    """Catenaries over steps (K, 3) with given tension at the upper ("platform") ends; NaN if there is no solution.
 
-    That tension grows with the one along the chord, down to a least tension: below it the cable would run out.
+    The upper tension increases with the chord tension, down to a minimum: below it no catenary exists.
     """
     level, rise = np.hypot(step[:, 0], step[:, 1]), step[:, 2]
     weight = 0.0 if model.weightless else cable.linear_density * gravity
@@ -272,7 +274,7 @@ def _span(model: CableModel, cable: Cable, step: Array, tension: Array, gravity:
 
 
 def _tangents(span: CableState, step: Array) -> tuple[Array, Array]:
-    """Unit tangents of catenaries at the ends of a step, at its start first, both toward the platform."""
+    """Unit tangents of catenaries at the start and the end of a step, both toward the platform."""
     level = np.hypot(step[:, 0], step[:, 1])[:, None]
     outward = step[:, :2] / np.maximum(level, _TINY)
 

@@ -1,4 +1,4 @@
-"""Tolerances of a robot's numbers, their names, units and shapes; provenance of calibrated numbers."""
+"""Tolerances of the quantities of a robot: names, units and shapes; provenance of calibrated values."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from sagline.core.results import set_fields
 
 
 class _Uncertain(NamedTuple):
-    """A number of a robot that may be off."""
+    """An uncertain quantity of a robot."""
 
-    place: str  # where a robot has it, as a dotted attribute
+    place: str  # location in the robot, as a dotted attribute
     unit: str  # its unit in SI
-    each: bool = True  # whether every cable has its own
-    axes: bool = False  # whether it has three components, along x, y and z
-    share: bool = False  # whether a file may give its tolerance as a share of it, in percent
+    each: bool = True  # True if every cable has its own value
+    axes: bool = False  # True if it has three components, along x, y and z
+    share: bool = False  # True if a file may give its tolerance relative to it, in percent
 
     def shape(self, cables: int) -> tuple[int, ...]:
-        """Its shape in a robot of so many cables."""
+        """Shape of the quantity in a robot with a given number of cables."""
         return (*((cables,) if self.each else ()), *((3,) if self.axes else ()))
 
 
@@ -53,11 +53,11 @@ UNCERTAIN: Final[Mapping[str, _Uncertain]] = MappingProxyType(
 def deviations(
     given: Any, item: str, cables: int, *, low: float = -np.inf, above: float = -np.inf
 ) -> Mapping[str, Array]:
-    """Standard deviations of a robot's numbers, each in the shape of its field.
+    """Standard deviations of the quantities of a robot, each in the shape of its field.
 
-    given: of some names of `UNCERTAIN`: one number for all of the field, three along the axes where it has them, or the
-    whole field; low: the least allowed; it may be infinite, where nothing is known. Returns the same names, in the same
-    order.
+    given: deviations for some names of `UNCERTAIN`: one number for the whole field, three along the axes for a quantity
+    with three components, or the whole field; low: the smallest allowed deviation; a deviation may be infinite if
+    nothing is known. Returns the same names in the same order.
     """
     if not isinstance(given, Mapping):
         allowed = "names of fields and standard deviations"
@@ -77,9 +77,9 @@ def deviations(
 
 
 def value_of(robot: object, name: str) -> Array | None:
-    """The number of a robot that a tolerance is about.
+    """Value of the robot's quantity to which a tolerance applies.
 
-    Returns its value in SI, shape () or that of the field; None where the robot does not have it.
+    Returns its value in SI, shape () or that of the field; None if the robot does not have it.
     """
     found: Any = robot
     for part in UNCERTAIN[name].place.split("."):
@@ -88,10 +88,10 @@ def value_of(robot: object, name: str) -> Array | None:
 
 
 def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
-    """Standard deviation of a number, from a share of it.
+    """Standard deviation of a quantity from a relative deviation.
 
-    share: the share, shape () or that of the number; value: the number, or None where it is not known. Returns in the
-    unit of the number, in its shape.
+    share: the relative deviation, shape () or that of the quantity; value: value of the quantity, or None if it is not
+    known. Returns the deviation in the unit and the shape of the quantity.
     """
     if value is None:
         raise InvalidValueError(item, "in percent", "a field that is given", f"Give {item} in its unit, or the field.")
@@ -103,17 +103,17 @@ def of_share(share: ArrayLike, value: Array | None, item: str) -> Array:
 
 @frozen(eq=False, weakref_slot=False)
 class Provenance:
-    """The calibration that found some of a robot's numbers.
+    """The calibration that identified some values of a robot.
 
     Attributes:
-        log: The log of readings that it used.
-        date: When it was done, ISO 8601.
-        standard_error: Name of what was found -> standard error of the robot's number, in the shape of the field and
-            its SI unit; infinite with neither observations nor a prior. The names are those of tolerances.
+        log: The winch log that it used.
+        date: Date of the calibration, ISO 8601.
+        standard_error: Name of an identified quantity -> standard error of the robot's value, in the shape of the field
+            and its SI unit; infinite with neither observations nor a prior. The names are those of tolerances.
         note: Further remarks for users.
 
     Raises:
-        InvalidValueError: If one is of the wrong kind, or the date is none.
+        InvalidValueError: If a field has the wrong type, or the date is not a date.
     """
 
     log: str
@@ -122,8 +122,8 @@ class Provenance:
     note: str = ""
 
     def __attrs_post_init__(self) -> None:
-        """Check what does not need the robot; the robot checks names and shapes."""
-        given: Any = self.standard_error  # a caller without types gives anything
+        """Check the fields, except for names and shapes, which the robot checks."""
+        given: Any = self.standard_error  # a caller without type checks may give anything
         if not isinstance(given, Mapping):
             allowed, step = "names of fields and standard errors", 'Give {"frame_anchors": 0.001}, in SI.'
             raise InvalidValueError("calibration: standard_error", brief(given), allowed, step)
@@ -136,7 +136,7 @@ class Provenance:
         )
 
     def _of(self, cables: int) -> Provenance:
-        """The same, every standard error in the shape of its field in a robot of so many cables."""
+        """Provenance with every standard error expanded to the shape of its field for a given number of cables."""
         errors = deviations(self.standard_error, "calibration: standard_error", cables, low=0.0)
         return Provenance(self.log, self.date, errors, self.note)
 

@@ -1,4 +1,4 @@
-"""The machine between encoder and cable: motor, gear, drum, dead length and pulley."""
+"""The winch from encoder to cable: motor, gear, drum, dead length and pulley."""
 
 from __future__ import annotations
 
@@ -15,75 +15,75 @@ from sagline.core.fields import given, if_known, reduced, rule
 from sagline.core.memory import check_memory
 from sagline.robot.pose import unit
 
-UPRIGHT: Final = 1e-9  # how far from vertical a swivel axis may be, as the sine of an angle
-_AGREEING: Final = 1e-9  # of the dead length: largest difference of a given one to that of the guides
-MOST_NAMED: Final = 3  # fields that a message names
-_AXES: Final = {"swivel_axis": 1, "guides": 2}  # of a field for one cable, where it is no number
+UPRIGHT: Final = 1e-9  # tolerance of a vertical swivel axis, as the sine of an angle
+_AGREEING: Final = 1e-9  # relative to the dead length: largest difference between a given one and that of the guides
+MOST_NAMED: Final = 3  # largest number of fields in a message
+_AXES: Final = {"swivel_axis": 1, "guides": 2}  # number of array axes of a field for one cable, if it is not a number
 
 
 @frozen(eq=False, weakref_slot=False)
 class Winch:
-    """One winch with its pulley, or those of all cables: every field that is given has one shape, () or (m,).
+    """One winch with its pulley, or those of all cables: all given fields have one shape, () or (m,).
 
-    A field that is None is not known: what needs it says so by name.
+    A field that is None is not known; a function that needs it raises an error that names it.
 
-    A cable ends at its platform anchor: one that runs over a pulley at the platform and back to the frame, a loop, is
-    not modeled.
+    A cable ends at its platform anchor. A loop, in which a cable runs over a pulley at the platform back to the frame,
+    is not modeled.
 
     Attributes:
-        pulley_radius: Radius of the pulley at the frame, to the middle of the cable [m], >= 0; 0 for an eyelet. The
+        pulley_radius: Radius of the pulley at the frame, to the centerline of the cable [m], >= 0; 0 for an eyelet. The
             pulley swivels about a vertical axis through the frame anchor, where the cable enters it.
-        swivel_axis: Unit vector along the cable's travel where it enters the pulley, shape (..., 3): up (0, 0, 1), from
-            a drum below, or down (0, 0, -1).
-        pulley_friction: Coefficient mu of the cable's friction on the pulley and at the guides: tensions on the two
-            sides of a bend differ by exp(mu psi), psi its angle, the larger one on the side that the cable runs to.
-            Friction counts where the direction of `winding` is given, as in `inverse` and `forward`.
-        rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1: behind the pulley it is
-            1 + f times what it would be while winding in, 1 - f times while paying out.
-        dead_cable: Length of the straight guided run from drum to pulley [m], >= 0; where it leaves the drum opposite
-            the first pulley. Where there are guides a robot fills it in: the sum of the distances.
-        dead_rise: Height of the pulley's entry above the drum [m], within dead_cable; downward negative. Where there
-            are guides a robot fills it in.
-        guides: Eyelets, or pulleys small enough to be points, that a cable passes on its way from the drum to the frame
-            anchor, world axes [m], shape (..., k, 3): the first is where it leaves the drum, the frame anchor is not
-            among them. Between two of them it is a free catenary. None: the dead length is guided all along. Stiffness
-            and sensitivities are those of a straight guided run of the same length.
-        drum_radius: Radius of the drum at the bottom of the cable [m]; None where the drum is not known.
-        drum_width: Width that the cable may fill, along the drum's axis [m], >= groove_pitch; a layer has drum_width
-            over groove_pitch turns, which need not be whole. None: wide enough for one layer.
-        groove_pitch: Distance of two turns along the drum's axis [m].
+        swivel_axis: Unit vector in the direction from drum to pulley at the pulley's entry, shape (..., 3): up (0, 0,
+            1), from a drum below, or down (0, 0, -1).
+        pulley_friction: Friction coefficient mu of the cable on the pulley and at the guides: tensions on the two sides
+            of a bend differ by exp(mu psi), psi the bend angle; the tension is larger on the side toward which the
+            cable moves. Friction acts only if the direction of `winding` is given, as in `inverse` and `forward`.
+        rolling_friction: Share f of the tension that the pulley's bearing takes, >= 0, < 1: on the drum side of the
+            pulley, friction multiplies the tension by 1 + f while winding in and by 1 - f while paying out.
+        dead_cable: Length of the straight guided run from drum to pulley [m], >= 0; with a moving exit, measured where
+            the cable leaves the drum opposite the first pulley. With guides, the robot computes it as the sum of the
+            distances.
+        dead_rise: Height of the pulley's entry above the drum [m], at most dead_cable in magnitude; negative if lower.
+            With guides, the robot computes it.
+        guides: Eyelets, or pulleys small enough to be points, along the cable from the drum to the frame anchor, world
+            axes [m], shape (..., k, 3): the first is where the cable leaves the drum, and the frame anchor is not among
+            them. Between two guides the cable is a free catenary. None: the whole dead length is guided. Stiffness and
+            sensitivities are those of a straight guided run of the same length.
+        drum_radius: Radius of the drum at the lower side of the cable [m]; None if the drum is not known.
+        drum_width: Usable width along the drum axis [m], >= groove_pitch; a layer has drum_width/groove_pitch turns,
+            not necessarily a whole number. None: wide enough for one layer.
+        groove_pitch: Distance between adjacent turns along the drum axis [m].
         layers: Largest number of layers on the drum, a whole number >= 1.
-        drum_distance: From the drum to the first pulley, across the drum's axis [m]; None: the cable leaves the drum at
-            a fixed place.
-        drum_offset: Exit of the cable on the empty drum, at its first groove, along its axis from the middle of the
-            first pulley [m]; the grooves of the first layer go on to the positive side. -drum_width/2 for a drum with
-            its middle opposite the pulley.
-        gear: Turns of the encoder for a turn of the drum, not zero; negative where counts fall as cable is let out.
-        counts_per_turn: Counts of the encoder for one of its turns.
-        count_zero: Counts at which length_zero is off the drum.
-        length_zero: Length of cable off the drum at count_zero, at the winding tension, with dead_cable for the run
-            to the pulley [m]; `home` finds it.
-        cable_length: Whole length of the cable, on the drum and off it, at the winding tension [m]; no less
-            than dead_cable.
-        winding_tension: Tension at which the cable lies on the drum [N], >= 0.
+        drum_distance: Distance from the drum to the first pulley, perpendicular to the drum axis [m]; None: the cable
+            leaves the drum at a fixed point.
+        drum_offset: Exit position of the cable on the empty drum, at the first groove, along the drum axis from the
+            center of the first pulley [m]; the grooves of the first layer continue in the positive direction. Use
+            -drum_width/2 for a drum whose center is opposite the pulley.
+        gear: Encoder turns per drum turn, not zero; negative if counts decrease while cable is paid out.
+        counts_per_turn: Encoder counts per encoder turn.
+        count_zero: Encoder counts at which the length off the drum is length_zero.
+        length_zero: Length of cable off the drum at count_zero, at the winding tension, including dead_cable for the
+            run to the pulley [m]; `home` determines it.
+        cable_length: Total length of the cable, on and off the drum, at the winding tension [m]; at least dead_cable.
+        winding_tension: Tension of the cable on the drum [N], >= 0.
         inertia: Moment of inertia of motor, gear and drum at the motor's shaft [kg m^2].
         torque_limit: Largest torque of the motor at its shaft [N m].
         speed_limit: Largest speed of the motor's shaft [rad/s].
-        friction: Of the whole drive, as a force at the cable where it leaves the drum [N], >= 0.
-        position_gain: k_p of the drive's position loop, at the cable [1/s].
-        speed_gain: k_v of its speed loop, at the cable [N s/m].
-        integral_gain: k_i of its speed loop, at the cable [N/m].
-        load_cell_range: Largest value that the load cell reads [N].
-        load_cell_deviation: Standard deviation of a reading [N], >= 0.
-        load_cell_bias: Reading without load [N].
-        load_cell_gain: Reading per newton.
+        friction: Friction of the whole drive, as a force on the cable where it leaves the drum [N], >= 0.
+        position_gain: k_p of the drive's position loop, referred to the cable [1/s].
+        speed_gain: k_v of its speed loop, referred to the cable [N s/m].
+        integral_gain: k_i of its speed loop, referred to the cable [N/m].
+        load_cell_range: Largest value that the load cell measures [N].
+        load_cell_deviation: Standard deviation of a measured value [N], >= 0.
+        load_cell_bias: Measured value without load [N].
+        load_cell_gain: Measured value per newton of load.
 
-    All are given in SI, one number for all cables or one a cable. A swivel axis may have any length but zero; guides
-    have the shape (k, 3) for all cables or (m, k, 3), k >= 1, and leave dead_cable and dead_rise at 0.
+    All fields are in SI, one number for all cables or one per cable. A swivel axis may have any length but zero. Guides
+    have the shape (k, 3) for all cables or (m, k, 3), k >= 1; dead_cable and dead_rise then remain 0.
 
     Raises:
-        InvalidValueError: If a value is out of its range, the dead length rises by more than itself or is longer
-            than all of the cable, a gear is zero, a swivel axis is not vertical, two guides in a row coincide, or
+        InvalidValueError: If a value is out of its range, the dead rise exceeds the dead length, the dead length
+            exceeds the total length, a gear is zero, a swivel axis is not vertical, two consecutive guides coincide, or
             the shapes do not fit.
 
     Examples:
@@ -93,7 +93,7 @@ class Winch:
         array([0.05, 0.05])
     """
 
-    __slots__: ClassVar[tuple[str, ...]]  # the names of the fields, in order
+    __slots__: ClassVar[tuple[str, ...]]  # names of the fields, in order
 
     pulley_radius: Array = field(default=0.0, converter=given, metadata=rule("m", low=0.0))
     swivel_axis: Array = field(default=(0.0, 0.0, 1.0), kw_only=True, converter=given, metadata=rule(shape=(3,)))
@@ -127,7 +127,7 @@ class Winch:
     load_cell_gain: Array = field(default=1.0, kw_only=True, converter=given, metadata=rule(above=0.0))
 
     def __attrs_post_init__(self) -> None:
-        """Check every field once, and give all that are known one shape."""
+        """Check every field once, and expand all known fields to one shape."""
         values = {
             name: _checked(value, about)
             for name, about in _FIELDS.items()
@@ -148,11 +148,11 @@ class Winch:
 
     @property
     def anything_behind(self) -> bool:
-        """True if a cable runs over a pulley, or has a dead length behind it; guides count once a robot has them."""
+        """True if a cable has a pulley or a dead length; guides count after a robot has computed the dead length."""
         return bool(self.pulley_radius.any() or self.dead_cable.any())
 
     def per_cable(self, count: int) -> Winch:
-        """The winches of so many cables, one value a cable.
+        """The winches of a given number of cables, one value per cable.
 
         Args:
             count: Number of cables m.
@@ -161,7 +161,7 @@ class Winch:
             Winch with fields of shape (m,).
 
         Raises:
-            InvalidValueError: If the fields have another length, or the count is no whole number >= 1.
+            InvalidValueError: If the fields have another length, or the count is not a whole number >= 1.
         """
         count = whole_number(count, "count", 1)
         check_memory("winches", 8.0 * (len(_FIELDS) - len(_AXES)) * count, "Give fewer cables.")
@@ -176,9 +176,9 @@ class Winch:
         )
 
     def _long(self) -> str:
-        """Names for a message of the fields that differ among the cables.
+        """Names, for a message, of the fields that differ among the cables.
 
-        All fields have one shape, and do not know any more which of them had it first.
+        All fields are expanded to one shape, so their original shapes are not known here.
         """
         differ = [name for name, field in self.known().items() if (field != field[0]).any()]
         if not differ:
@@ -186,7 +186,7 @@ class Winch:
         return f"winches: {', '.join(differ[:MOST_NAMED])}{', ...' if len(differ) > MOST_NAMED else ''}"
 
     def _part(self, index: NDArray[Any]) -> Winch:
-        """The winches of some of the cables, of fields of shape (m,)."""
+        """The winches of some of the cables, with fields of shape (m,)."""
         return self.replace(**{name: field[index] for name, field in self.known().items()})
 
     def replace(self, **changes: Any) -> Winch:
@@ -196,7 +196,7 @@ class Winch:
             changes: Fields of `Winch` and their new values.
 
         Returns:
-            A new winch; this one stays as it is.
+            A new winch; this one remains unchanged.
 
         Raises:
             InvalidValueError: If there is no such field, or the constructor does not accept the new values.
@@ -210,21 +210,21 @@ class Winch:
         for name in changes:
             choice(name, "field", self.__slots__)
         if self.guides is not None and changes.get("guides") is not None:
-            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # they follow again
+            changes = {"dead_cable": 0.0, "dead_rise": 0.0, **changes}  # the robot computes them again
         return evolve(self, **changes)
 
     def _run_to(self, frame_anchors: Array) -> Winch:
-        """These winches with the dead length that follows from their guides.
+        """Copy of these winches with the dead length computed from their guides.
 
         Args:
             frame_anchors: End points of the guides, world axes [m], shape (m, 3).
 
         Returns:
-            Winch with fields of shape (m,); this one where there are no guides.
+            Winch with fields of shape (m,); this one if there are no guides.
 
         Raises:
-            InvalidValueError: If the last guide is at the frame anchor, or a dead length or rise other than 0 is given
-                and is not what follows from the guides to a billionth.
+            InvalidValueError: If the last guide is at the frame anchor, or a given dead length or rise is neither 0 nor
+                equal to the value from the guides within a relative error of 1e-9.
         """
         if self.guides is None:
             return self
@@ -239,7 +239,8 @@ class Winch:
                 "points before it",
                 "List the guides from the drum on, without the frame anchor.",
             )
-        rise = np.clip(frame_anchors[:, 2] - self.guides[:, 0, 2], -length, length)  # within it, whatever is rounded
+        # at most the length, despite rounding
+        rise = np.clip(frame_anchors[:, 2] - self.guides[:, 0, 2], -length, length)
         for name, own, follows in (("dead_cable", self.dead_cable, length), ("dead_rise", self.dead_rise, rise)):
             if (wrong := (own != 0.0) & (np.abs(own - follows) > _AGREEING * length)).any():
                 i = int(np.argmax(wrong))
@@ -291,7 +292,7 @@ def _element(item: str, wrong: NDArray[np.bool_]) -> tuple[str, tuple[int, ...]]
 
 
 def _points(points: Array) -> Array:
-    """The guides of all cables (k, 3), or of each (m, k, 3)."""
+    """The guides, (k, 3) for all cables or (m, k, 3) for each."""
     if points.ndim not in (2, 3) or points.shape[-1] != 3 or 0 in points.shape:
         allowed = "shape (k, 3) or (m, k, 3), k >= 1"
         step = "Give the points from the drum on, or None."
@@ -310,7 +311,7 @@ def _points(points: Array) -> Array:
 
 
 def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
-    """The one shape of all fields, () or (m,)."""
+    """The common shape of all fields, () or (m,)."""
     longest = max(shapes, key=lambda name: shapes[name])
     for name, shape in shapes.items():
         if len(shape) > 1 or 0 in shape:
@@ -323,7 +324,7 @@ def _shape(shapes: dict[str, tuple[int, ...]]) -> tuple[int, ...]:
 
 
 def _vertical(axis: Array) -> Array:
-    """Unit vectors of the swivel axes, which are vertical."""
+    """Unit vectors of the swivel axes; refuses an axis that is not vertical."""
     length = np.linalg.norm(axis, axis=-1)
     if not length.all():
         raise InvalidValueError(

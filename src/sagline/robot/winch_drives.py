@@ -1,4 +1,4 @@
-"""Drives of winches, motor and gear, from the data sheets of their makers."""
+"""Drives of winches, motor and gear, from the data sheets of the manufacturers."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from sagline.core.arrays import number
 from sagline.core.errors import InvalidValueError, nearest
 from sagline.robot.winch import Winch
 
-_TURN: Final = 2.0 * pi / 60.0  # rad/s of a turn a minute
-_SHORT: Final = 1e-4  # kg m^2, the sheets' unit
+_TURN: Final = 2.0 * pi / 60.0  # rad/s per revolution per minute
+_SHORT: Final = 1e-4  # kg m^2, the unit of the data sheets
 
 
 @dataclass(frozen=True, slots=True)
 class WinchDrive:
-    """A motor, with its gear where it has one, as its data sheet has it.
+    """Data sheet of a motor, with its gear if it has one.
 
     Attributes:
         name: Name for `winch_drive`.
-        gear: Turns of the motor for a turn of the output.
-        inertia: Of motor and gear at the motor's shaft [kg m^2].
-        rated_torque: That it can give all the time, at the motor's shaft [N m].
-        torque_limit: That it can give for moments, at the motor's shaft [N m].
-        rated_speed: At which it gives its rated torque, of the motor's shaft [rad/s].
-        speed_limit: Largest, of the motor's shaft [rad/s].
-        source: The sheet.
-        assumed: Assumptions, and data that are left out.
+        gear: Motor turns per turn of the output.
+        inertia: Moment of inertia of motor and gear at the motor's shaft [kg m^2].
+        rated_torque: Continuous torque at the motor's shaft [N m].
+        torque_limit: Peak torque at the motor's shaft [N m].
+        rated_speed: Speed of the motor's shaft at rated torque [rad/s].
+        speed_limit: Largest speed of the motor's shaft [rad/s].
+        source: The data sheet.
+        assumed: Assumptions, and data that are not used.
     """
 
     name: str
@@ -51,10 +51,11 @@ class WinchDrive:
             fields: Other fields of `Winch`, position_gain for instance.
 
         Returns:
-            The winch; its gear, inertia and limits are the drive's, the drum's inertia included.
+            The winch with gear, inertia and limits of the drive; the inertia includes that of the drum.
 
         Raises:
-            InvalidValueError: If a value is out of its range, or a field is not one of `Winch` or one of the drive's.
+            InvalidValueError: If a value is out of its range, or a field is not a field of `Winch` or is set by the
+                drive.
 
         Examples:
             >>> import sagline as sl
@@ -88,7 +89,8 @@ _GEARED_ASSUMED: Final = (
     "torques at the output over the gear ratio, so that losses in the gear count as torque that is missing; speed: "
     "that of the motor, 4000 min^-1; backlash and torsion of the gear left out"
 )
-# model: turns of the motor, rated and peak torque at the output [N m], inertia of motor and gear [1e-4 kg m^2]
+# model: turns of the motor per output turn, rated and peak torque at the output [N m], inertia of motor and gear [1e-4
+# kg m^2]
 _GEARED: Final = {
     "a3aj1": (5.0, 0.238, 1.16, 0.044),
     "a3aj3": (31.0 / 3.0, 0.687, 2.37, 0.033),
@@ -170,22 +172,22 @@ def winch_drive_names() -> tuple[str, ...]:
 
 
 def winch_drive(name: str) -> WinchDrive:
-    """A motor and gear for winches, from the catalogue.
+    """A motor with gear for winches, from the catalogue.
 
     Args:
         name: One of `winch_drive_names`.
 
     Returns:
-        The drive, with its source and what is assumed.
+        The drive, with its source and assumptions.
 
     Raises:
-        InvalidValueError: If there is no such drive; the message suggests one that is near.
+        InvalidValueError: If there is no such drive; the message suggests a similar name.
 
     Examples:
         >>> import sagline as sl
         >>> drive = sl.winch_drive("yaskawa-sgmah-01aj1")
     """
-    given: Any = name  # a caller without types gives anything
+    given: Any = name  # a caller without type checks may give anything
     word = str(given) if isinstance(given, str) else ""
     if word in _DRIVES:
         return _DRIVES[word]
