@@ -1,1 +1,1 @@
-"""Inverse kinematics (from a motion to tensions and lengths) and forward kinematics (back again)."""
+"""Inverse kinematics (motion to tensions and lengths) and forward kinematics (lengths to poses)."""

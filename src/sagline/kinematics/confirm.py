@@ -1,4 +1,4 @@
-"""The proof of a plan: where the platform really goes when the planned lengths are wound."""
+"""Confirmation of a plan: the actual equilibrium of the platform at the planned lengths."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from sagline.robot.routing import differs, kernel_length
 from sagline.statics.tables import pose_rows
 
 _CATENARY = Catenary()
-BLOCK = 1 << 14  # poses whose cables are kept at once: little memory
+BLOCK = 1 << 14  # poses per block, to limit memory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Confirmation(Result):
-    """A plan, and the exact equilibrium that its lengths lead to.
+    """A plan, and the exact equilibrium at its lengths.
 
     Attributes:
         plan: The plan, of any cable model.
-        pose: Equilibrium on exact cables of the planned lengths; NaN where the plan has no solution.
+        pose: Equilibrium with catenary cables of the planned lengths; NaN where the plan has no solution.
         status: Codes of `ForwardStatus`, shape () or (N,).
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] there, shape (2,) or (N, 2).
     """
@@ -48,33 +48,33 @@ class Confirmation(Result):
 
     @property
     def position_error(self) -> Array:
-        """Position of the platform origin less the planned one [m], world axes, shape (3,) or (N, 3)."""
+        """Position of the platform origin minus the planned position [m], world axes, shape (3,) or (N, 3)."""
         return locked(self.pose.position - self.plan.state.pose.position)
 
     @property
     def rotation_error(self) -> Array:
         """Angle between the platform's orientation and the planned one [rad], shape () or (N,)."""
         planned, real = self.plan.state.pose.quaternion, self.pose.quaternion
-        # from sine and cosine of half the angle: precise for the smallest angles, as the cosine alone is not
+        # Computed from sine and cosine of half the angle: precise for very small angles, unlike the cosine alone.
         sine = 0.5 * np.linalg.norm(real - planned, axis=-1) * np.linalg.norm(real + planned, axis=-1)
         cosine = np.abs(np.einsum("...i,...i->...", real, planned))
         return locked(np.asarray(2.0 * np.arctan2(sine, cosine)))
 
 
 def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
-    """Wind a plan's lengths onto exact catenaries and find where the platform rests.
+    """Equilibrium of the platform with catenary cables of the planned lengths.
 
-    Inertia and external wrench are the plan's; the search starts from the planned poses.
+    Inertia and external wrench are those of the plan; the search starts at the planned poses.
 
     Args:
-        plan: A plan of any cable model: the errors are that model's. Those of the exact one are of rounding alone.
-        progress: Called every tenth of a second or so: how many poses are confirmed, of how many.
+        plan: A plan of any cable model. The errors are those of its model; for the exact model, only rounding errors.
+        progress: Called about every tenth of a second: number of confirmed poses, total number.
 
     Returns:
-        The plan with the poses found.
+        The plan with its exact equilibrium poses.
 
     Raises:
-        InvalidValueError: If the plan is none.
+        InvalidValueError: If plan is not a Plan.
 
     Examples:
         >>> import numpy as np
@@ -87,7 +87,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     """
     callback(progress, "progress")
     state, lengths = instance(plan, Plan, "plan").state, plan.unstrained_length
-    if not state.pose.shape or not len(lengths):  # all at once
+    if not state.pose.shape or not len(lengths):  # one block
         found = _forward(state, progress)
         return Confirmation(plan, found.pose, found.status, found.wrench_residual)
     parts = []
@@ -100,7 +100,7 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
 
 
 def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
-    """Forward kinematics of a state's lengths, with its friction."""
+    """Forward kinematics of the lengths of a state, with its friction."""
     robot, winding = state.robot, None if state.contact is None else state.contact.winding
     if not differs(robot, winding):
         return forward(robot, state.unstrained_length, state.pose, wrench=state.wrench, progress=progress)
@@ -112,5 +112,5 @@ def _forward(state: Equilibrium, progress: Progress | None) -> ForwardSolution:
 
 
 def _from(first: int, count: int, progress: Progress) -> Progress:
-    """Progress of a part that begins at a pose, as of the whole."""
+    """Progress callback for a part that starts at a given pose, relative to all poses."""
     return lambda done, _: progress(first + done, count)

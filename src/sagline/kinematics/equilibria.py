@@ -24,20 +24,20 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 
-START_BYTES = 250.0  # memory of each cable of a start during the solution
-_SAME = 1e-6  # relative to the mean length, and in radians: closer poses are one
+START_BYTES = 250.0  # memory per cable of one start during the solution
+_SAME = 1e-6  # relative to the mean length, and in radians: poses with a smaller distance are the same
 _KEPT = (*STABLE, ForwardStatus.FITTED)
 _CATENARY = Catenary()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Equilibria(Result):
-    """Result of `equilibria`: K stable equilibria, the lowest energy first.
+    """Result of `equilibria`: K stable equilibria, in order of increasing energy.
 
     Attributes:
         solutions: The equilibria, a batch of K.
-        reached: Number of starts that ended in each, shape (K,): a share of the orientations, not a probability.
-        starts: Number of starts; those that reached none of the K were unstable or did not converge.
+        reached: Number of starts that ended in each, shape (K,): a share of the start orientations, not a probability.
+        starts: Number of starts; the remaining starts ended at an unstable equilibrium or did not converge.
     """
 
     solutions: ForwardSolution
@@ -57,27 +57,28 @@ def equilibria(
     starts: int = 300,
     seed: int = 0,
 ) -> Equilibria:
-    """Stable equilibria of a robot at given lengths, as far as a thorough search finds them.
+    """Stable equilibria of a robot at given lengths, found by a search over orientations.
 
-    For a held orientation the energy is convex in the position, so only orientations need to be searched: starts
-    are spread evenly at random over all of them, each placed by its own unique equilibrium of the position. A robot
-    that does not turn has exactly one equilibrium. For others this is no proof: what no start reached is not listed.
+    For a fixed orientation the energy is convex in the position, so only orientations are searched: starts are
+    uniformly random over all orientations, each at the unique equilibrium position for its orientation. A robot without
+    rotations has exactly one equilibrium. For other robots the list can be incomplete: an equilibrium that no start
+    reached is missing.
 
     Args:
         robot: The robot, with m cables.
         unstrained_length: L [m], > 0, shape (m,).
-        model: Cable model. The shallow ones have no energy: theirs are sorted by the number of starts. For straight
-            cables: the local least-squares fits, sorted by misfit.
-        wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for none.
+        model: Cable model. The shallow models have no energy: their equilibria are sorted by the number of starts. For
+            straight cables: the local least-squares fits, sorted by misfit.
+        wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
         starts: Number of initial orientations, >= 1.
-        seed: Of the random orientations.
+        seed: Seed of the random orientations.
 
     Returns:
         Equilibria.
 
     Raises:
-        InvalidValueError: If a length is wrong (the message names the cable), starts is below 1 or more than
-            memory holds, or an argument is of the wrong kind.
+        InvalidValueError: If a length is wrong (the message names the cable), starts is below 1 or exceeds the memory,
+            or an argument has the wrong type.
 
     Examples:
         >>> import sagline as sl
@@ -111,7 +112,7 @@ def equilibria(
 
 
 def _quaternions(robot: Robot, count: int, seed: int) -> Array:
-    """Level and tilted starts first, then orientations evenly at random, as far as the robot can turn, (K, 4)."""
+    """Level and tilted starts first, then uniformly random orientations within the free rotations, (K, 4)."""
     known = start_quaternions(robot)
     if robot.motion_pattern not in ROTATING or count <= len(known):
         return known[:count]
@@ -127,7 +128,7 @@ def _quaternions(robot: Robot, count: int, seed: int) -> Array:
 
 
 def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
-    """One index for each distinct stable equilibrium, lowest energy first, and how many starts reached it."""
+    """One index per distinct stable equilibrium, lowest energy first, and number of starts that reached it."""
     kept = np.flatnonzero(np.isin(found.pose_status, _KEPT))
     chosen: list[int] = []
     counts: list[int] = []
@@ -146,7 +147,7 @@ def _distinct(found: ForwardRows, length: float) -> tuple[Indices, Indices]:
 
 
 def _distance(row: Array, other: Array, length: float) -> float:
-    """Distance of two pose rows: the larger of displacement over length and angle."""
+    """Distance of two pose rows: the larger of relative displacement and angle."""
     shift = float(np.linalg.norm(row[:3] - other[:3])) / length
     sign = np.copysign(1.0, row[3:] @ other[3:])
     return max(shift, 2.0 * float(np.linalg.norm(row[3:] - sign * other[3:])))

@@ -1,4 +1,4 @@
-"""Forward kinematics: from unstrained lengths to the pose in which the platform rests, with or without a start."""
+"""Forward kinematics: from unstrained lengths to the equilibrium pose, with or without an initial pose."""
 
 from __future__ import annotations
 
@@ -40,24 +40,24 @@ from sagline.robot.routing import differs, with_routing
 from sagline.statics.balance import external_wrench
 from sagline.statics.tables import pose_rows
 
-_TILTS = (25.0, 60.0)  # degrees, tried where the level platform leads nowhere
-_DEPTH = 0.1  # of the mean length
-_LIMIT_SLACK = 0.01  # a measured tension may miss its limit by this share
-_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; fitted ranks like solved
+_TILTS = (25.0, 60.0)  # degrees, tried if the level start fails
+_DEPTH = 0.1  # relative to the mean length
+_LIMIT_SLACK = 0.01  # a measured tension may exceed its limit by this share
+_POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; a fitted sample has the rank of a solved one
 
 
 def search(
     robot: Robots, model: CableModel, lengths: Array, wrenches: Array, progress: Progress | None = None
 ) -> ForwardRows:
-    """Forward kinematics without a start, sample by sample.
+    """Forward kinematics without initial poses; each sample is searched independently.
 
-    With its orientation held, the platform has a single equilibrium, because the energy is convex in the position:
-    it is found from anywhere, and is the start for the whole motion. First the platform is held level. Samples whose
-    answer is not a stable equilibrium within the tension limits are tried again from tilted starts; the best answer
-    counts: the better status, then fewer cables outside their limits, then the lower energy.
+    With fixed orientation the platform has a single equilibrium, because the energy is convex in the position. It is
+    found from any start and is the start for all motions together. The first start orientation is level. Samples
+    without a stable equilibrium within the tension limits are repeated from tilted starts. The best result is kept:
+    better status first, then fewer cables outside their limits, then lower energy.
 
-    lengths: unstrained lengths (N, m), rows of NaN are left out; wrenches: external plus inertial (1 or N, 6);
-    progress: called after each block how many samples are done, of how many.
+    lengths: unstrained lengths (N, m), rows of NaN are skipped; wrenches: external plus inertial (1 or N, 6); progress:
+    called after each block with the number of finished samples and the total number.
     """
     count, m = lengths.shape
     found = ForwardRows.empty(count, m, has_routing(robot))
@@ -88,10 +88,10 @@ def _search_block(robot: Robots, model: CableModel, lengths: Array, wrenches: Ar
 def from_orientations(
     robot: Robots, model: CableModel, lengths: Array, wrenches: Array, quaternion: Array
 ) -> ForwardRows:
-    """From the middle of the frame: first the position alone, then all motions.
+    """Solve from the middle of the frame: first the position alone, then all motions.
 
-    lengths: unstrained lengths (N, m); wrenches: external plus inertial (1 or N, 6); quaternion: orientation to begin
-    with (x, y, z, w), shape (4,), or one a sample (N, 4).
+    lengths: unstrained lengths (N, m); wrenches: external plus inertial (1 or N, 6); quaternion: initial orientation
+    (x, y, z, w), shape (4,), or one per sample (N, 4).
     """
     shared = first_of(robot)
     freedom = shared.freedom
@@ -104,9 +104,9 @@ def from_orientations(
 
 
 def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Array:
-    """Positions a little below the middle of the frame ends, as far as the platform can move.
+    """Positions slightly below the center of the frame ends, within the free motions of the platform.
 
-    Not in the middle itself, because the two ends of a single cable must not coincide.
+    Not the center itself, because the two ends of a single cable must not coincide.
 
     lengths: unstrained lengths (N, m); quaternion: orientation of the platform, shape (4,) or (N, 4). Returns positions
     of the platform origin [m], shape (N, 3).
@@ -118,7 +118,7 @@ def starting_positions(robot: Robots, lengths: Array, quaternion: Array) -> Arra
 
 
 def centered_positions(robot: Robots, quaternion: Array) -> Array:
-    """Position at which the middle of the platform ends is in the middle of the frame ends.
+    """Position at which the center of the platform ends is at the center of the frame ends.
 
     quaternion: orientation of the platform, shape (4,) or (N, 4). Returns position of the platform origin [m], shape
     (3,) or (N, 3).
@@ -132,7 +132,7 @@ def centered_positions(robot: Robots, quaternion: Array) -> Array:
 
 
 def start_quaternions(robot: Robot) -> Array:
-    """Orientations to start from: level, then tilted about each axis that the robot can turn about, both ways.
+    """Start orientations: level, then tilted about each free rotation axis, in both directions.
 
     Returns quaternions (K, 4), scalar last.
     """
@@ -145,7 +145,7 @@ def start_quaternions(robot: Robot) -> Array:
 
 
 def outside_limits(robot: Robots, model: CableModel, found: ForwardRows) -> Indices:
-    """Number of cables of each sample outside their robot's tension limits.
+    """Number of cables per sample outside the tension limits of the robot.
 
     Returns counts (N,); 0 for straight cables, whose tensions are not known.
     """
@@ -164,7 +164,7 @@ def _is_plausible(robot: Robots, model: CableModel, found: ForwardRows) -> Flags
 
 
 def _rank(robot: Robots, model: CableModel, found: ForwardRows) -> Array:
-    """Rows (status, cables outside their limits, energy) of which the smaller is the better, (N, 3)."""
+    """Rows (status, cables outside their limits, energy) for comparison: a smaller row is better, (N, 3)."""
     energy = np.nan_to_num(found.numbers[:, ENERGY], nan=0.0)
     return np.stack((_POOR[found.pose_status].astype(np.float64), outside_limits(robot, model, found), energy), axis=1)
 
@@ -188,36 +188,36 @@ def forward(
     winding: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> ForwardSolution:
-    """The pose in which the platform rests on cables of given unstrained lengths.
+    """The equilibrium pose of the platform on cables of given unstrained lengths.
 
     Args:
-        robot: The robot, with m cables. Or a sequence of N robots, one a sample, that differ in anything but number of
-            cables, motion pattern with its plane, kind of tension limits and gravity.
-        unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN, as a plan has it at an
-            infeasible pose, is answered by the status NO_LENGTHS.
-        start: Initial pose. A batch of N poses: one a sample. A single pose with N samples: a trajectory, the
-            first sample begins there and each other where the last one ended. None: every sample is searched for
-            by itself, from the level platform; of several equilibria the one is taken that keeps the robot's tension
-            limits and is found first (see `equilibria` for the others).
+        robot: The robot, with m cables. Or a sequence of N robots, one per sample, with equal number of cables, motion
+            pattern with plane, type of tension limits and gravity; all other data may differ.
+        unstrained_length: L [m], > 0, shape (m,) for one sample or (N, m). A row of NaN, as in a plan at an infeasible
+            pose, gets the status NO_LENGTHS.
+        start: Initial pose. A batch of N poses: one per sample. A single pose with N samples: a trajectory; the first
+            sample starts at this pose, each following one at the previous result. None: every sample is searched
+            independently, from the level platform; of several equilibria, the first one found within the tension limits
+            of the robot is taken (see `equilibria` for the others).
         model: Cable model; the default is exact.
-        wrench: External plus inertial wrench on the platform about its center of mass in world axes, without
-            gravity: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
-        tension_measured: Readings of load cells: then lengths count as measured too, both are corrected within their
-            deviations to fit each other, and the answer carries the covariance of the pose.
-        winding: Last direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out,
-            0 standing, shape (m,) or (N, m). None: nothing rubs. Friction and guides change the lengths by
-            iteration; with load cells, that change stays as it is at the measured lengths. Much friction on
-            soft cables lets the platform rest at more than one pose near by.
-        progress: Called every tenth of a second or so: how many samples are solved, of how many.
+        wrench: External plus inertial wrench on the platform about its center of mass in world axes, without gravity:
+            force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
+        tension_measured: Load cell data. Lengths then count as measured too; lengths and tensions are corrected within
+            their deviations to fit each other, and the result has the covariance of the pose.
+        winding: Last direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
+            rest, shape (m,) or (N, m). None: no friction. Friction and guides change the lengths by iteration; with
+            load cells, this change is computed once, at the measured lengths. With high friction and soft cables,
+            several adjacent poses can be in equilibrium.
+        progress: Called about every tenth of a second: number of solved samples, total number.
 
     Returns:
         ForwardSolution, single or with a leading axis N.
 
     Raises:
-        InvalidValueError: If a length is not positive, or no longer than the dead length behind its pulley, or single
-            lengths of a sample are NaN (the message names the cable), several robots do not fit together (it names
-            which), an argument is of the wrong kind or shape, the start is outside the motions of the robot's pattern,
-            or so many samples need more memory than is free.
+        InvalidValueError: If a length is not positive, or not longer than the dead length, or only some lengths of a
+            sample are NaN (the message names the cable), several robots do not fit together (it names the property), an
+            argument has the wrong type or shape, the start is outside the motions of the robot's pattern, or the
+            samples need more memory than is free.
 
     Source:
         docs/model.md, section 6.
@@ -260,10 +260,10 @@ def forward(
 
 
 def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
-    """The caller's lengths, shape (m,) or (N, m), positive and beyond the dead length, or whole rows of NaN.
+    """The caller's lengths, shape (m,) or (N, m), positive and longer than the dead length, or whole rows of NaN.
 
-    robot: gives the number of cables, their dead length, and its name to messages; or one a sample; lengths: what the
-    caller gave [m]. Returns write-locked array of shape (m,) or (N, m).
+    robot: gives number of cables, dead length, and name for messages; or one robot per sample; lengths: the caller's
+    lengths [m]. Returns write-locked array of shape (m,) or (N, m).
     """
     array = numbers(lengths, "unstrained_length", "m")
     shared, dead = first_of(robot), dead_cable(robot)
@@ -293,10 +293,10 @@ def checked_lengths(robot: Robots, lengths: ArrayLike) -> Array:
 
 
 def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
-    """The error of a length that would not reach from drum to pulley.
+    """Error for a length that is not longer than the dead length.
 
-    lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead length [m], of the same shape; no less than one of
-    the lengths. Returns the error, to be raised: it names the cable and, of many, the sample.
+    lengths: unstrained lengths [m], shape (m,) or (N, m); dead: dead length [m], of the same shape; at least one length
+    does not exceed it. Returns the error, to be raised: it names the cable and, in a batch, the sample.
     """
     index = tuple(int(i) for i in np.argwhere((lengths <= dead) & (dead > 0.0))[0])
     sample = f"sample {index[0]}, " if lengths.ndim == 2 else ""
@@ -309,7 +309,7 @@ def dead_only(lengths: Array, dead: Array) -> InvalidValueError:
 
 
 def start_rows(start: Pose, lengths: Array) -> Array:
-    """Pose rows to begin at.
+    """Pose rows of the starts.
 
     lengths: the samples, shape (m,) or (N, m). Returns array of shape (1 or N, POSE_COLUMNS).
     """

@@ -42,15 +42,15 @@ class ForwardSolution(Result):
         state: Robot, poses, wrench and cables in equilibrium; NaN where the lengths were NaN.
         status: Codes of `ForwardStatus`, shape () or (N,).
         stiffness_min: Smallest stiffness of the platform against its free motions [N/m], shape () or (N,). A rotation
-            counts by the arc it makes at the root mean square distance of the platform ends from the center of mass.
-        energy: Potential energy of cables, weight and given force [J], shape () or (N,); frame ends and the origin
-            of the world are at zero. The shallow models have none: NaN. Straight cables: what they minimize
-            instead, half the sum of squared length errors [m^2].
+            is measured by its arc length at the root mean square distance of the platform ends from the center of mass.
+        energy: Potential energy of cables, weight and given force [J], shape () or (N,); zero at the frame ends and at
+            the origin of the world. The shallow models have none: NaN. Straight cables: their objective instead, half
+            the sum of squared length errors [m^2].
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
-        iterations: Newton steps taken, shape () or (N,).
-        covariance: Of the pose found from measured tensions: displacement of the center of mass [m] and rotation
-            vector [rad], world axes, shape (6, 6) or (N, 6, 6). None where no tensions were measured.
+        iterations: Number of Newton steps, shape () or (N,).
+        covariance: Covariance of a pose from measured tensions: displacement of the center of mass [m] and rotation
+            vector [rad], world axes, shape (6, 6) or (N, 6, 6). None without measured tensions.
     """
 
     state: Equilibrium
@@ -73,21 +73,21 @@ class ForwardSolution(Result):
 
     @property
     def stable(self) -> Flags:
-        """True if each sample is a stable equilibrium, however it is held, shape () or (N,)."""
+        """True if each sample is a stable equilibrium, with any constraint by the cables, shape () or (N,)."""
         return np.isin(self.status, STABLE)
 
     @property
     def slack(self) -> Flags:
-        """Flags of slack cables, shape (m,) or (N, m): tau at most half the weight of the chord's length.
+        """True for slack cables, shape (m,) or (N, m): tau at most half the weight of a cable of chord length.
 
-        Such a cable sags by a quarter of its chord or more. A weightless one is slack when it carries nothing.
+        Such a cable sags by a quarter of its chord or more. A weightless cable is slack if its tension is zero.
         """
         cables = self.state.cables
         density = np.zeros(()) if cables.model.weightless else cables.cable.linear_density
         return np.asarray(cables.chord_tension <= 0.5 * density * cables.gravity * cables.chord)
 
 
-BLOCK = 1 << 13  # cables solved at once: from a few to some 130 ms, after which an interrupt is heard
+BLOCK = 1 << 13  # cables per block: from a few to 130 ms, after which an interrupt is handled
 
 
 class ForwardRows(NamedTuple):
@@ -100,7 +100,7 @@ class ForwardRows(NamedTuple):
     pose_status: Codes
 
     def keep(self, samples: Indices | slice, other: ForwardRows, which: Indices | slice = slice(None)) -> None:
-        """Replace the results of some samples (k,) by those of some (k,) of another batch."""
+        """Replace the results of some samples (k,) by those of some samples (k,) of another batch."""
         self.poses[samples] = other.poses[which]
         self.results[:, samples] = other.results[:, which]
         self.cable_status[samples] = other.cable_status[which]
@@ -118,19 +118,19 @@ class ForwardRows(NamedTuple):
         )
 
     def last_pose(self, before: Array) -> Array:
-        """The last pose row that was found, (1, POSE_COLUMNS); the one before these if none was."""
+        """The last pose row found, (1, POSE_COLUMNS); the given previous row if none was found."""
         found = ~np.isin(self.pose_status, (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS))
         which = np.flatnonzero(found)[-1:]
         return locked(self.poses[which]) if which.size else before
 
     @property
     def arrays(self) -> SolutionArrays:
-        """A plain tuple: kernels know those the fastest."""
+        """Plain tuple of the arrays: kernels accept it fastest."""
         return self.poses, self.results, self.cable_status, self.numbers, self.pose_status
 
     @classmethod
     def empty(cls, count: int, cables: int, behind: bool | None) -> ForwardRows:
-        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead lengths."""
+        """Arrays for a batch, to be filled; behind: True with pulleys or dead lengths."""
         return cls(
             np.empty((count, tables.POSE_COLUMNS)),
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
@@ -186,8 +186,8 @@ def solve_forward_rows(
     """Run the kernel over samples, in blocks.
 
     lengths: unstrained lengths (N, m); starts: pose rows (1 or N, POSE_COLUMNS); wrenches: external plus inertial (1 or
-    N, 6); chained: whether each sample starts where the last one ended; freedom: motions to allow (n, 6); None for
-    those of the robot; progress: called after each block how many samples are done, of how many.
+    N, 6); chained: True if each sample starts at the result of the previous one; freedom: free motions (n, 6); None for
+    those of the robot; progress: called after each block with the number of finished samples and the total number.
     """
     count, m = lengths.shape
     allowed = first_of(robot).freedom if freedom is None else freedom
@@ -209,7 +209,7 @@ def solve_forward_rows(
 
 
 def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
-    """Memory of a chain of samples, before the first one."""
+    """Memory of a chain of samples, before the first sample."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),

@@ -28,13 +28,13 @@ from sagline.statics.tables import body_table, cable_table, pose_rows
 
 
 class ForwardStep(NamedTuple):
-    """Answer for one sample.
+    """Result for one sample.
 
     Attributes:
-        position: Of the platform origin [m], shape (3,).
+        position: Position of the platform origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
         chord_tension: tau of the cables [N], shape (m,).
-        status: Kind of equilibrium, or reason of the failure.
+        status: Type of equilibrium, or reason of the failure.
         stiffness_min: Smallest stiffness [N/m], as in `ForwardSolution`.
         force_residual: Norm of the unbalanced force [N].
         moment_residual: Norm of the unbalanced moment [N m].
@@ -50,10 +50,10 @@ class ForwardStep(NamedTuple):
 
 
 class ForwardSolver:
-    """Solves one sample after another, each from the last stable equilibrium.
+    """Solver for successive samples; each starts from the last stable equilibrium.
 
-    It owns its working memory and remembers that equilibrium: `reset` forgets it. One solver serves one control loop;
-    it is not to be shared between threads.
+    The solver owns its work arrays and stores the last equilibrium; `reset` clears it. Use one solver per control loop;
+    do not share it between threads.
     """
 
     def __init__(self, robot: Robot, model: CableModel | None = None, start: Pose | None = None) -> None:
@@ -62,11 +62,11 @@ class ForwardSolver:
         Args:
             robot: The robot.
             model: Cable model with forces; the default is the exact one.
-            start: Initial pose of the first step; None: a search, which takes some hundred microseconds.
+            start: Initial pose of the first step; None: a search, which takes several hundred microseconds.
 
         Raises:
             InvalidValueError: If the model is Straight, which has no forces, start is a batch, the robot's winches have
-                guides, or an argument is of the wrong kind.
+                guides, or an argument has the wrong type.
         """
         self._robot = without_guides(instance(robot, Robot, "robot"), "ForwardSolver", "forward")
         self._model = optional(model, CableModel, "model") or Catenary()
@@ -85,7 +85,7 @@ class ForwardSolver:
         self._status: Codes = np.empty(1, dtype=np.int8)
         self._arguments: tuple[Any, ...] = (
             (self._model.code, *self._model.parameters, behind or None),
-            True,  # a chain continues from the last equilibrium
+            True,  # the chain continues from the last equilibrium
             (
                 robot.freedom,
                 body_table(robot),
@@ -98,20 +98,20 @@ class ForwardSolver:
         )
         self._own_lengths, self._load = self._lengths[0].data, self._wrench[0].data
         self._place, self._turn = self._pose[0, :3], self._pose[0, 3:]
-        self._loaded = False  # whether the wrench of the last sample was given
+        self._loaded = False  # True if the last sample had a wrench
         self._start[0, 6] = 1.0
-        self._lengths[0] = np.nan  # compiles, solves nothing
+        self._lengths[0] = np.nan  # compiles without solving
         forward_poses(*self._arguments)
         self.reset(start)
 
     def reset(self, start: Pose | None = None) -> None:
-        """Forget the last pose: the next step begins at a start, or searches.
+        """Clear the last pose: the next step starts at the given pose, or searches.
 
         Args:
             start: Initial pose of the next step; None: a search.
 
         Raises:
-            InvalidValueError: If start is a batch, or no pose.
+            InvalidValueError: If start is a batch, or not a pose.
         """
         if start is not None and instance(start, Pose, "start").shape:
             raise InvalidValueError("start", f"a batch of {len(start)} poses", "one pose", "Give one of them.")
@@ -124,13 +124,14 @@ class ForwardSolver:
 
         Args:
             unstrained_length: L [m], > 0, shape (m,).
-            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+            wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for
+                zero.
 
         Returns:
-            A fresh result whose arrays belong to the caller.
+            A new result whose arrays belong to the caller.
 
         Raises:
-            InvalidValueError: If a length is not positive, or no longer than its dead length (the message names the
+            InvalidValueError: If a length is not positive, or not longer than its dead length (the message names the
                 cable), or a shape is wrong.
         """
         lengths = self._checked(unstrained_length)
@@ -151,11 +152,11 @@ class ForwardSolver:
         )
 
     def _checked(self, unstrained_length: ArrayLike) -> Array:
-        """Lengths of shape (m,), positive and finite; looked at as a list, which for few numbers is the fastest."""
+        """Lengths of shape (m,), positive and finite; checked as a list, which is fastest for few numbers."""
         given, shape = unstrained_length, self._lengths.shape[1:]
         if type(given) is np.ndarray and given.dtype == np.float64 and given.shape == shape:
             values = given.tolist()
-            if min(values) >= SMALLEST and sum(values) < LARGEST:  # the sum is NaN if a length is
+            if min(values) >= SMALLEST and sum(values) < LARGEST:  # the sum is NaN if a length is NaN
                 return given
         lengths = checked(unstrained_length, "unstrained_length", "m", shape=shape, above=0.0)
         if lengths.ndim != 1:
@@ -167,21 +168,22 @@ class ForwardSolver:
     def step_into(
         self, unstrained_length: Array, position: Array, quaternion: Array, wrench: Array | None = None
     ) -> ForwardStatus:
-        """Solve one sample into the caller's memory: no allocation once a pose is known.
+        """Solve one sample and write the result to the caller's arrays; no allocation after the first solved pose.
 
-        A wrong length or number of the wrench is reported by the status, not by an error.
+        A wrong length or wrench is reported by the status, not by an error.
 
         Args:
             unstrained_length: L [m], shape (m,).
             position: Filled with the position of the platform origin [m], shape (3,).
             quaternion: Filled with the rotation platform -> world, scalar last, shape (4,).
-            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+            wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for
+                zero.
 
         Returns:
             The status of the sample.
 
         Raises:
-            InvalidValueError: If an argument is no such array of numbers.
+            InvalidValueError: If an argument is not an array of the required type and shape.
         """
         copy_in(self._own_lengths, unstrained_length, "unstrained_length", "m")
         if wrench is not None:

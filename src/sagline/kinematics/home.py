@@ -1,4 +1,4 @@
-"""Homing: the zeros of counts and lengths, from a pose held at known tensions."""
+"""Homing: the zeros of counts and lengths, from a pose with known tensions."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows, refuse_missing_chords
 
 _CATENARY = Catenary()
-MISSED: Final = 1e-9  # of a tension: a cable that misses it by more cannot have it
-LARGEST_STRAIN: Final = 0.5  # no rope holds more; what reads so has another unit
-HALVINGS: Final = 50  # of the interval, as a ratio, in which a cable's least tension lies
-PRECISION: Final = 1e-4  # its precision, as a ratio
+MISSED: Final = 1e-9  # relative to the tension: a cable with a larger error cannot have this tension
+LARGEST_STRAIN: Final = 0.5  # larger than the strain of any rope; such a measured value has another unit
+HALVINGS: Final = 50  # largest number of bisections of the interval ratio that contains the smallest tension of a cable
+PRECISION: Final = 1e-4  # precision of this smallest tension, as a ratio
 
 
 def home(
@@ -38,26 +38,26 @@ def home(
     *,
     temperature: ArrayLike = 0.0,
 ) -> Robot:
-    """A robot whose winches know where they are: the zeros of counts and lengths from a pose at known tensions.
+    """Robot with calibrated winch zeros: count and length zeros from one pose with known tensions.
 
     Args:
         robot: A robot with winches.
         pose: Pose of the platform, a single one.
-        frame_end_tension: Readings of the load cells at the frame ends there [N], a number or shape (m,). Tensions are
-            these less the winches' load_cell_bias, over load_cell_gain. They need not balance the platform exactly:
-            each cable is taken by itself.
-        counts: Encoder counts there, a number or shape (m,).
+        frame_end_tension: Load cell values at the frame ends at this pose [N], a number or shape (m,). The tension is
+            this value minus load_cell_bias, divided by load_cell_gain. The tensions need not balance the platform
+            exactly: each cable is evaluated separately.
+        counts: Encoder counts at this pose, a number or shape (m,).
         model: Cable model; the default is exact.
-        temperature: By how much the cables are warmer there than where the lengths are to hold [K].
+        temperature: Cable temperature at this pose minus the temperature for which the lengths are valid [K].
 
     Returns:
         The robot with `count_zero` and `length_zero` of its winches replaced.
 
     Raises:
-        InvalidValueError: If the robot has no winches, or they have guides, the pose is none or a batch, a reading is
-            beyond load_cell_range, no cable has so little tension there or holds so much, or more is off a drum
-            than its cable_length; the message names the cable.
-        CableGeometryError: If a cable's ends coincide there, or its platform end is inside its pulley.
+        InvalidValueError: If the robot has no winches, or they have guides, the pose is a batch or has the wrong type,
+            a measured value is beyond load_cell_range, a tension is too small or too large for its cable at this pose,
+            or the length off a drum exceeds its cable_length; the message names the cable.
+        CableGeometryError: If the ends of a cable coincide at this pose, or its platform end is inside its pulley.
 
     Examples:
         >>> import sagline as sl
@@ -94,7 +94,7 @@ def home(
 
 
 def _tensions(robot: Robot, winches: Winch, reading: Array) -> Array:
-    """Tensions that load cells read, each of which a cable can hold."""
+    """Tensions from load cell values; refuses tensions that a cable cannot have."""
     bias, gain, most = winches.load_cell_bias, winches.load_cell_gain, winches.load_cell_range
     if most is not None:
         _check_readings(
@@ -124,14 +124,14 @@ def _lengths(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> Arr
 
 
 def _cell_reading(robot: Robot, cable: int, tension: float) -> float:
-    """Reading of a load cell at a tension."""
+    """Measured value of a load cell at a given tension."""
     if robot.winches is None:
         return tension
     return float(tension * robot.winches.load_cell_gain[cable] + robot.winches.load_cell_bias[cable])
 
 
 def _lengths_and_reached(robot: Robot, pose: Pose, tension: Array, model: CableModel) -> tuple[Array, Flags]:
-    """Unstrained lengths off the drums, and which cables have these tensions with them."""
+    """Unstrained lengths off the drums, and True for each cable that has its given tension at this length."""
     m = robot.cable_count
     held, length = np.empty(m), np.empty(m)
     table, body = cable_table(robot)[0], body_table(robot)[0]
@@ -141,7 +141,7 @@ def _lengths_and_reached(robot: Robot, pose: Pose, tension: Array, model: CableM
 
 
 def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low: float) -> float | None:
-    """The least tension from `low` on that a cable can have at a pose; None where it holds none that it can have."""
+    """Smallest tension >= `low` that a cable can have at a pose; None if there is none."""
     high = LARGEST_STRAIN * float(robot.cables.axial_stiffness[cable])
 
     def can(tension: float) -> bool:
@@ -154,7 +154,7 @@ def _least_tension(robot: Robot, pose: Pose, model: CableModel, cable: int, low:
             break
         centered_positions = math.sqrt(low * high)
         low, high = (low, centered_positions) if can(centered_positions) else (centered_positions, high)
-    return high * (1.0 + PRECISION)  # so that the number in the message is enough, with five digits
+    return high * (1.0 + PRECISION)  # rounded up, so that the number in the message, with five digits, is large enough
 
 
 def _check_whole(winches: Winch, length: Array) -> None:

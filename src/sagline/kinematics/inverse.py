@@ -32,7 +32,7 @@ from sagline.statics.tables import pose_rows, refuse_missing_chords
 from sagline.tension.method import TensionMethod, Variable, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
-STANDING: Final = 1e-7  # of the fastest cable's rate: slower ones stand, rates are good to 1e-8
+STANDING: Final = 1e-7  # relative to the fastest cable's rate: slower cables are at rest; rates are accurate to 1e-8
 _CATENARY = Catenary()
 _CLOSEST = Closest()
 
@@ -48,35 +48,36 @@ def inverse(
     winding: Winding | None = None,
     progress: Progress | None = None,
 ) -> Plan:
-    """Tensions that balance the platform within their limits, and the unstrained lengths that produce them.
+    """Tensions that balance the platform within their limits, and the corresponding unstrained lengths.
 
     Args:
-        robot: The robot, with m cables and n degrees of freedom, m >= n. Or a sequence of N robots, one a pose, that
-            differ in anything but number of cables, motion pattern with its plane, kind of tension limits and gravity.
+        robot: The robot, with m cables and n degrees of freedom, m >= n. Or a sequence of N robots, one per pose, with
+            equal number of cables, motion pattern with plane, type of tension limits and gravity; all other data may
+            differ.
         motion: A path of N samples, whose inertia is included; or a pose or batch of N poses at rest.
         model: Cable model; the default is exact.
-        tension: Tension distribution method. `Closest` carries its reference along a
-            path only; in a batch of poses each stands alone.
-        wrench: External wrench on the platform about its center of mass in world axes, without gravity and
-            inertia: force [N], then moment [N m], shape (6,) or (N, 6). None for none.
-        previous: A plan that this one continues: `Closest` starts from its last feasible tensions. Or such tensions,
-            in the variable of the tension distribution [N], shape (m,).
-        winding: Direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0
-            standing, shape (m,) or (N, m); or "path", the way the lengths go along the path without friction. It
-            changes lengths behind the pulleys alone. None: nothing rubs.
-        progress: Called every few hundredths of a second: how many poses are solved, or known not to be feasible and
-            why, of how many.
+        tension: Tension distribution method. `Closest` keeps its reference only along a path; in a batch of poses, each
+            pose is solved independently.
+        wrench: External wrench on the platform about its center of mass in world axes, without gravity and inertia:
+            force [N], then moment [N m], shape (6,) or (N, 6). None for zero.
+        previous: A plan that this one continues: `Closest` starts from its last feasible tensions. Or such tensions, in
+            the tension variable [N], shape (m,).
+        winding: Direction of the drums, for the friction of pulleys and guides: +1 winding in, -1 paying out, 0 at
+            rest, shape (m,) or (N, m); or "path": the direction of the length changes along the path without friction.
+            It affects only wrapped and dead lengths. None: no friction.
+        progress: Called every few hundredths of a second: number of finished poses (solved, or infeasible with known
+            reason), total number.
 
     Returns:
-        Plan with fields of shape (m,) for a single pose, (N, m) otherwise. A pose without an answer is not
-        feasible there, says why, and holds NaN.
+        Plan with fields of shape (m,) for a single pose, (N, m) otherwise. At a pose without a solution, feasible is
+        False, the status gives the reason, and the values are NaN.
 
     Raises:
-        InvalidValueError: If a robot has fewer cables than degrees of freedom, the method cannot share among
-            its cables, several robots do not fit together (the message names which), winding is "path" for poses
-            without times, an argument is of the wrong kind or shape, a pose is outside the motions of the robot's
-            pattern, or so many poses need more memory than is free.
-        CableGeometryError: If a cable has no length at some pose: its ends coincide, or its platform end is inside its
+        InvalidValueError: If a robot has fewer cables than degrees of freedom, the tension distribution method does not
+            support its number of cables, several robots do not fit together (the message names the property), winding
+            is "path" for poses without times, an argument has the wrong type or shape, a pose is outside the motions of
+            the robot's pattern, or the poses need more memory than is free.
+        CableGeometryError: If a cable has no chord at some pose: its ends coincide, or its platform end is inside its
             pulley.
 
     Source:
@@ -138,7 +139,7 @@ def inverse(
 
 
 def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | None:
-    """Winding directions as given; None for none, or for those of the path."""
+    """Winding directions of the caller, checked; None if not given, or if they follow from the path."""
     if not isinstance(winding, str):
         return winding
     if choice(winding, "winding", ("path",)) and isinstance(motion, Path):
@@ -148,7 +149,7 @@ def _given_winding(winding: Winding | None, motion: Path | Pose) -> ArrayLike | 
 
 
 def _with_path_friction(plan: Plan) -> Plan:
-    """The plan with friction by the direction in which its lengths change."""
+    """The plan with friction according to the direction of its length changes."""
     if plan.state.contact is None or plan.length_rate is None:
         return plan
     rate = np.nan_to_num(plan.length_rate)
@@ -165,13 +166,13 @@ def _check_kinds(motion: object, model: object, tension: object) -> None:
 
 
 def _in_world(components: Array, robot: Robot) -> Array:
-    """Wrenches (N, 6) of components along the free motions (N, n); einsum is faster than a thin product."""
+    """Wrenches (N, 6) from components along the free motions (N, n); einsum is faster than a thin product."""
     wrench: Array = np.einsum("pi,ij->pj", components, robot.freedom)
     return wrench
 
 
 def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variable) -> Array:
-    """Tensions to start from, in the distribution's variable (m,): given, the last feasible of a plan, or NaN."""
+    """Initial reference tensions in the tension variable (m,): given, the last feasible ones of a plan, or NaN."""
     if previous is None:
         return np.full(robot.cable_count, np.nan)
     if not isinstance(previous, Plan):
@@ -185,7 +186,7 @@ def _reference(robot: Robot, previous: Plan | ArrayLike | None, variable: Variab
             "Continue a plan of this robot.",
         )
     tensions = shared_tension(previous.state, variable)
-    # tensions that the distribution method did not choose are no reference
+    # Tensions that the distribution method did not compute are not used as a reference.
     at_border = np.zeros_like(previous.feasible) if previous.at_border is None else previous.at_border
     feasible = np.flatnonzero(np.atleast_1d(previous.feasible & ~at_border))
     if not feasible.size:

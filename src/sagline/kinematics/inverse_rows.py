@@ -1,4 +1,4 @@
-"""Inverse kinematics in rows: robot, poses and wrenches as the kernels take them, and their answers back."""
+"""Inverse kinematics in rows: robot, poses and wrenches in the form for kernels, and their results."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from sagline.robot.batch import Robots, first_of, has_routing
 from sagline.statics.tables import robot_terms
 from sagline.tension.method import Options, TensionMethod, takes_default_kernel
 
-UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # poses left open by the iterations
-BLOCK = 1 << 12  # poses solved at once: a tenth of a second at most, after which an interrupt is heard
-DECIDED = 1 << 10  # and poses decided at once, which take longer
+UNDECIDED = (codes.POSE_INFEASIBLE, codes.POSE_NOT_CONVERGED)  # poses without a result from the iterations
+BLOCK = 1 << 12  # poses per block of the solution: at most a tenth of a second, after which an interrupt is handled
+DECIDED = 1 << 10  # poses per block of the feasibility decision, which takes longer
 
 
 class InverseRows(NamedTuple):
-    """Results of the kernel, in its order; arrays lead with the N poses except results (RESULT_ROWS, N, m)."""
+    """Results of the kernel, in its order; the first axis is the N poses except in results (RESULT_ROWS, N, m)."""
 
     results: Array
     cable_status: Codes
@@ -32,7 +32,7 @@ class InverseRows(NamedTuple):
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int, behind: bool) -> InverseRows:
-        """Arrays for a batch, to be filled; behind: whether there are pulleys or dead lengths."""
+        """Arrays for a batch, to be filled; behind: True with pulleys or dead lengths."""
         return cls(
             np.empty((tables.RESULT_ROWS if behind else tables.BARE_ROWS, count, cables)),
             np.empty((count, cables), dtype=np.int8),
@@ -42,7 +42,7 @@ class InverseRows(NamedTuple):
         )
 
     def reject_slack(self, verdicts: Verdicts, lengths: Array) -> bool:
-        """Mark solved poses as TOO_SLACK where lengths (N, m) between guides are NaN; whether there are any."""
+        """Mark solved poses as TOO_SLACK if lengths (N, m) between guides are NaN; return True if there are any."""
         slack = np.isnan(np.atleast_2d(lengths)) & np.isfinite(self.results[tables.LENGTH])
         lost = (self.pose_status == codes.POSE_SOLVED) & slack.any(axis=-1)
         if not lost.any():
@@ -56,7 +56,7 @@ class InverseRows(NamedTuple):
 
     @property
     def answers(self) -> Answers:
-        """As the kernel takes it: a plain tuple."""
+        """Plain tuple of the arrays, as the kernel requires."""
         return self.results, self.cable_status, self.residuals, self.needed, self.pose_status
 
 
@@ -71,9 +71,9 @@ def solve_inverse_rows(
 ) -> InverseRows:
     """Run the kernel over poses.
 
-    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: tensions that
-    `Closest` starts from, in its variable (m,), or NaN; the last feasible ones on return; progress: called after each
-    block how many poses are solved, without those left open, of how many.
+    rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); reference: initial tensions
+    of `Closest`, in its variable (m,), or NaN; changed to the last feasible ones; progress: called after each block
+    with the number of finished poses, without undecided ones, and the total number.
     """
     shared = first_of(robot)
     behind = has_routing(robot)
@@ -91,19 +91,19 @@ def solve_inverse_rows(
 
 
 class Verdicts(NamedTuple):
-    """Proofs of infeasible poses; arrays lead with the N poses."""
+    """Proofs of infeasible poses; the first axis of all arrays is the N poses."""
 
-    # proved and sufficient value of the smallest change of the force [N], (N, 2): 0 where a pose is solved, NaN
-    # where the load is not the reason that it is not
+    # Proved and sufficient value of the smallest change of the force [N], (N, 2): 0 at a solved pose, NaN if the load
+    # is not the cause of the failure.
     brackets: Array
-    reliefs: Array  # the force that suffices [N], along the free motions, (N, n), NaN where none is needed or known
+    reliefs: Array  # sufficient change of the force [N], along the free motions, (N, n), NaN if not needed or not known
     farkas: Array  # Farkas vectors along the free motions, (N, n)
     blocking: Flags  # cables whose limits oppose the needed wrench, (N, m)
-    at_border: Flags  # poses solved here, not by the tension distribution method, (N,)
+    at_border: Flags  # poses solved by this search, not by the tension distribution method, (N,)
 
     @classmethod
     def empty(cls, count: int, cables: int, freedoms: int) -> Verdicts:
-        """Arrays for a batch without verdicts: NaN, and no cables."""
+        """Arrays for a batch without verdicts: all NaN or False."""
         return cls(
             np.full((count, 2), np.nan),
             np.full((count, freedoms), np.nan),
@@ -114,18 +114,18 @@ class Verdicts(NamedTuple):
 
     @property
     def shortfall(self) -> Array:
-        """Smallest change of the force that is known to suffice [N], (N,); infinite only where that is proved."""
+        """Smallest change of the force known to be sufficient [N], (N,); infinite only if none is proved to exist."""
         proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
         return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
 
     @property
     def answers(self) -> tuple[Array, Array, Array, Flags]:
-        """As the kernel takes them: a plain tuple."""
+        """Plain tuple of the arrays, as the kernel requires."""
         return self.brackets, self.reliefs, self.farkas, self.blocking
 
 
 def covers_all(method: int, redundant: int) -> bool:
-    """True if a distribution method finds tensions wherever there are any; formulas without limits do not.
+    """True if a distribution method finds tensions whenever feasible ones exist; closed-form methods do not.
 
     redundant: number of cables beyond the degrees of freedom.
     """
@@ -135,10 +135,10 @@ def covers_all(method: int, redundant: int) -> bool:
 def decide_rows(
     robot: Robots, options: Options, rows: Array, loads: Array, found: InverseRows, progress: Progress | None = None
 ) -> Verdicts:
-    """Decide the poses that the iterations left open; fill the results of the feasible ones.
+    """Decide the feasibility of the poses without a result from the iterations; fill in the results of feasible poses.
 
     rows: pose rows (N, POSE_COLUMNS); loads: external plus inertial wrenches (1 or N, 6); progress: called after each
-    block how many poses are done, the feasible ones among them, of how many.
+    block with the number of finished poses, including feasible ones, and the total number.
     """
     count, n = found.needed.shape
     m = found.cable_status.shape[1]

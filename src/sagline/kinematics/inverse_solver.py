@@ -30,16 +30,16 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import TensionMethod, kernel_options, takes_default_kernel
 from sagline.tension.methods import Closest
 
-_STATUSES = tuple(sorted(PoseStatus))  # by code; a lookup costs a tenth of a conversion
-# takes exactly so many real numbers, quicker than an array takes a tuple
+_STATUSES = tuple(sorted(PoseStatus))  # indexed by code; a lookup takes a tenth of the time of a conversion
+# Accepts exactly this number of real numbers, faster than an array assignment from a tuple.
 _POSE = struct.Struct(f"{tables.POSE_COLUMNS}d").pack_into
-QUATERNION_TOLERANCE = 1e-6  # of the length: as `Pose.from_quaternion`
+QUATERNION_TOLERANCE = 1e-6  # relative deviation of the length, as in `Pose.from_quaternion`
 _PLAIN = (tuple, list)
-ROUNDING = 1e-15  # of the length: what needs no normalizing
+ROUNDING = 1e-15  # relative deviation of the length below which no normalization is needed
 
 
 class InverseStep(NamedTuple):
-    """Answer for one pose; NaN where the status is not SOLVED.
+    """Result for one pose; NaN if the status is not SOLVED.
 
     Attributes:
         unstrained_length: L [m], shape (m,).
@@ -59,10 +59,10 @@ class InverseStep(NamedTuple):
 
 
 class InverseSolver:
-    """Solves one pose after another without setting anything up again.
+    """Solver for successive poses without repeated setup.
 
-    It owns its working memory and, for `Closest`, the last feasible tensions: `reset` forgets them. One solver
-    serves one control loop; it is not to be shared between threads.
+    The solver owns its work arrays and, for `Closest`, stores the last feasible tensions; `reset` clears them. Use one
+    solver per control loop; do not share it between threads.
 
     Examples:
         >>> import sagline as sl
@@ -78,11 +78,11 @@ class InverseSolver:
         Args:
             robot: The robot, with at least as many cables as degrees of freedom.
             model: Cable model; the default is the exact one.
-            tension: Tension distribution method; the default is `Closest`, to the step before.
+            tension: Tension distribution method; the default is `Closest`, relative to the previous step.
 
         Raises:
-            InvalidValueError: If the robot has too few cables, its winches have guides, the method cannot share among
-                them, or an argument is of the wrong kind.
+            InvalidValueError: If the robot has too few cables, its winches have guides, the method does not support its
+                number of cables, or an argument has the wrong type.
         """
         without_guides(instance(robot, Robot, "robot"), "InverseSolver", "inverse")
         m, n = robot.cable_count, robot.degrees_of_freedom
@@ -98,10 +98,11 @@ class InverseSolver:
         self._load = self._wrench[0].data
         self._reference = np.full(m, np.nan)
         self._found = InverseRows.empty(1, m, n, has_routing(robot))
-        self._status = self._found.pose_status.data  # read five times faster than an array of one
-        self._loaded = False  # whether the wrench of the last step was more than zero
+        self._status = self._found.pose_status.data  # read five times faster than an array of one element
+        self._loaded = False  # True if the wrench of the last step was not zero
         self._lengths = self._found.results[tables.LENGTH, 0]
-        # the views are read-only: kernels are compiled for read-only inputs, and writing goes through the owner
+        # The views are read-only: kernels are compiled for read-only inputs. Values are written through the owner of
+        # the memory.
         self._rows = locked(self._pose.view())
         model_terms, sharing_terms, limit_terms = self._options
         given = (robot_terms(robot), self._rows, locked(self._wrench.view()))
@@ -117,19 +118,20 @@ class InverseSolver:
         self.reset()
 
     def reset(self) -> None:
-        """Forget the last tensions: the next step starts from the minimum norm."""
+        """Clear the last tensions: the next step starts from the minimum norm."""
         self._reference.fill(np.nan)
 
     def step(self, position: ArrayLike, quaternion: ArrayLike, wrench: ArrayLike | None = None) -> InverseStep:
         """Solve one pose.
 
         Args:
-            position: Of the platform origin [m], shape (3,).
+            position: Position of the platform origin [m], shape (3,).
             quaternion: Rotation platform -> world, unit, scalar last, shape (4,).
-            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+            wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for
+                zero.
 
         Returns:
-            A fresh result whose arrays belong to the caller.
+            A new result whose arrays belong to the caller.
 
         Raises:
             InvalidValueError: If an argument is not finite or of the wrong shape, or the quaternion is not of length 1
@@ -152,20 +154,20 @@ class InverseSolver:
     def step_into(
         self, position: ArrayLike, quaternion: ArrayLike, out: Array, wrench: ArrayLike | None = None
     ) -> PoseStatus:
-        """Solve one pose into the caller's memory: no allocation, and no error where a number is wrong but a status.
+        """Solve one pose and write the result to the caller's array; no allocation; the status reports wrong numbers.
 
         Args:
-            position: Of the platform origin [m], shape (3,).
-            quaternion: Rotation platform -> world, scalar last, of length 1 to 1e-6 (what is left is normalized away),
-                shape (4,).
+            position: Position of the platform origin [m], shape (3,).
+            quaternion: Rotation platform -> world, scalar last, of length 1 within 1e-6 (then normalized), shape (4,).
             out: Filled with the unstrained lengths [m], shape (m,); NaN without a solution.
-            wrench: External plus inertial, about the center of mass, world axes [N, N m], shape (6,); None for none.
+            wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for
+                zero.
 
         Returns:
-            The status of the pose; NO_POSE where a number is not finite, or the quaternion is of another length.
+            The status of the pose; NO_POSE if a number is not finite, or the length of the quaternion is not 1.
 
         Raises:
-            InvalidValueError: If an argument is no such array of numbers.
+            InvalidValueError: If an argument is not an array of the required type and shape.
         """
         place: Any = position
         turn: Any = quaternion
@@ -179,7 +181,8 @@ class InverseSolver:
             else:
                 raise TypeError
         except (struct.error, TypeError, ValueError, NotImplementedError, OverflowError):
-            copy_in(self._position, place, "position", "m")  # integers and the like, or an error with a reason
+            # converts integers and similar, or raises an error with the reason
+            copy_in(self._position, place, "position", "m")
             copy_in(self._quaternion, turn, "quaternion", "")
         if wrench is not None:
             self._loaded = True
@@ -211,14 +214,14 @@ class InverseSolver:
         return status
 
     def _normalized(self, length: float) -> bool:
-        """Normalize the quaternion in place, where its length is near enough to 1 to be meant."""
-        if not abs(length - 1.0) <= QUATERNION_TOLERANCE:  # NaN is not near
+        """Normalize the quaternion in place if its length is close enough to 1."""
+        if not abs(length - 1.0) <= QUATERNION_TOLERANCE:  # also true for NaN
             return False
         self._pose[0, 3:] /= length
         return True
 
     def _no_pose(self) -> InvalidValueError:
-        """The error of what is no pose."""
+        """The error for arguments that are not a pose."""
         exactly(self._pose[0, :3], "position", "m", (3,))
         length = float(np.linalg.norm(exactly(self._pose[0, 3:], "quaternion", "", (4,))))
         step = "Normalize it; scalar last: (x, y, z, w)."

@@ -1,4 +1,4 @@
-"""Pose from lengths and load cells together: both are noisy, each corrects the other."""
+"""Pose from lengths and load cells together: a least-squares fit of both noisy measurements."""
 
 from __future__ import annotations
 
@@ -20,20 +20,21 @@ from sagline.statics.stiffness import stiffness
 
 _STEPS = 100
 _HALVINGS = 20
-_TOLERANCE = 1e-8  # of the sum of squares: a step that promises less is within 1e-4 standard deviations of the best
+# relative to the sum of squares: a smaller predicted gain means less than 1e-4 standard deviations to the optimum
+_TOLERANCE = 1e-8
 
 
 @frozen(eq=False, weakref_slot=False)
 class MeasuredTension(Result):
-    """Load cells at the frame ends of the cables, and the accuracy of them and of the lengths.
+    """Load cells at the frame ends of the cables, with standard deviations of tensions and lengths.
 
     Attributes:
-        frame_end_tension: Readings [N], shape (m,) or (N, m); NaN for a cable without a cell.
-        tension_deviation: Standard deviation of a reading [N], > 0, a number or shape (m,).
+        frame_end_tension: Measured tensions [N], shape (m,) or (N, m); NaN for a cable without a load cell.
+        tension_deviation: Standard deviation of a measured tension [N], > 0, a number or shape (m,).
         length_deviation: Standard deviation of an unstrained length [m], > 0, a number or shape (m,).
 
     Raises:
-        InvalidValueError: If a reading is negative or infinite, or a deviation is not positive.
+        InvalidValueError: If a measured tension is negative or infinite, or a deviation is not positive.
     """
 
     frame_end_tension: Array = field(converter=given, metadata=rule("N", low=0.0, missing=True))
@@ -41,7 +42,7 @@ class MeasuredTension(Result):
     length_deviation: Array = field(converter=given, metadata=rule("m", above=0.0))
 
     def __attrs_post_init__(self) -> None:
-        """Check the three."""
+        """Check the three fields."""
         for about in fields(MeasuredTension):
             object.__setattr__(self, about.name, checked(getattr(self, about.name), about.name, **about.metadata))
 
@@ -51,14 +52,14 @@ class MeasuredTension(Result):
 def fit_measurements(
     robot: Robots, model: CableModel, found: ForwardRows, loads: Array, measured: MeasuredTension
 ) -> Array:
-    """Replace equilibria at measured lengths by those that fit lengths and tensions best; their poses' covariance.
+    """Replace equilibria at measured lengths by the best fits to lengths and tensions; return covariances of the poses.
 
-    Every sample by itself: Gauss-Newton in the lengths, L_true, that minimize
-    sum ((L_true - L)/sigma_L)^2 + sum ((T_A - reading)/sigma_T)^2 while the platform stays in equilibrium.
+    For each sample, Gauss-Newton iterations find the lengths L_true that minimize sum ((L_true - L)/sigma_L)^2 + sum
+    ((T_A - reading)/sigma_T)^2 with the platform in equilibrium.
 
-    found: equilibria at the measured lengths (N samples), where the search begins; changed in place; loads: external
+    found: equilibria at the measured lengths (N samples), the starts of the search; changed in place; loads: external
     plus inertial wrenches (1 or N, 6). Returns covariance of displacement of the center of mass and rotation vector,
-    (N, 6, 6); NaN without an answer.
+    (N, 6, 6); NaN without a solution.
     """
     if model.code == codes.STRAIGHT:
         raise InvalidValueError("model", "Straight()", "a model with forces", "Use Catenary() with measured tensions.")
@@ -90,7 +91,7 @@ def _fitting(name: str, value: Array, shape: tuple[int, ...]) -> Array:
 
 
 class _Fit(NamedTuple):
-    """One sample to fit."""
+    """Fit of one sample."""
 
     robot: Robot
     model: CableModel
@@ -101,7 +102,7 @@ class _Fit(NamedTuple):
     length_deviation: Array
 
     def best(self, found: ForwardRows) -> tuple[ForwardRows, Array]:
-        """The best fit and the covariance of its pose, from the equilibrium at the measured lengths."""
+        """The best fit and the covariance of its pose; starts at the equilibrium at the measured lengths."""
         known = ~np.isnan(self.readings)
         covariance = np.full((6, 6), np.nan)
         for _ in range(_STEPS):
@@ -123,14 +124,14 @@ class _Fit(NamedTuple):
         return found, covariance
 
     def misfit(self, found: ForwardRows) -> Array:
-        """Lengths and tensions less their readings, in standard deviations."""
+        """Lengths and tensions minus their measured values, in standard deviations."""
         state = found.solution(self.robot, self.model, self.load, ()).state
         tensions = (state.cables.frame_end_tension - self.readings) / self.tension_deviation
         lengths = (state.unstrained_length - self.lengths) / self.length_deviation
         return np.concatenate((lengths, tensions[~np.isnan(tensions)]))
 
     def moved(self, found: ForwardRows, step: Array) -> ForwardRows | None:
-        """The equilibrium after a step, halved until the fit is better; None if no part of it helps."""
+        """The equilibrium after a step, which is halved until the fit improves; None if it never improves."""
         lengths = found.results[tables.LENGTH]
         now = self.misfit(found)
         for _ in range(_HALVINGS):

@@ -1,4 +1,4 @@
-"""The plan: for a motion of the platform, the tensions to hold and the lengths to wind."""
+"""The plan: cable tensions and unstrained lengths for a motion of the platform."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from sagline.tension.method import TensionMethod
 
 
 class Gap(NamedTuple):
-    """A run of consecutive poses without an answer.
+    """A run of consecutive poses without a solution.
 
     Attributes:
         first: Index of its first pose.
         last: Index of its last pose.
-        status: Why its first pose has no solution.
-        shortfall: Largest finite shortfall in it [N]; infinite where no change of the force alone would do at any of
-            its poses, NaN where it has none.
-        cables: Indices of the cables whose limits oppose the wrench at some pose of it.
-        hopeless: At how many of its poses no change of the force alone would do.
+        status: Reason for the missing solution at its first pose.
+        shortfall: Largest finite shortfall in the gap [N]; infinite if all shortfalls are infinite, NaN if there are
+            none.
+        cables: Indices of the cables whose limits oppose the wrench at any pose of the gap.
+        hopeless: Number of its poses that no change of the force alone makes feasible.
     """
 
     first: int
@@ -47,33 +47,33 @@ class Plan(Result, Saved):
 
     Attributes:
         state: Robot, poses, wrench and cables; NaN forces and lengths where a pose has no solution.
-        path: The path that was followed, or None for poses alone.
+        path: The path of the plan, or None for poses alone.
         tension: Tension distribution method.
         status: Codes of `PoseStatus`, shape () or (N,).
-        shortfall: Smallest change of the force on the platform that would make the pose feasible [N], shape () or
-            (N,), reached by tensions within their limits: 0 where it is feasible, infinite where it is proved that no
-            force alone would do, NaN where that is not the reason or none was found.
+        shortfall: Smallest change of the force on the platform that makes the pose feasible [N], shape () or (N,), with
+            tensions within their limits: 0 if it is feasible, infinite if it is proved that no force alone is
+            sufficient, NaN if the force is not the cause or no value was found.
         wrench_residual: Norms of the unbalanced force [N] and moment [N m] in the platform's free motions,
             shape (2,) or (N, 2).
-        blocking: Cables at a limit that opposes the needed wrench: a wider limit reduces the shortfall, shape
+        blocking: True for cables at a limit that opposes the needed wrench: a wider limit reduces the shortfall, shape
             (m,) or (N, m).
-        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere: with y = farkas, what the cables
-            give along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)) with J the structure matrix and G_i what a
-            pull takes away, stays below y . (needed - the pulls in it) for all chord tensions within their limits, on
-            the cables' exact curves. Tensions of less than a tenth of a cable's weight do not count, nor, where there
-            is no upper limit, those that stretch it to more than twice its length. Its force part has length 1, so
-            that the gap is in newtons. NaN also where one
-            direction alone proves nothing and ranges of tensions were narrowed or split. None for a plan from a file
-            that was written before files kept it.
-        needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and
-            the cables' sag forces T_z - tau sin phi; without a solution, at the tensions that leave least of it.
-            None as above.
-        bracket: Proved and sufficient value of the shortfall [N], shape (2,) or (N, 2); infinite where nothing
-            was found that does. None as above.
-        relief: The force of that size [N], in world axes: added to the wrench it makes the pose feasible, shape (3,) or
-            (N, 3); NaN where none is needed or known. None as above.
-        at_border: Poses so near the border of feasibility that the iterations found no tensions: these were searched
-            on the cables' exact curves, without the tension distribution method, shape () or (N,). None as above.
+        farkas: Proof of each infeasible pose, shape (6,) or (N, 6), NaN elsewhere. With y = farkas, the component of
+            the cable wrench along y, the sum of y . (J_i tau_i - G_i pull_i(tau_i)), is less than y . (needed - the sag
+            forces in it) for all chord tensions within their limits, on the exact catenaries; J is the structure
+            matrix, pull_i the sag force and G_i its wrench matrix. Tensions below a tenth of a cable's weight are
+            excluded and, without an upper limit, tensions that stretch the cable to more than twice its length. The
+            force part of y has length 1, so the difference is in newtons. NaN also if a single direction proves nothing
+            and tension ranges were narrowed or split. None for a plan from an old file without this field.
+        needed: The wrench J tau that the chord tensions must supply, shape (6,) or (N, 6): weight, given wrench and the
+            cables' sag forces T_z - tau sin phi; without a solution, at the tensions that minimize the remaining
+            wrench. None for a plan from an old file.
+        bracket: Proved and sufficient value of the shortfall [N], shape (2,) or (N, 2); infinite if no sufficient value
+            was found. None for a plan from an old file.
+        relief: The force change of this size [N], in world axes: added to the wrench, it makes the pose feasible, shape
+            (3,) or (N, 3); NaN if not needed or not known. None for a plan from an old file.
+        at_border: True for poses so close to the border of feasibility that the iterations found no tensions; their
+            tensions were found on the exact catenaries, without the tension distribution method, shape () or (N,). None
+            for a plan from an old file.
     """
 
     state: Equilibrium
@@ -91,12 +91,12 @@ class Plan(Result, Saved):
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """True if each pose has an answer, shape () or (N,)."""
+        """True if each pose has a solution, shape () or (N,)."""
         return np.asarray(self.status == PoseStatus.SOLVED)
 
     @property
     def unstrained_length(self) -> Array:
-        """L: lengths to wind [m]: all cable off the drum, with wrapped and dead lengths."""
+        """L: unstrained lengths off the drums [m], including wrapped and dead lengths."""
         return self.state.unstrained_length
 
     @property
@@ -126,33 +126,33 @@ class Plan(Result, Saved):
 
     @property
     def wrap_angle(self) -> Array | None:
-        """Psi, over which the cables lie on their pulleys [rad]; None where there are none."""
+        """Wrap angle Psi of the cables on their pulleys [rad]; None without pulleys and dead lengths."""
         return None if self.state.contact is None else self.state.contact.wrap_angle
 
     @property
     def length_rate(self) -> Array | None:
-        """dL/dt: how fast to wind [m/s], shape (N, m), along the path; None for poses without a path.
+        """Length rate dL/dt [m/s], shape (N, m), along the path; None for poses without a path.
 
-        The rate at which `unstrained_length` changes as the platform moves and the tensions change; NaN where
-        the plan has no solution. Computed at each call. See docs/model.md, section 7.
+        The rate of `unstrained_length` due to platform motion and tension changes; NaN where the plan has no solution.
+        Computed at each call. See docs/model.md, section 7.
         """
         return None if self.path is None else length_rate(self.state, self.path, self.tension, self.feasible)
 
     @property
     def gaps(self) -> tuple[Gap, ...]:
-        """The runs of consecutive poses without an answer, in order; a single pose counts as a batch of one."""
+        """The runs of consecutive poses without a solution, in order; a single pose counts as a batch of one."""
         lost = ~np.atleast_1d(self.feasible)
         edges = np.flatnonzero(np.diff(np.concatenate(([False], lost, [False])).astype(np.int8)))
         return tuple(self._gap(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2))
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings: poses out of the robot's plane, at the border of feasibility, out of a model's validity."""
+        """Warnings: poses out of the robot's plane, at the border of feasibility, or outside a model's validity."""
         return (*self._turned_away(), *self._out_of_plane(), *self._at_the_border(), *self._below_validity())
 
     def _turned_away(self) -> tuple[str, ...]:
         robot = first_of(self.state.robot)
-        turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]  # all poses have the same, or `inverse` refuses them
+        turn = forbidden_turn(robot, self.state.pose, LEVEL)[:1]  # equal at all poses, otherwise `inverse` refuses them
         if not np.linalg.norm(turn) > ROUNDING:
             return ()
         return (

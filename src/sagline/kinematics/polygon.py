@@ -24,7 +24,7 @@ from sagline.tension.method import Options, Variable, check_sharing, kernel_opti
 from sagline.tension.methods import Centroid, MinimumNorm
 from sagline.tension.polygon import Side, TensionPolygon
 
-MERGED = 1e-10  # of the largest tension: corners closer than this are one
+MERGED = 1e-10  # relative to the largest tension: corners with a smaller distance are merged
 
 _CATENARY = Catenary()
 
@@ -42,15 +42,15 @@ def tension_polygon(
         robot: The robot, with at most two redundant cables.
         pose: One pose.
         model: Cable model.
-        wrench: External and inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for none.
-        variable: The tension the polygon is drawn in: "chord", "horizontal" (the article's) or "frame_end".
+        wrench: External plus inertial wrench about the center of mass, world axes [N, N m], shape (6,); None for zero.
+        variable: The tension variable of the polygon: "chord", "horizontal" (the article's) or "frame_end".
 
     Returns:
-        The polygon, with no vertices where the pose is not feasible.
+        The polygon, without vertices if the pose is not feasible.
 
     Raises:
-        InvalidValueError: If there is not one pose, the structure matrix has lost rank, a cable is too slack, or
-            the robot has too few or too many cables.
+        InvalidValueError: If pose is not a single pose, the structure matrix is rank-deficient, a cable is too slack,
+            or the robot has too few or too many cables.
 
     Source:
         Gia Luan & Truong Thinh 2020, (53)-(55); Gouttefarde et al. 2015; docs/model.md, section 5.
@@ -77,7 +77,7 @@ def tension_polygon(
 def polygon_at(
     robot: Robot, pose: Pose, options: Options, wrench: Array, tension: Array, pulls: Array, feasible: bool
 ) -> TensionPolygon:
-    """The polygon around chord tensions [N] that balance the platform, (m,), given the cables' pulls [N], (m,)."""
+    """The polygon around chord tensions [N] that balance the platform, (m,), at given sag forces [N], (m,)."""
     m, r = robot.cable_count, robot.cable_count - robot.degrees_of_freedom
     scale, offset = np.empty(m), np.empty(m)
     limits = np.empty((bounds.STRIP_ROWS, m))
@@ -108,14 +108,14 @@ def polygon_at(
 
 
 def _pulls(plan: Plan) -> Array:
-    """T_z - tau sin phi of the cables [N], as kernels take it."""
+    """Sag forces T_z - tau sin phi of the cables [N], in the form for kernels."""
     return plan.state.pull
 
 
 def _sides_of(
     count: int, null: Array, limits: Array, corners: Array, labels: Indices
 ) -> tuple[Array, tuple[Side | None, ...]]:
-    """Vertices (h, r) and what the sides are."""
+    """Vertices (h, r) and the limits of the sides."""
     r, m = null.shape
     origin, low, high = limits[bounds.START], limits[bounds.LOW], limits[bounds.HIGH]
     if r == 0 or count == 0:
@@ -134,7 +134,7 @@ def _sides_of(
 
 
 def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) -> Side | None:
-    """The limit that ends an interval there."""
+    """The limit at an end of an interval."""
     if not np.isfinite(end):
         return None
     there = origin + row * end
@@ -144,7 +144,7 @@ def _limit_at(end: float, row: Array, origin: Array, low: Array, high: Array) ->
 
 
 def _tensions(vertices: Array, null: Array, origin: Array) -> Array:
-    """Tensions at the vertices; a cable that the null space does not move keeps its tension at an infinite end."""
+    """Tensions at the vertices; at infinite vertices, cables unaffected by the null space keep their tensions."""
     with np.errstate(invalid="ignore"):
         steps = vertices[:, :, None] * null
     moved = np.where(null == 0.0, 0.0, steps)

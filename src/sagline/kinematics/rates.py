@@ -1,4 +1,4 @@
-"""Rates of a plan's lengths and tensions, by its motion an instant before and after each sample."""
+"""Rates of lengths and tensions of a plan, from its motion shortly before and after each sample."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod, kernel_options, shared_tension
 from sagline.tension.methods import Closest
 
-SHARE = 1e-5  # of the time in which the motion changes: differences over it are good to 1e-9
-LONGEST = 1e-2  # of the time between samples
-_CONSTANT = 1e-9  # of the largest part of a wrench: what differs by less does not change
+SHARE = 1e-5  # relative to the time scale of the motion: finite differences are then accurate to 1e-9
+LONGEST = 1e-2  # relative to the time between samples
+_CONSTANT = 1e-9  # relative to the largest component of a wrench: a smaller difference counts as constant
 
 
 class _Instant(NamedTuple):
-    """Poses, a batch of N, and external plus inertial wrenches (N, 6), at one moment near every sample."""
+    """Poses, a batch of N, and external plus inertial wrenches (N, 6), at one instant close to every sample."""
 
     pose: Pose
     wrench: Array
 
     def part(self, samples: Indices) -> _Instant:
-        """Those near some of the samples, (k,)."""
+        """Poses and wrenches of some of the samples, (k,)."""
         return _Instant(self.pose[samples], self.wrench[samples])
 
 
 class _Instants(NamedTuple):
-    """Moments one step [s] before, one step after and two steps after every sample."""
+    """Instants one step [s] before, one step after and two steps after every sample."""
 
     before: _Instant
     after: _Instant
@@ -48,10 +48,10 @@ class _Instants(NamedTuple):
 
 
 def _instants(robot: Robots, path: Path, wrench: Array) -> _Instants:
-    """Poses and wrenches a step before and after each sample of a path, the step chosen by its speed.
+    """Poses and wrenches one step before and after each sample of a path; the step depends on its speed.
 
-    path: the path; without a jerk, that is taken from a spline through its accelerations; wrench: external plus
-    inertial wrench at the samples (N, 6); the external part is interpolated by a spline.
+    path: the path; if it has no jerk, a spline through its accelerations gives it; wrench: external plus inertial
+    wrench at the samples (N, 6); the external part is interpolated by a spline.
     """
     jerk = path.jerk if path.jerk is not None else _rate(path.time, path.twist_rate)
     external = wrench - inertial_wrench(robot, path.pose, path.twist, path.twist_rate)
@@ -73,7 +73,7 @@ def _rate(time: Array, values: Array) -> Array:
 
 
 def _step(path: Path, jerk: Array) -> float:
-    """Step [s]: a small share of the time of a change by a meter or a radian, and of that between samples."""
+    """Step [s]: a small share of the time for a change by 1 m or 1 rad, and of the time between samples."""
     rates = (path.twist, path.twist_rate, jerk)
     quickest = max(float(np.abs(rate).max()) ** (1.0 / order) for order, rate in enumerate(rates, start=1))
     between = float(np.diff(path.time).min()) if len(path) > 1 else 1.0
@@ -81,8 +81,8 @@ def _step(path: Path, jerk: Array) -> float:
 
 
 def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
-    """The poses a time h later, to third order in position and second in orientation, whose third is even in h."""
-    from scipy.spatial.transform import Rotation  # takes a third of the time that sagline takes to load
+    """The poses after a time h: third order in position, second in orientation, whose third-order term is even in h."""
+    from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
     move = h * (path.twist + 0.5 * h * (path.twist_rate + h / 3.0 * jerk))
     turned = path.pose.quaternion
@@ -91,19 +91,19 @@ def _poses_later(path: Path, jerk: Array, h: float) -> Pose:
     return Pose.from_quaternion(path.pose.position + move[:, :3], turned)
 
 
-TENSION_STEP = 1e-5  # of a tension, for slopes at a fixed place
-LEAST_STEP = 1e-6  # N, where there is no tension
-AT_LIMIT = 1e-8  # of a tension: as near to its limit it is at it
-OUTWARD = 1e-9  # of the largest rate: a slower one does not leave a limit
+TENSION_STEP = 1e-5  # relative step of a tension, for derivatives at a fixed pose
+LEAST_STEP = 1e-6  # N, smallest step, used at zero tension
+AT_LIMIT = 1e-8  # relative to the tension: a smaller distance to a limit counts as at the limit
+OUTWARD = 1e-9  # relative to the largest rate: a slower approach does not cross a limit
 
 
 class _PlacedCables(NamedTuple):
-    """Cables of given chord tensions at given poses, and the matrices of their forces."""
+    """Cables at given chord tensions and poses, and the matrices of their forces."""
 
     cables: CableState  # their state, fields of shape (N, m)
     pull: Array  # T_z - tau sin phi [N], shape (N, m)
     structure: Array  # structure matrix J, shape (N, n, m)
-    hanging: Array  # the same for forces straight up, shape (N, n, m)
+    hanging: Array  # structure matrix for vertical forces at the platform ends, shape (N, n, m)
 
 
 def _cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> _PlacedCables:
@@ -126,11 +126,11 @@ def _cables_at(state: Equilibrium, pose: Pose, chord_tension: Array) -> _PlacedC
 def _held_limit_rates(
     state: Equilibrium, method: TensionMethod, before: _Instant, after: _Instant, step: float
 ) -> Array:
-    """Rates of the chord tensions of `Closest` as the platform moves on.
+    """Rates of the chord tensions of `Closest` along the path.
 
-    Each set of tensions is the one nearest to the set before: in the limit, of all rates that keep the balance and do
-    not leave the limits, the smallest in the distribution's variable. Where cables are at limits that the smallest
-    rates would leave, they are held there, the worst first.
+    Each tension set is the one nearest to the previous set. In the limit, the rates are the smallest, in the tension
+    variable, that keep the balance and cross no limit. Cables that would cross a limit at these rates are held at it,
+    starting with the largest violation.
 
     step: the step [s]. Returns d(tau)/dt [N/s], shape (N, m).
     """
@@ -146,7 +146,7 @@ def _held_limit_rates(
     )
 
     def slopes(values: Callable[[_PlacedCables], Array]) -> tuple[Array, Array]:
-        """d/d(tau) at a held place, and d/dt at held tensions."""
+        """d/d(tau) at a fixed pose, and d/dt at fixed tensions."""
         by_tau, drift = ((values(last) - values(first)) / by for first, last, by in (by_tension, by_time))
         return by_tau, drift
 
@@ -169,12 +169,12 @@ def _held_limit_rates(
 class _RateConditions(NamedTuple):
     """Conditions on the rates x of the chord tensions."""
 
-    structure: Array  # J, whose rows the rates of the distribution's variable are made of, shape (N, n, m)
-    matrix: Array  # the balance is kept where matrix x = right, shape (N, n, m)
+    structure: Array  # structure matrix J, whose rows combine to the rates of the tension variable, shape (N, n, m)
+    matrix: Array  # balance condition: matrix x = right, shape (N, n, m)
     right: Array  # shape (N, n)
-    scale: Array  # the distribution's variable changes by scale x + drift, which is to be small, shape (N, m)
+    scale: Array  # the rate of the tension variable, scale x + drift, is minimized; shape (N, m)
     drift: Array  # shape (N, m)
-    gap_slope: Array  # the distance to the nearest limit changes by gap_slope x + gap_drift, shape (N, m)
+    gap_slope: Array  # the distance to the nearest limit has the rate gap_slope x + gap_drift, shape (N, m)
     gap_drift: Array  # shape (N, m)
 
     def solved(self, held: Flags) -> Array:
@@ -191,13 +191,13 @@ class _RateConditions(NamedTuple):
         right[:, m:] = self.right
         try:
             found: Array = np.linalg.solve(system, right[..., None])[:, :m, 0]
-        except np.linalg.LinAlgError:  # somewhere the balance itself determines a cable that is held
+        except np.linalg.LinAlgError:  # at some sample the balance itself determines the tension of a held cable
             found = (np.linalg.pinv(system) @ right[..., None])[:, :m, 0]
         return found
 
 
 def _smallest_rates(conditions: _RateConditions, at_limit: Flags) -> Array:
-    """The smallest rates that leave no limit; cables are held one by one, the one that would leave fastest first."""
+    """Smallest rates that cross no limit; cables are held one by one, starting with the largest outward rate."""
     _, n, m = conditions.matrix.shape
     held = np.zeros_like(at_limit)
     rates = conditions.solved(held)
@@ -230,19 +230,19 @@ def _supplied_wrench(cables: _PlacedCables, tension: Array) -> Array:
 def _nearest_limits(
     here: _PlacedCables, state: Equilibrium, method: TensionMethod
 ) -> tuple[Array, Callable[[_PlacedCables], Array]]:
-    """Distance of each cable from its nearest limit (N, m), and that distance as a function of other cables."""
+    """Distance of each cable from its nearest limit (N, m), and this distance as a function for other tensions."""
     limits = limits_of(state.robot)
 
     def gaps(at: _PlacedCables) -> Array:
-        """Distances to all limits (N, m, 2 or 3), positive within."""
+        """Distances to all limits (N, m, 2 or 3), positive within the limits."""
         cables = at.cables
         limited = limited_tension(state.robot, cables)
         found = [limited - limits.low, limits.high - limited]
         if method.lowest_point_margin is not None:
-            with np.errstate(divide="ignore", invalid="ignore"):  # a level cable has no such bound
+            with np.errstate(divide="ignore", invalid="ignore"):  # a horizontal cable has no such bound
                 weight = 0.5 * cables.cable.linear_density * cables.gravity * cables.chord
                 bound = weight * cables.chord / np.abs(cables.rise)
-                if method.lowest_point_margin > 0.0:  # on a vertical cable a bound of zero is zero
+                if method.lowest_point_margin > 0.0:  # on a vertical cable, a bound of zero remains zero
                     bound += method.lowest_point_margin * cables.chord / cables.span
             found.append(np.where(cables.rise == 0.0, np.inf, cables.chord_tension - bound))
         return np.stack(found, axis=-1)
@@ -256,17 +256,18 @@ def _nearest_limits(
 
 
 def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible: Flags) -> Array:
-    """Rate of the unstrained lengths while the platform follows the path with the planned tension distribution.
+    """Rate of the unstrained lengths along the path with the planned tension distribution.
 
     Geometry and tensions both change: L(t) = L(pose(t), tau(t)). A method that depends on the pose alone is solved
-    again an instant before and after each sample, where the path's twist, its rate and its jerk lead; `Closest` follows
-    the tensions it has, so that its tensions' rates are solved for: of all that keep the balance, the smallest, with
-    cables held at the limits that they would cross. Over pulleys the path is followed for two more steps instead.
+    again shortly before and after each sample, at poses extrapolated by the path's twist, twist rate and jerk.
+    `Closest` depends on its previous tensions, so the rates of its tensions are computed instead: the smallest rates
+    that keep the balance, with cables held at the limits that they would cross. With pulleys, `Closest` is solved again
+    for two steps after each sample instead.
 
-    state: robot, poses, wrench and cables along the path; path: the path; where it knows no jerk, a spline through its
-    accelerations gives it; feasible: which samples have an answer, shape (N,). Returns dL/dt [m/s], shape (N, m): good
-    to 1e-8 of its largest value; NaN where the plan has no solution. Where the rate jumps, as where a cable reaches a
-    limit, it is one of the two sides'.
+    state: robot, poses, wrench and cables along the path; path: the path; if it has no jerk, a spline through its
+    accelerations gives it; feasible: True for samples with a solution, shape (N,). Returns dL/dt [m/s], shape (N, m),
+    accurate to 1e-8 of its largest value; NaN where the plan has no solution. At a discontinuity of the rate, for
+    example where a cable reaches a limit, the value is that of one of the two sides.
 
     Source:
         docs/model.md, section 7.
@@ -284,7 +285,7 @@ def length_rate(state: Equilibrium, path: Path, tension: TensionMethod, feasible
 
 
 def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: _Instants) -> Array:
-    """Rates from poses solved again an instant before and after; to one side, where the path leaves the feasible."""
+    """Rates from poses solved again shortly before and after; one-sided at the border of feasibility."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     none = np.full(first_of(state.robot).cable_count, np.nan)
     before, after = (
@@ -302,7 +303,7 @@ def _resolved_rates(state: Equilibrium, tension: TensionMethod, near: _Instants)
 
 
 def _one_sided_rates(state: Equilibrium, tension: TensionMethod, near: _Instants) -> Array:
-    """Rates of `Closest` over pulleys, from two steps on: backward it would leave the limits that hold it."""
+    """Rates of `Closest` with pulleys, from two forward steps: a backward step would cross the active limits."""
     options, lengths = kernel_options(state.robot, state.cables.model, tension), state.unstrained_length
     held, moments = shared_tension(state, tension.variable), (near.after, near.later)
     rows = np.stack([pose_rows(moment.pose) for moment in moments], axis=1)
@@ -333,7 +334,7 @@ def _total_lengths(state: Equilibrium, moment: _Instant, found: InverseRows) -> 
 
 
 def _closest_rates(state: Equilibrium, tension: TensionMethod, near: _Instants, kept: Indices) -> Array:
-    """Rates of `Closest`, at the samples that have an answer: the state is theirs."""
+    """Rates of `Closest` at the samples with a solution; the state contains only these samples."""
     before, after = (moment.part(kept) for moment in (near.before, near.after))
     rates = _held_limit_rates(state, tension, before, after, near.step)
     lengths = [

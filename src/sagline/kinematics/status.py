@@ -7,7 +7,7 @@ from sagline.kernels import codes
 
 
 class PoseStatus(Status):
-    """Status of one pose of a plan; `text` says what it means and what to do."""
+    """Status of one pose of a plan; `text` states its meaning and the next step."""
 
     SOLVED = codes.POSE_SOLVED, "solved"
     INFEASIBLE = (
@@ -40,7 +40,7 @@ class PoseStatus(Status):
         "the feasible tensions are unbounded, so they have no center; give tension_max, or choose MinimumNorm",
     )
     NO_POSE = (
-        100,  # of no kernel: a value that is not a pose does not reach one
+        100,  # not from a kernel: a value that is not a pose never reaches one
         "the value is not a pose: a number is not finite, or the quaternion is not of length 1; give a position and "
         "a unit quaternion, scalar last",
     )
@@ -52,7 +52,7 @@ class PoseStatus(Status):
 
 
 class ForwardStatus(Status):
-    """Status of one sample of a forward solution; `text` says what it means and what to do."""
+    """Status of one sample of a forward solution; `text` states its meaning and the next step."""
 
     SOLVED = codes.FORWARD_SOLVED, "solved: a stable equilibrium"
     LOOSE = (
@@ -88,5 +88,5 @@ class ForwardStatus(Status):
     )
 
 
-# Equilibria that the platform does not leave by itself.
+# Equilibria in which the platform remains without other forces.
 STABLE = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)

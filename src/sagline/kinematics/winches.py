@@ -19,30 +19,30 @@ from sagline.robot.drum import Drums, drum_tension, drums_of, warmth
 from sagline.robot.robot import Robot
 
 Winding = Literal["constant", "remembered"]
-LARGEST: Final = 2.0**53  # counts: beyond, whole numbers are not exact
+LARGEST: Final = 2.0**53  # counts: larger whole numbers are not exact as floats
 
 
 def encoder_counts(
     plan: Plan, winding: Winding = "constant", *, temperature: ArrayLike = 0.0, creep: Creep | None = None
 ) -> Array:
-    """Counts of the encoders at which the drums have let out a plan's lengths.
+    """Encoder counts at which the lengths off the drums are those of a plan.
 
     Args:
-        plan: A plan of a robot whose winches have a drum, counts and the zeros of both.
-        winding: State of the cable on the drum. "constant": cable wound at the winches' winding_tension. "remembered":
-            cable wound along the plan too, each meter at the tension it had at the drum when it was wound in; below it,
-            what was never off the drum since the first sample, at winding_tension.
-        temperature: By how much the cables are warmer than where the lengths of the winches hold [K], a number or one
-            a cable.
-        creep: Creep of the cables along the plan's path, zero at its first sample, under the plan's
-            `chord_tension`; None for not at all.
+        plan: A plan of a robot whose winches have a drum, counts, and the zeros of counts and lengths.
+        winding: State of the cable on the drum. "constant": all cable was wound at the winches' winding_tension.
+            "remembered": cable is also wound along the plan, each meter at its tension at the drum when it was wound
+            in; the cable below, on the drum since the first sample, was wound at winding_tension.
+        temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K], a number
+            or one per cable.
+        creep: Creep of the cables along the path of the plan, zero at its first sample, under the plan's
+            `chord_tension`; None: no creep.
 
     Returns:
         Whole counts, shape (m,) or (N, m), as floats; NaN where the plan has no solution.
 
     Raises:
-        InvalidValueError: If the robot's winches or cables lack what is needed (the message names it), a drum cannot
-            hold the cable that is left or has not so much, or creep is given for a plan without a path.
+        InvalidValueError: If required data of winches or cables are missing (the message names them), the remaining
+            cable does not fit on a drum or is too short, or creep is given for a plan without a path.
 
     Examples:
         >>> import sagline as sl
@@ -90,23 +90,23 @@ def lengths_from_counts(
     drum_tension: ArrayLike | None = None,
     temperature: ArrayLike = 0.0,
 ) -> Array:
-    """Unstrained lengths of the cable off the drums at counts of the encoders: what `forward` takes.
+    """Unstrained lengths off the drums from encoder counts: the input of `forward`.
 
     Args:
-        robot: A robot whose winches have a drum, counts and the zeros of both.
-        counts: Shape (m,) or (N, m); NaN where there is none.
-        winding: As of `encoder_counts`; "remembered" needs the tensions.
-        drum_tension: Of the cables where they leave the drum, at each sample [N], of the shape of counts: for
-            winding="remembered" alone. That of a plan is `winch_rates(plan).drum_tension`.
-        temperature: By how much the cables are warmer than where the lengths of the winches hold [K].
+        robot: A robot whose winches have a drum, counts, and the zeros of counts and lengths.
+        counts: Encoder counts, shape (m,) or (N, m); NaN if not known.
+        winding: Same as in `encoder_counts`; "remembered" needs the tensions.
+        drum_tension: Tension of the cables where they leave the drum, at each sample [N], of the shape of counts; only
+            for winding="remembered". For a plan: `winch_rates(plan).drum_tension`.
+        temperature: Temperature of the cables minus the temperature for which the winch lengths are valid [K].
 
     Returns:
-        L [m], of the shape of counts. Where cables creep, multiply by 1 + `Creep.strain` of the
-            plan's times and `chord_tension`.
+        L [m], of the shape of counts. For cables with creep, multiply by 1 + `Creep.strain` of the plan's times and
+        `chord_tension`.
 
     Raises:
-        InvalidValueError: If the robot's winches or cables lack what is needed (the message names it), counts run off a
-            drum, are no whole number of rows, or tensions are missing.
+        InvalidValueError: If required data of winches or cables are missing (the message names them), counts are beyond
+            the end of a drum or have the wrong shape, or tensions are missing.
 
     Examples:
         >>> import sagline as sl
@@ -139,7 +139,7 @@ def lengths_from_counts(
 
 
 def _remembered_lengths(drums: Drums, robot: Robot, given: Array, tension: Array, *, unstrained: bool) -> Array:
-    """Lengths with the drums' memory of tensions, (N, m)."""
+    """Lengths with the tensions stored in the cable on the drums, (N, m)."""
     strain = np.atleast_2d(tension / robot.cables.axial_stiffness)
     if (loose := strain <= -1.0).any():
         p, i = (int(index) for index in np.argwhere(loose)[0])
@@ -167,7 +167,7 @@ def _creep_strain(plan: Plan, creep: Creep) -> Array:
 
 
 def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
-    """Numbers of shape (m,) or (N, m), NaN among them."""
+    """Numbers of shape (m,) or (N, m); NaN is allowed."""
     array, m = numbers(value, item, unit), robot.cable_count
     if array.ndim not in (1, 2) or array.shape[-1] != m:
         step = f"Give one for each of the {m} cables of {robot.name}."
@@ -186,22 +186,23 @@ def _rows(robot: Robot, value: ArrayLike, item: str, unit: str) -> Array:
 class WinchRates(Result):
     """Speeds and torques of the winches along a path, arrays of shape (N, m); NaN where the plan has no solution.
 
-    Speeds of the drum are positive where cable is let out; what holds at the motor is positive in the direction in
-    which the encoder, on its shaft, counts up. With a positive gear both are the same direction, and a motor that only
-    holds a cable has a negative torque.
+    Drum speeds are positive while cable is paid out. Motor quantities are positive in the direction in which the
+    encoder on the motor shaft counts up. With a positive gear both directions agree, and a motor that only holds a
+    cable has a negative torque.
 
     Attributes:
-        drum_speed: Of the drum [rad/s].
-        motor_speed: Of the motor's shaft [rad/s]: drum_speed times gear.
-        motor_acceleration: Of the motor's shaft [rad/s^2]: from differences of the lengths' rates between samples,
-            without the jump where a layer ends.
-        drum_tension: Of the cable where it leaves the drum [N], with friction where the plan knows the winding.
-        motor_torque: That the motor gives at its shaft [N m]: inertia, less the cable's pull at the drum's lever over
-            the gear, plus the drive's friction against the motion; at rest without friction. None where the inertia
-            of the winches is not known.
-        count_rate: Of the encoder [1/s]; None where counts_per_turn is not known.
-        too_fast: True where motor_speed is beyond the winches' speed_limit; None if that is unknown.
-        too_strong: True where motor_torque is beyond their torque_limit; None if one of the two is unknown.
+        drum_speed: Speed of the drum [rad/s].
+        motor_speed: Speed of the motor's shaft [rad/s]: drum_speed times gear.
+        motor_acceleration: Acceleration of the motor's shaft [rad/s^2]: from differences of the length rates between
+            samples, without the jump at the end of a layer.
+        drum_tension: Tension of the cable where it leaves the drum [N], with friction if the plan has winding
+            directions.
+        motor_torque: Torque of the motor at its shaft [N m]: inertia torque, minus the cable tension times the lever of
+            the drum divided by the gear, plus the drive friction opposite to the motion (none at rest). None if the
+            inertia of the winches is not known.
+        count_rate: Count rate of the encoder [1/s]; None if counts_per_turn is not known.
+        too_fast: True where motor_speed exceeds the winches' speed_limit; None if the limit is not known.
+        too_strong: True where motor_torque exceeds their torque_limit; None if torque or limit is not known.
     """
 
     drum_speed: Array
@@ -215,7 +216,7 @@ class WinchRates(Result):
 
     @property
     def exceeding(self) -> Flags:
-        """Samples at which a winch would have to exceed a limit that is known, shape (N,)."""
+        """True for samples at which a winch exceeds a known limit, shape (N,)."""
         found = np.zeros(len(self.drum_speed), dtype=np.bool_)
         for beyond in (self.too_fast, self.too_strong):
             if beyond is not None:
@@ -224,23 +225,23 @@ class WinchRates(Result):
 
 
 def winch_rates(plan: Plan) -> WinchRates:
-    """Speeds and torques that the winches need to follow a plan, and where they exceed their limits.
+    """Speeds and torques of the winches along a plan, and samples at which they exceed their limits.
 
-    The lever of the cable is the change of its length in a turn of the drum, over 2 pi, so that no power is lost: the
-    pitch radius of its layer except for the pitch of the helix, which adds some 0.01 %, and the wandering exit: the
-    pitch times the slant of the run in a turn, 0.06 % where a groove pitch of 4 mm is 40 mm off at 0.8 m. Drums are
-    wound at winding_tension.
+    The lever of the cable is the change of its length per drum turn divided by 2 pi, so that power is conserved. It
+    equals the pitch radius of the layer except for two effects: the pitch of the helix adds about 0.01 %, and the
+    moving exit adds the pitch times the slant of the run, 0.06 % for a groove pitch of 4 mm, 40 mm off center at a
+    distance of 0.8 m. The cable on the drums is at winding_tension.
 
     Args:
-        plan: A plan along a path, of a robot whose winches have drum_radius and groove_pitch and whose cables a
-            diameter. Of several layers or a wandering exit, drum_width and cable_length are needed too.
+        plan: A plan along a path, of a robot whose winches have drum_radius and groove_pitch and whose cables have a
+            diameter. Several layers or a moving exit also need drum_width and cable_length.
 
     Returns:
         Rates, at every sample.
 
     Raises:
-        InvalidValueError: If the plan has no path, data are missing (the message names them), or a drum cannot hold
-            what is left of the cable.
+        InvalidValueError: If the plan has no path, data are missing (the message names them), or the remaining cable
+            does not fit on a drum.
 
     Examples:
         >>> import sagline as sl
@@ -295,10 +296,10 @@ def _exceeds(values: Array | None, limit: Array | None) -> Flags | None:
 
 
 def _differences(time: Array, values: Array) -> Array:
-    """Rates of values, (N, m), within each run of samples that have one; a sample alone has none."""
+    """Rates of values, (N, m), within each run of valid samples; NaN for an isolated sample."""
     found = np.full(values.shape, np.nan)
     kept = np.isfinite(values).all(axis=-1)
-    gradient: Any = np.gradient  # its types do not know arrays of two axes
+    gradient: Any = np.gradient  # its type annotations do not support arrays of two axes
     edges = np.flatnonzero(np.diff(np.concatenate(([False], kept, [False])).astype(np.int8))).reshape(-1, 2)
     for first, end in edges:
         if end - first > 1:

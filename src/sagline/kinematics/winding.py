@@ -18,18 +18,18 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import with_routing
 
 Winding = ArrayLike | Literal["path"]
-ITERATIONS: Final = 100  # some ten of them, unless far more cable is behind than before, or a lot rubs
-MEMORY: Final = 5  # iterations before, from which the next is mixed
+ITERATIONS: Final = 100  # usually about ten; more if the routing length changes a lot, or friction is high
+MEMORY: Final = 5  # previous iterations used in Anderson mixing
 _RANK: Final = 1e-6
-TOLERANCE: Final = 1e-13  # of a length
+TOLERANCE: Final = 1e-13  # relative to a length
 _OPEN = (codes.FORWARD_NOT_CONVERGED, codes.FORWARD_NO_LENGTHS)
 
 
 def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> Array:
-    """Directions of winding, one a cable.
+    """Winding directions, one per cable.
 
-    winding: what the caller gave: +1, -1 and 0; shape: () for a single pose, (N,) for N. Returns array of shape (m,) or
-    (N, m).
+    winding: the caller's directions: +1, -1 and 0; shape: () for a single pose, (N,) for N. Returns array of shape (m,)
+    or (N, m).
     """
     array = checked(winding, "winding", "")
     shapes = [(cables,)] + [(*shape, cables)] * bool(shape)
@@ -47,9 +47,9 @@ def checked_winding(winding: ArrayLike, shape: tuple[int, ...], cables: int) -> 
 
 
 def without_guides(robot: Robot, solver: str, instead: str) -> Robot:
-    """The robot, refused where its cables sag between guides.
+    """The robot; refuses one whose cables sag between guides.
 
-    solver: what does not take them, for the message.
+    solver: name of the function that does not support guides, for the message.
     """
     if robot.winches is None or robot.winches.guides is None:
         return robot
@@ -66,16 +66,16 @@ def iterate_routing(
     winding: Array | None,
     taken: Array | None = None,
 ) -> ForwardRows:
-    """Equilibria at lengths that count what is really behind the pulleys.
+    """Equilibria at lengths that include the actual routing.
 
-    Kernels get the lengths less what guides and friction add at the tensions of the iteration before, until they
-    converge.
+    The lengths for the kernels are the given lengths minus the correction for guides and friction at the tensions of
+    the previous iteration; repeated until convergence.
 
-    found: equilibria over a straight guided run without friction, at the lengths less what is taken for the rest;
-    lengths: unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of
-    friction, shape (m,) or (N, m), or None; taken: what they were solved with for what guides and friction add [m], (N,
-    m); None for nothing. Returns the answers; NOT_CONVERGED where that does not converge, or a cable is too slack for a
-    catenary between its guides.
+    found: equilibria for a straight guided run without friction, at the lengths minus the initial correction; lengths:
+    unstrained lengths (N, m); loads: external plus inertial wrenches (1 or N, 6); winding: directions of friction,
+    shape (m,) or (N, m), or None; taken: initial correction for guides and friction [m], (N, m); None for zero. Returns
+    the results; NOT_CONVERGED if the iteration does not converge, or a cable is too slack for a catenary between its
+    guides.
     """
     more = np.zeros(lengths.shape) if taken is None else taken.copy()
     past: deque[tuple[Array, Array]] = deque(maxlen=MEMORY)  # input and residual
@@ -108,7 +108,7 @@ def iterate_routing(
 
 
 def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]]) -> Array:
-    """The next step from what was missed before too, (N, m): by Anderson's mixing."""
+    """The next iterate by Anderson mixing, from previous inputs and residuals, (N, m)."""
     if not past:
         return missed
     changes = np.stack([missed - before for _, before in past], axis=-1)
@@ -119,7 +119,7 @@ def _anderson_step(taken: Array, missed: Array, past: list[tuple[Array, Array]])
 
 
 def _routing_change(robot: Robots, model: CableModel, found: ForwardRows, winding: Array | None) -> Array:
-    """Change of the lengths behind the pulleys by guides and friction [m], (N, m); NaN for a too slack cable."""
+    """Correction of the routing lengths for guides and friction [m], (N, m); NaN for a cable that is too slack."""
     shape = (len(found.poses),)
     plain = found.solution(robot, model, np.zeros(6), shape).state
     real = with_routing(plain, winding)

@@ -1,4 +1,4 @@
-"""A path: the platform's poses, velocities and accelerations, sample by sample."""
+"""A path: poses, velocities and accelerations of the platform at each sample."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sagline.robot.pose import Pose
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path(Shown):
-    """The motion of the platform frame over time, in N samples; no two at the same time.
+    """The motion of the platform frame over time, in N samples at different times.
 
     Attributes:
         time: Time of each sample [s], shape (N,), strictly increasing.
@@ -24,9 +24,9 @@ class Path(Shown):
         twist: Velocity of the platform's origin [m/s], then its angular velocity [rad/s], in world axes, shape (N, 6).
         twist_rate: Acceleration of the platform's origin [m/s^2], then its angular acceleration [rad/s^2],
             in world axes, shape (N, 6).
-        jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None where it is not known, as of sampled poses.
-        rests: Times at which the platform rests between two moves [s], first and last time included, shape (R,);
-            they need not be times of samples. None where they are not known, as of sampled poses.
+        jerk: d(twist_rate)/dt [m/s^3, rad/s^3], shape (N, 6); None if not known, for example for sampled poses.
+        rests: Times at which the platform is at rest between two segments [s], first and last time included, shape
+            (R,); they can differ from the sample times. None if not known, for example for sampled poses.
     """
 
     time: Array
@@ -51,9 +51,9 @@ class Path(Shown):
             time: Time of each sample [s], shape (N,), strictly increasing.
             pose: A batch of N poses.
             twist: Velocity [m/s] and angular velocity [rad/s], shape (N, 6).
-            twist_rate: Their rates [m/s^2, rad/s^2], shape (N, 6).
-            jerk: Their second rates [m/s^3, rad/s^3], shape (N, 6), or None.
-            rests: Times between moves [s], from the first sample's to the last's, strictly increasing; or None.
+            twist_rate: First time derivatives of the twist [m/s^2, rad/s^2], shape (N, 6).
+            jerk: Second time derivatives of the twist [m/s^3, rad/s^3], shape (N, 6), or None.
+            rests: Times of rest between segments [s], from the first to the last sample, strictly increasing; or None.
 
         Raises:
             InvalidValueError: If the times do not increase, a number is not finite, or the lengths differ.

@@ -16,8 +16,8 @@ from sagline.motion.segments import QUINTIC, SEPTIC, RestProfile, Segments
 from sagline.robot.pose import Pose
 
 LIMITS = ("speed", "acceleration", "angular_speed", "angular_acceleration")
-MOST_SAMPLES = 100_000_000  # 21 GB of path: beyond it a duration or the rate has the wrong unit
-SAMPLE_BYTES = 300.0  # of memory a sample needs while the path is made
+MOST_SAMPLES = 100_000_000  # 21 GB of path: with more samples, a duration or the rate probably has the wrong unit
+SAMPLE_BYTES = 300.0  # peak memory per sample during construction of the path
 
 
 def quintic_path(
@@ -30,22 +30,22 @@ def quintic_path(
     angular_acceleration: float | None = None,
     rate: float = 100.0,
 ) -> Path:
-    """Move from waypoint to waypoint, each time from rest to rest.
+    """Path through waypoints, with rest at each waypoint.
 
-    Within a segment of duration T the share 10 s^3 - 15 s^4 + 6 s^5 (s = time/T) of the way is done: the position moves
-    along the straight line, the orientation turns about one fixed axis, and velocity and acceleration vanish at both
-    ends; the jerk does not (see `septic_path`). A turn of exactly 180 degrees has two equally short ways; the one of
-    scipy's `Rotation.as_rotvec` is taken.
+    Within a segment of duration T the platform has covered the share 10 s^3 - 15 s^4 + 6 s^5 (s = time/T) of the
+    segment. The position moves along a straight line and the orientation rotates about one fixed axis. Velocity and
+    acceleration vanish at both ends; the jerk does not (see `septic_path`). A rotation of exactly 180 degrees has two
+    equally short directions; the path takes that of scipy's `Rotation.as_rotvec`.
 
-    Time is given either by `durations` or by limits. With limits, each segment takes the shortest time in which all of
-    them hold, the slower of translation and turn deciding for both.
+    Give either `durations` or limits. With limits, each segment takes the shortest time that satisfies all of them; the
+    slower of translation and rotation determines it.
 
-    The samples lie at 0, 1/rate, 2/rate, ... and at the very end, whatever the step before it. A waypoint between two
-    of those times is passed between two samples.
+    The samples are at 0, 1/rate, 2/rate, ... and at the end time, so the last step can be shorter. A waypoint can lie
+    between two samples.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
-        durations: Time of each segment [s], shape () or (N - 1,), > 0. A waypoint given twice is a dwell.
+        durations: Time of each segment [s], shape () or (N - 1,), > 0. Two equal consecutive waypoints give a dwell.
         speed: Limit of the origin's speed [m/s], > 0.
         acceleration: Limit of the origin's acceleration [m/s^2], > 0.
         angular_speed: Limit of the angular speed [rad/s], > 0.
@@ -53,12 +53,13 @@ def quintic_path(
         rate: Samples per second [1/s], > 0.
 
     Returns:
-        Path that starts at time 0. Its jerk jumps at every waypoint, where it is that of the segment that begins.
+        Path that starts at time 0. Its jerk is discontinuous at every waypoint and has there the value of the next
+        segment.
 
     Raises:
-        InvalidValueError: If a value is out of range, both or neither of durations and limits are given, a segment
-            moves or turns without a limit on it or has no sample between its ends, or two consecutive waypoints are
-            the same while limits are given.
+        InvalidValueError: If a value is out of range, both or neither of durations and limits are given, a limit is
+            missing for the translation or rotation of a segment, a segment has no sample between its ends, or two
+            consecutive waypoints are equal while limits are given.
 
     Source:
         docs/model.md, section 7.
@@ -84,15 +85,15 @@ def septic_path(
     angular_acceleration: float | None = None,
     rate: float = 100.0,
 ) -> Path:
-    """Move from waypoint to waypoint, each time from rest to rest, with continuous jerk.
+    """Path through waypoints, with rest at each waypoint and continuous jerk.
 
-    As `quintic_path`, but the share of the way is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7: velocity, acceleration and jerk
-    vanish at both ends of each segment, so that cables and winches are not struck at the waypoints. For the same
-    duration its peak speed is 7/6 and its peak acceleration 1.30 of the quintic's.
+    Same as `quintic_path`, except that the share of the segment is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7: velocity,
+    acceleration and jerk vanish at both ends of each segment, so that cables and winches see no sudden change. For the
+    same duration, the peak speed is 7/6 and the peak acceleration 1.30 of that of the quintic.
 
     Args:
         waypoints: At least two poses, as a batch or a sequence; or positions [m] of shape (N, 3), orientation identity.
-        durations: Time of each segment [s], shape () or (N - 1,), > 0. A waypoint given twice is a dwell.
+        durations: Time of each segment [s], shape () or (N - 1,), > 0. Two equal consecutive waypoints give a dwell.
         speed: Limit of the origin's speed [m/s], > 0.
         acceleration: Limit of the origin's acceleration [m/s^2], > 0.
         angular_speed: Limit of the angular speed [rad/s], > 0.
@@ -103,7 +104,7 @@ def septic_path(
         Path that starts at time 0.
 
     Raises:
-        InvalidValueError: As `quintic_path`.
+        InvalidValueError: In the cases listed for `quintic_path`.
 
     Source:
         docs/model.md, section 7.
@@ -127,7 +128,7 @@ def _rest_to_rest(
     limits: tuple[float | None, float | None, float | None, float | None],
     rate: float,
 ) -> Path:
-    """A path of segments of one profile, timed by durations or by the limits in the order of `LIMITS`."""
+    """Path of segments with one profile and given durations or limits; limits in the order of `LIMITS`."""
     segments = Segments.between(_as_pose(waypoints), profile)
     given = [name for name, value in zip(LIMITS, limits, strict=True) if value is not None]
     if (durations is None) == (not given):
@@ -173,7 +174,7 @@ def _checked_durations(durations: ArrayLike, segments: int) -> Array:
 
 
 def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None:
-    """Refuse a segment that moves without a sample between its ends: no result would contain its motion."""
+    """Refuse a segment that moves but has no sample between its ends: its motion would be missing in all results."""
     rounding = 1e-9 * ends[-1]
     inside = np.searchsorted(grid, ends - rounding) - np.searchsorted(grid, ends - times + rounding)
     if (unseen := np.flatnonzero((inside < 1) & moves)).size:
@@ -187,7 +188,7 @@ def _check_sampled(grid: Array, ends: Array, times: Array, moves: Flags) -> None
 
 
 def time_grid(total: float, rate: float) -> Array:
-    """Times k/rate from 0 to the total time, and the total itself as the last [s].
+    """Times k/rate from 0 to the total time, with the total time as the last [s].
 
     Shapes: total [s]; rate [1/s]; returns (N,).
     """
@@ -216,9 +217,9 @@ DURATIONS = (9.0, 11.0, 10.0, 11.0, 10.0, 9.0)  # s
 def article_path(rate: float = 100.0) -> Path:
     """The article's planar motion: at z = 1.5 m, without rotation, from rest to rest.
 
-    The article gives the height and the zero angles, but no further numbers (its Figure 18); the rest is our choice.
-    From the center to the corner (+5, +3.5) m, counter-clockwise around the rectangle of x = +-5 m, y = +-3.5 m, back
-    to the center; 60 s in all, with a peak acceleration of 0.48 m/s^2 and a peak speed of 1.70 m/s.
+    The article gives only the height and the zero angles (its Figure 18); the remaining values are our choice. The path
+    leads from the center to the corner (+5, +3.5) m, counter-clockwise around the rectangle of x = +-5 m, y = +-3.5 m,
+    and back to the center; 60 s in total, peak acceleration 0.48 m/s^2, peak speed 1.70 m/s.
 
     Args:
         rate: Samples per second [1/s], > 0; 100 gives 6,001 poses.

@@ -13,22 +13,22 @@ from sagline.robot.pose import Pose
 
 
 def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
-    """Complete timed poses to a path.
+    """Path from timed poses.
 
     Position and quaternion are interpolated by cubic splines with continuous second derivatives; the path keeps the
-    poses as given and takes velocity and acceleration from the splines. At both ends the spline is the cubic through
-    the first (last) four samples (not-a-knot): a path sampled in mid-motion is not forced to rest. Two samples give
-    constant velocity, three a parabola.
+    given poses and computes velocity and acceleration from the splines. At both ends the spline is the cubic through
+    the first (last) four samples (not-a-knot): the path need not start or end at rest. Two samples give constant
+    velocity, three a parabola.
 
-    The acceleration is as good as the samples: positions rounded to within d [m] at steps of h [s] disturb it by
-    up to 12 d/h^2, which is 0.06 m/s^2 for micrometers (d = 0.5e-6 m) at 100 samples/s.
+    Errors of the samples reduce the accuracy of the acceleration: position errors up to d [m] at time steps of h [s]
+    cause acceleration errors up to 12 d/h^2, which is 0.06 m/s^2 for micrometers (d = 0.5e-6 m) at 100 samples/s.
 
     Args:
         time: Time of each sample [s], shape (N,), strictly increasing, N >= 2.
-        pose: The N poses; from one to the next the platform turns by less than 180 degrees.
+        pose: The N poses; the rotation between consecutive poses is less than 180 degrees.
 
     Returns:
-        Path with the given times and poses; its jerk is None: a cubic spline does not define it.
+        Path with the given times and poses; its jerk is None, because a cubic spline does not define it.
 
     Raises:
         InvalidValueError: If the times do not increase, there are fewer than two, or the number of poses differs.
@@ -57,18 +57,18 @@ def path_from_samples(time: ArrayLike, pose: Pose) -> Path:
 
 
 def spline_rates(time: Array, values: Array) -> tuple[Array, Array]:
-    """First and second derivative, at its knots, of the cubic spline through the values.
+    """First and second derivatives of the cubic spline through the values, at its knots.
 
     Shapes: time (N,); values (N, ...).
     """
-    from scipy.interpolate import CubicSpline  # takes longer to load than all the rest of motion
+    from scipy.interpolate import CubicSpline  # this import takes longer than the rest of the folder motion
 
     spline = CubicSpline(time, values, bc_type="not-a-knot")
     return spline(time, 1), spline(time, 2)
 
 
 def _without_sign_changes(quaternion: Array) -> Array:
-    """Continuous quaternions: each on the side of the one before (q and -q are one rotation)."""
+    """Continuous quaternions: each has the sign closer to its predecessor (q and -q are the same rotation)."""
     aligned = np.sum(quaternion[1:] * quaternion[:-1], axis=1) >= 0.0
     sign = np.cumprod(np.concatenate(([1.0], np.where(aligned, 1.0, -1.0))))
     continuous: Array = quaternion * sign[:, None]
@@ -81,12 +81,12 @@ def _angular_rates(time: Array, quaternion: Array) -> tuple[Array, Array]:
     With q' = (omega, 0) q / 2 for the normalized quaternion, and |q| = 1 at the samples, the spline's derivatives give
     omega = 2 vec(q' q*) and omega' = 2 vec(q'' q*) - 2 omega (q . q').
 
-    scipy's RotationSpline is not used: it starts and ends with the mean velocity of the outermost steps, which leaves
-    an error in the acceleration there that smaller steps do not cure.
+    scipy's RotationSpline is not used: it starts and ends with the mean velocity of the outermost steps. This causes an
+    error of the acceleration there that does not decrease with smaller steps.
     """
     rate, curvature = spline_rates(time, quaternion)
     velocity = 2.0 * _vector_of_product_with_conjugate(rate, quaternion)
-    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # of the norm, which a spline does not keep at 1
+    growth = np.sum(quaternion * rate, axis=1, keepdims=True)  # rate of the norm, which a spline does not keep at 1
     return velocity, 2.0 * _vector_of_product_with_conjugate(curvature, quaternion) - 2.0 * growth * velocity
 
 

@@ -16,9 +16,10 @@ from sagline.robot.pose import Pose
 
 @dataclass(frozen=True, slots=True)
 class RestProfile:
-    """A polynomial that goes from 0 to 1 while s goes from 0 to 1, as smooth at both ends as its degree allows.
+    """Polynomial from 0 to 1 for s from 0 to 1; k derivatives vanish at both ends.
 
-    With u = s (1 - s) its slope is c u^k, so that its first k derivatives vanish at both ends; the degree is 2 k + 1.
+    With u = s (1 - s), its derivative is c u^k, so that its first k derivatives vanish at both ends; the degree is 2 k
+    + 1.
 
     Attributes:
         order: k, >= 2: 2 for the quintic (acceleration vanishes at the ends), 3 for the septic (jerk too).
@@ -41,30 +42,30 @@ class RestProfile:
 
     @property
     def slope(self) -> float:
-        """C = (2 k + 1)!/(k!)^2: what makes the integral of c u^k one."""
+        """C = (2 k + 1)!/(k!)^2, which makes the integral of c u^k equal to one."""
         return float(factorial(2 * self.order + 1) // factorial(self.order) ** 2)
 
     @property
     def peak_speed(self) -> float:
-        """Largest slope, at s = 1/2: c/4^k."""
+        """Largest derivative with respect to s, at s = 1/2: c/4^k."""
         return self.slope / 4.0**self.order
 
     @property
     def peak_acceleration(self) -> float:
-        """Largest second derivative, where (1 - 2 s)^2 = q = 1/(2 k - 1): c k u^(k - 1) sqrt(q), u = (1 - q)/4."""
+        """Largest second derivative, at (1 - 2 s)^2 = q = 1/(2 k - 1): c k u^(k - 1) sqrt(q), u = (1 - q)/4."""
         k = self.order
         q = 1.0 / (2 * k - 1)
         return float(self.slope * k * (0.25 * (1.0 - q)) ** (k - 1) * np.sqrt(q))
 
     def share(self, s: Array) -> Array:
-        """Share of the way that is done."""
+        """Covered share of the segment."""
         total: Array = np.full_like(s, self.tail[-1])
         for coefficient in self.tail[-2::-1]:
             total = coefficient + s * total
         return s ** (self.order + 1) * total
 
     def rates(self, s: Array) -> tuple[Array, Array, Array]:
-        """First, second and third derivative of the share by s; the first k of them exactly 0 at both ends."""
+        """First to third derivatives of the share with respect to s; the first k are exactly 0 at both ends."""
         k = self.order
         u, bend = s * (1.0 - s), 1.0 - 2.0 * s
         second = self.slope * k * u ** (k - 1) * bend
@@ -76,22 +77,22 @@ QUINTIC: Final = RestProfile.of_order(2)  # 10 s^3 - 15 s^4 + 6 s^5
 SEPTIC: Final = RestProfile.of_order(3)  # 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7
 
 
-STILL = 1e-9  # m and rad: a shorter move is the rounding of a waypoint
-BLOCK = 1 << 16  # samples worked on at once; keeps the temporaries at a few MB
+STILL = 1e-9  # m and rad: a shorter motion is rounding of a waypoint
+BLOCK = 1 << 16  # samples per block; limits the temporary arrays to a few MB
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """S straight moves with a turn about a fixed axis.
+    """S straight segments with a rotation about a fixed axis.
 
     Attributes:
         profile: Profile from rest to rest.
-        start: Position at the beginning [m], shape (S, 3).
+        start: Position at the start [m], shape (S, 3).
         move: Displacement to the end [m], shape (S, 3).
-        turn: Rotation vector to the end in world axes [rad], shape (S, 3).
-        start_quaternion: Orientation q at the beginning, scalar last, shape (S, 4).
-        side_quaternion: The quaternion product of the unit axis of the turn and q, shape (S, 4): a turn by the angle a
-            leads to cos(a/2) q + sin(a/2) side.
+        turn: Rotation vector from start to end in world axes [rad], shape (S, 3).
+        start_quaternion: Orientation q at the start, scalar last, shape (S, 4).
+        side_quaternion: The quaternion product of the unit rotation axis and q, shape (S, 4): the orientation after a
+            rotation by angle a is cos(a/2) q + sin(a/2) side.
     """
 
     profile: RestProfile
@@ -105,15 +106,16 @@ class Segments:
     def between(cls, stops: Pose, profile: RestProfile) -> Segments:
         """The segments from each pose of a batch to the next."""
         move, kept = np.diff(stops.position, axis=0), stops.quaternion[:-1]
-        if np.array_equal(kept, stops.quaternion[1:]):  # nothing turns: the axis is never asked for
+        if np.array_equal(kept, stops.quaternion[1:]):  # no rotation: the axis is not needed
             return cls(profile, stops.position[:-1], move, np.zeros_like(move), kept, np.zeros_like(kept))
-        from scipy.spatial.transform import Rotation  # takes a third of the time that sagline takes to load
+        from scipy.spatial.transform import Rotation  # this import takes a third of the load time of sagline
 
         first, second = stops.rotation[:-1], stops.rotation[1:]
         turn = (second * first.inv()).as_rotvec()
         angle = np.linalg.norm(turn, axis=1, keepdims=True)
         axis = np.where(angle > 0.0, turn / np.where(angle > 0.0, angle, 1.0), (0.0, 0.0, 1.0))
-        half_turn = Rotation.from_quat(np.hstack((axis, np.zeros_like(angle))))  # a pure quaternion is half a turn
+        # a pure quaternion is a rotation by 180 degrees
+        half_turn = Rotation.from_quat(np.hstack((axis, np.zeros_like(angle))))
         side = (half_turn * first).as_quat()
         return cls(profile, stops.position[:-1], move, turn, first.as_quat(), side)
 
@@ -123,7 +125,7 @@ class Segments:
 
     @property
     def moves(self) -> Flags:
-        """True for segments that move or turn, shape (S,)."""
+        """True for segments that translate or rotate, shape (S,)."""
         moves: Flags = np.linalg.norm(np.hstack((self.move, self.turn)), axis=1) > STILL
         return moves
 
@@ -134,7 +136,7 @@ class Segments:
         angular_speed: float | None,
         angular_acceleration: float | None,
     ) -> Array:
-        """Shortest times that keep all limits.
+        """Shortest times that satisfy all limits.
 
         Shapes: speed [m/s]; acceleration [m/s^2]; angular_speed [rad/s]; angular_acceleration [rad/s^2]; returns
         (S,) [s].
@@ -162,17 +164,17 @@ class Segments:
         starts = np.concatenate(([0.0], ends[:-1]))
         half_angle = 0.5 * np.linalg.norm(self.turn, axis=1, keepdims=True)
         position, quaternion = np.empty((time.size, 3)), np.empty((time.size, 4))
-        rates = np.empty((3, time.size, 6))  # twist, its rate, its jerk
+        rates = np.empty((3, time.size, 6))  # twist and its first and second time derivatives
         for low in range(0, time.size, BLOCK):
             block = slice(low, low + BLOCK)
             k = np.minimum(np.searchsorted(ends, time[block], side="right"), len(self) - 1)
             T = durations[k][:, None]
-            s = np.minimum((time[block] - starts[k])[:, None] / T, 1.0)  # rounding of starts may pass 1
+            s = np.minimum((time[block] - starts[k])[:, None] / T, 1.0)  # rounding of starts may give more than 1
             share = self.profile.share(s)
             move, turn, turned = self.move[k], self.turn[k], share * half_angle[k]
             position[block] = self.start[k] + share * move
             quaternion[block] = np.cos(turned) * self.start_quaternion[k] + np.sin(turned) * self.side_quaternion[k]
-            # The axis is fixed, so the derivatives of the rotation vector are those of the orientation, exactly.
+            # The axis is fixed, so the derivatives of the rotation vector are exactly those of the orientation.
             for order, by_share in enumerate(self.profile.rates(s)):
                 rate = by_share / T ** (order + 1)
                 rates[order, block, :3], rates[order, block, 3:] = rate * move, rate * turn
@@ -183,7 +185,7 @@ class Segments:
     def _least_time(
         self, extent: Array, verb: str, name: str, unit: str, speed: float | None, acceleration: float | None
     ) -> Array:
-        """Shortest time [s] for a move or turn of the given extent [m or rad] under two limits, None for no limit."""
+        """Shortest times [s] for motions of the given extent [m or rad] under two limits; None: no limit."""
         if speed is None and acceleration is None and (extent > STILL).any():
             k = int(np.argmax(extent > STILL))
             raise InvalidValueError(

@@ -1,1 +1,1 @@
-"""Balance of the platform: structure matrix, the wrench it needs, and the inertial wrench of a motion."""
+"""Statics of the platform: structure matrix, required wrench, and inertial wrench of a motion."""

@@ -20,20 +20,20 @@ from sagline.statics.tables import chord_geometry, refuse_missing_chords
 
 
 def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike, twist_rate: ArrayLike) -> Array:
-    """The d'Alembert wrench of a motion: what the platform's inertia does to it.
+    """Inertial (d'Alembert) wrench of a motion of the platform.
 
     Args:
-        robot: Gives mass, center of mass and inertia; one robot, or a sequence of N, one a pose.
+        robot: Robot with mass, center of mass and inertia; or a sequence of N robots, one per pose.
         pose: A batch of N poses.
         twist: Velocity of the platform origin [m/s] and angular velocity [rad/s], world axes, shape (N, 6).
-        twist_rate: Their rates [m/s^2, rad/s^2], shape (N, 6).
+        twist_rate: Time derivatives of the twist [m/s^2, rad/s^2], shape (N, 6).
 
     Returns:
         Force -M p_c'' [N] and moment -(Gamma w' + w x Gamma w) [N m] about the center of mass, shape (N, 6).
 
     Raises:
-        InvalidValueError: If several robots are not one a pose or do not fit together, or the poses, the twists and
-            their rates are not N of each.
+        InvalidValueError: If the number of several robots is not N or the robots do not fit together, or the numbers of
+            poses, twists and twist rates differ.
 
     Examples:
         >>> import sagline as sl
@@ -42,7 +42,7 @@ def inertial_wrench(robot: Robot | Sequence[Robot], pose: Pose, twist: ArrayLike
         (6001, 6)
 
     Source:
-        Newton and Euler; docs/model.md, section 4. With the angular velocity itself, not Euler-angle rates.
+        Newton and Euler; docs/model.md, section 4. Uses the angular velocity itself, not Euler-angle rates.
     """
     if not instance(pose, Pose, "pose").shape:
         raise InvalidValueError("pose", "a single one", "a batch of N poses", "Take Pose(position[None], rotation).")
@@ -79,11 +79,11 @@ def external_wrench(wrench: ArrayLike | None, count: int | None) -> Array:
 
 
 class ArticleBalance(NamedTuple):
-    """The article's system H t_x + b = [F; tau], force and moment about the center of mass without gravity.
+    """The article's system H t_x + b = [F; tau], with force and moment about the center of mass, without gravity.
 
     Attributes:
         h: The matrix H of (50), shape (..., 6, m).
-        b: The vector b of (51), the platform's weight included once, shape (..., 6).
+        b: The vector b of (51), including the platform's weight once, shape (..., 6).
     """
 
     h: Array
@@ -91,23 +91,23 @@ class ArticleBalance(NamedTuple):
 
 
 def _geometry(robot: Robots, pose: Pose) -> Array:
-    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m); refused where a cable has no chord."""
+    """Geometry rows of every pose, shape (N, GEOMETRY_ROWS, m); refuses a pose at which a cable has no chord."""
     geometry = chord_geometry(robot, pose)
     refuse_missing_chords(robot, pose, geometry)
     return geometry
 
 
 def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
-    """J: the wrench of unit chord tensions, about the center of mass, in world axes.
+    """J: the wrenches of unit chord tensions, about the center of mass, in world axes.
 
     Args:
-        robot: The robot; or a sequence of N that fit together (see `inverse`), one a pose.
+        robot: The robot; or a sequence of N that fit together (see `inverse`), one per pose.
         pose: One pose or a batch of N.
 
     Returns:
         Columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
 
-    Raises:
+    InvalidValueError: If there is not one robot per pose, or several robots do not fit together.
         InvalidValueError: If several robots are not one a pose, or do not fit together.
         CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
             cable.
@@ -134,8 +134,8 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
 def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBalance:
     """The article's own H and b, in the horizontal tensions t_x, for comparison.
 
-    Written from its equations with the levers b_i = B_i - P from the center of mass and the sign of b_pi
-    corrected (erratum 1) and gravity counted once (erratum 2); infinite under an anchor (erratum 8).
+    H and b follow the article's equations with the levers b_i = B_i - P from the center of mass, the corrected sign of
+    b_pi (erratum 1) and gravity counted once (erratum 2); they are infinite under an anchor (erratum 8).
 
     Args:
         robot: The robot.
@@ -146,7 +146,7 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
         H of shape (6, m) or (N, 6, m), b of shape (6,) or (N, 6).
 
     Raises:
-        InvalidValueError: If robot or pose are none, or k_h is no number.
+        InvalidValueError: If robot or pose has the wrong type, or k_h is not a number.
         CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
             cable.
 
@@ -166,7 +166,7 @@ def article_balance(robot: Robot, pose: Pose, k_h: float = 4.845) -> ArticleBala
     cosine, sine = geometry[rows.AZIMUTH_X], geometry[rows.AZIMUTH_Y]
     bx, by, bz = geometry[rows.LEVER_X], geometry[rows.LEVER_Y], geometry[rows.LEVER_Z]
     pull = k_h * robot.cables.linear_density * geometry[rows.CHORD]
-    with np.errstate(divide="ignore", invalid="ignore"):  # infinite, times a lever of zero
+    with np.errstate(divide="ignore", invalid="ignore"):  # infinite value times a zero lever
         slope = geometry[rows.RISE] / geometry[rows.SPAN]
         h = -np.stack(
             (cosine, sine, slope, by * slope - bz * sine, bz * cosine - bx * slope, bx * sine - by * cosine), axis=-2

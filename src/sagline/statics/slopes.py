@@ -1,4 +1,4 @@
-"""Derivatives of cable forces and tensions by pose, length and material."""
+"""Derivatives of cable forces and tensions with respect to pose, length and material."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.routing import kernel_length
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-BLOCK = 1 << 12  # samples at once: a tenth of a second, after which an interrupt is heard
+BLOCK = 1 << 12  # samples per block: a tenth of a second, after which an interrupt is handled
 _TINY = 1e-300
 
 
 class CableSlopes(NamedTuple):
-    """Derivatives of every cable's force on its platform end, world axes."""
+    """Derivatives of the force of every cable on its platform end, world axes."""
 
-    matrix: Array  # derivative of the platform's unbalance by its motion, shape (..., 6, 6)
+    matrix: Array  # derivative of the unbalanced wrench with respect to platform motion, shape (..., 6, 6)
     blocks: Array  # dT/dB, shape (..., m, 3, 3) [N/m]
     by_length: Array  # dT/dL, shape (..., m, 3) [N/m]
     by_density: Array  # dT/d(rho), shape (..., m, 3) [N m/kg]
     by_stiffness: Array  # dT/d(EA), shape (..., m, 3) [1]
     by_radius: Array  # dT/dR of the pulley, shape (..., m, 3) [N/m]
-    by_dead: Array  # dT by the dead length, shape (..., m, 3) [N/m]
+    by_dead: Array  # dT/d(dead length), shape (..., m, 3) [N/m]
     levers: Array  # from the center of mass to the platform ends, shape (..., m, 3) [m]
-    force: Array  # T, on the platform ends, shape (..., m, 3) [N]
+    force: Array  # T on the platform ends, shape (..., m, 3) [N]
 
 
 def cable_slopes(state: Equilibrium) -> CableSlopes:
-    """Derivatives of the cables' forces by the platform's motion and by their own data."""
+    """Derivatives of the cable forces with respect to platform motion and to cable data."""
     shared, cables = first_of(state.robot), state.cables
     bodies, robots = body_table(state.robot), cable_table(state.robot)
     poses, lengths = pose_rows(state.pose), np.atleast_2d(kernel_length(state))
@@ -61,7 +61,7 @@ def cable_slopes(state: Equilibrium) -> CableSlopes:
         describe_states(code, (shared.freedom, *own), memory, *found)
     centers = poses[:, :3] + _turned(state, bodies[:, tables.CENTER_X :])
     reach = (centers[:, None] + levers - robots[:, :, : tables.PLATFORM_X]).reshape(*shape, m, 3)
-    # a vertical cable pulls nowhere sideways
+    # a vertical cable has no horizontal direction
     level = reach[..., :2] / np.maximum(np.hypot(reach[..., 0], reach[..., 1]), _TINY)[..., None]
     sideways = level * cables.horizontal_tension[..., None]
     return CableSlopes(
@@ -92,7 +92,7 @@ def on_platform(forces: Array, levers: Array) -> Array:
 
 
 def motions_of_ends(levers: Array) -> Array:
-    """Matrices from a motion of the platform (..., 6) [m, rad] to those of the platform ends, (..., m, 3, 6)."""
+    """Matrices from a platform motion (..., 6) [m, rad] to the displacements of the platform ends, (..., m, 3, 6)."""
     motion = np.eye(6)
     ends = np.swapaxes(motion[:, :3] + np.cross(motion[:, 3:], levers[..., None, :]), -1, -2)
     return np.ascontiguousarray(ends)
@@ -106,20 +106,21 @@ def platform_end_forces(state: Equilibrium) -> Array:
 
 
 def frame_end_forces(state: Equilibrium) -> Array:
-    """Forces in the cables of a single state at their frame ends, towards the platform, world axes [N], (m, 3)."""
+    """Forces in the cables of a single state at their frame ends, toward the platform, world axes [N], (m, 3)."""
     weight = state.cables.cable_weight[:, None] * np.array([0.0, 0.0, 1.0])
     return np.asarray(platform_end_forces(state) - weight)
 
 
-_LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a meter of the cable's own
+_LONGER = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])  # the last column is a change of the cable's own length by 1 m
 
 
 class TensionSlopes(NamedTuple):
-    """Derivatives of the tension at each cable's frame end."""
+    """Derivatives of the tension at the frame end of each cable."""
 
-    # by (displacement of the center of mass, rotation vector) at fixed lengths, shape (..., m, 6) [N/m, N/rad]
+    # with respect to (displacement of the center of mass, rotation vector) at fixed lengths, shape (..., m, 6) [N/m,
+    # N/rad]
     by_motion: Array
-    by_length: Array  # by the cable's own length, the platform held, shape (..., m) [N/m]
+    by_length: Array  # with respect to the cable's own length, platform fixed, shape (..., m) [N/m]
 
 
 def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
@@ -136,19 +137,19 @@ def tension_slopes(state: Equilibrium, slopes: CableSlopes) -> TensionSlopes:
 
 
 def _at_anchors(state: Equilibrium, slopes: CableSlopes, forces: Array) -> Array:
-    """Tension slopes of cables from anchors, by the change of the force on each platform end, (..., m, 7, 3)."""
+    """Derivatives of the tension without pulleys, from the change of the force on each platform end, (..., m, 7, 3)."""
     cables = state.cables
     at_frame, forces = slopes.force.copy(), forces.copy()
     at_frame[..., 2] -= cables.cable_weight
     forces[..., 2] -= _weight(state)[..., None] * _LONGER
-    # a cable without force pulls nowhere
+    # a cable without force has no direction
     direction = at_frame / np.maximum(np.linalg.norm(at_frame, axis=-1, keepdims=True), _TINY)
     slope: Array = np.einsum("...ik,...ijk->...ij", direction, forces)
     return slope
 
 
 def _leaving(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array) -> Array:
-    """Tension slopes of cables from pulleys, by H = T + T^2/(2 EA) - w z, which is one number from end to end.
+    """Derivatives of the tension with pulleys, by H = T + T^2/(2 EA) - w z, which is constant along the cable.
 
     Shapes: forces (..., m, 7, 3).
     """
@@ -171,7 +172,7 @@ def _leaving(state: Equilibrium, slopes: CableSlopes, forces: Array, ends: Array
 
 
 def _weight(state: Equilibrium) -> Array:
-    """Weight of the cables a length, as their model sees it [N/m], shape (..., m)."""
+    """Cable weight per length in the cable model [N/m], shape (..., m)."""
     cables = state.cables
     weight = 0.0 if cables.model.weightless else cables.cable.linear_density * cables.gravity
     return np.broadcast_to(weight, cables.shape)

@@ -1,4 +1,4 @@
-"""Stiffness of the platform on its cables, what its pose is sensitive to, and how it vibrates."""
+"""Stiffness of the platform on its cables, sensitivities of its pose, and its natural modes."""
 
 from __future__ import annotations
 
@@ -15,39 +15,40 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import CableSlopes, cable_slopes, on_platform, tension_slopes
 from sagline.statics.strings import strings_below, strings_of
 
-_SINGULAR = 1e-14  # determinant, at diagonal elements of 1
-# of the largest square of a frequency: less positive, and less negative, is rounding
+_SINGULAR = 1e-14  # relative limit of a determinant, for diagonal elements of 1
+# relative to the largest squared frequency: smaller positive, and smaller negative, values are rounding
 NEUTRAL, UNSTABLE = 1e-13, 1e-10
-_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # a cable of a state, while it is computed
+_STIFFNESS_BYTES, _MODES_BYTES = 2500.0, 800.0  # memory per cable of a state, during the calculation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stiffness(Result):
     """Result of `stiffness`, single or with a leading axis N.
 
-    Motions are (displacement of the center of mass [m], rotation vector [rad]), wrenches (force [N], moment [N m])
-    about it, all in world axes. Sensitivities are zero in motions that the robot's pattern does not have, and NaN where
-    the stiffness is singular.
+    Motions are (displacement of the center of mass [m], rotation vector [rad]); wrenches are (force [N], moment [N m])
+    about it, all in world axes. Sensitivities are zero for motions outside the robot's motion pattern, and NaN if the
+    stiffness is singular.
 
     Attributes:
-        state: The state it belongs to.
+        state: The equilibrium of the calculation.
         matrix: -d(wrench of the cables)/d(motion) at fixed lengths: elastic, sag and geometric stiffness, shape
-            (..., 6, 6). Symmetric except for half the given moment, whose direction does not turn with the platform.
+            Symmetric except for half the given moment, whose direction does not rotate with the platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
         stiffness_sensitivity: d(motion)/d(axial stiffness) of each cable, shape (..., 6, m) [m/N, rad/N].
-        pulley_radius_sensitivity: d(motion)/d(pulley radius) of each cable, the length off the drum held, shape
-            (..., 6, m) [m/m, rad/m]; of the shallow models as of the exact one, as is the next.
-        dead_cable_sensitivity: d(motion)/d(dead length) in the same way, shape (..., 6, m) [m/m, rad/m].
-        cable_stiffness: dT/dB of each cable, T the force on its platform end, B that end's position, world axes, shape
-            (..., m, 3, 3) [N/m].
+        pulley_radius_sensitivity: d(motion)/d(pulley radius) of each cable at constant length off the drum, shape (...,
+            6, m) [m/m, rad/m]; available for the shallow models too, like dead_cable_sensitivity.
+        dead_cable_sensitivity: d(motion)/d(dead length) at constant length off the drum, shape (..., 6, m) [m/m,
+            rad/m].
+        cable_stiffness: dT/dB of each cable, T the force on its platform end, B the position of this end, world axes,
+            shape (..., m, 3, 3) [N/m].
         frame_anchor_sensitivity: d(motion)/d(frame anchor, world axes) at fixed lengths, shape (..., 6, m, 3)
             [m/m, rad/m].
         platform_anchor_sensitivity: d(motion)/d(platform anchor, platform frame) at fixed lengths, shape (..., 6, m, 3)
             [m/m, rad/m].
-        tension_sensitivity: d(tension at the frame end of cable i)/dL_j while the platform keeps its balance, shape
-            (..., m, m) [N/m].
+        tension_sensitivity: d(tension at the frame end of cable i)/dL_j with the platform in equilibrium, shape (...,
+            m, m) [N/m].
         null_lengths: Changes of length that do not move the platform, to first order: orthonormal columns, shape
             (..., m, m - n), n the number of free motions; no columns if m <= n.
     """
@@ -72,10 +73,10 @@ class Modes(Result):
     """Result of `modes`, single or with a leading axis N; n is the number of free motions.
 
     Attributes:
-        state: The state it belongs to.
-        frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for a motion that nothing holds and nothing
-            pushes, NaN for one in which the platform falls.
-        shape: Motions (displacement of the center of mass, rotation vector, world axes) of unit modal mass, one a
+        state: The equilibrium of the calculation.
+        frequency: Natural frequencies [Hz], ascending, shape (..., n); 0 for a motion without stiffness, NaN for an
+            unstable motion.
+        shape: Motions (displacement of the center of mass, rotation vector, world axes) of unit modal mass, one per
             column, shape (..., 6, n) [m/sqrt(kg), rad/(sqrt(kg) m)].
     """
 
@@ -85,10 +86,10 @@ class Modes(Result):
 
     @property
     def above_strings(self) -> Flags:
-        """True for modes above the lowest frequency at which any cable rings as a string, its ends held.
+        """True for modes above the lowest string frequency of any cable with both ends fixed.
 
-        Above it the platform's modes are no approximation to those of the robot, whose cables take part in them: see
-        `vibration`. False for a motion that is not held, shape (..., n).
+        Above this frequency the platform modes do not approximate the modes of the robot, because the cables take part
+        in these: see `vibration`. Shape (..., n); False for a motion without stiffness.
         """
         frequency = np.nan_to_num(self.frequency.reshape(-1, self.frequency.shape[-1]))
         below = strings_below(strings_of(self.state), frequency)
@@ -96,19 +97,19 @@ class Modes(Result):
 
 
 def stiffness(state: Equilibrium) -> Stiffness:
-    """Stiffness of the platform at fixed unstrained lengths, and what its pose is sensitive to; all analytic.
+    """Stiffness of the platform at fixed unstrained lengths, and sensitivities of its pose; all analytic.
 
     Args:
         state: An equilibrium, single or N of them, from `inverse` or `forward`.
 
     Returns:
-        Stiffness; NaN where the state has no lengths, and for straight cables, which have none.
+        Stiffness; NaN if the state has no lengths, or the cables are straight (their stiffness is undefined).
 
     Raises:
-        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
 
     Examples:
-        How far 100 N upwards lift the platform, and how far 1 mm more of cable 0 does:
+        Platform height change due to 100 N upward, and due to 1 mm more length of cable 0:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -146,13 +147,13 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
 
 def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """A frame end moved by da changes its cable as the platform end moved by -da would, shape (..., 6, m, 3)."""
+    """Frame anchor sensitivity: moving a frame end by da acts like moving the platform end by -da."""
     columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
     return np.stack(columns, axis=-1)
 
 
 def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Array) -> Array:
-    """An anchor moved by db moves the platform end by Q db, and so the point its force acts on, (..., 6, m, 3)."""
+    """Platform anchor sensitivity: a change db moves the platform end and its force by Q db, shape (..., 6, m, 3)."""
     rotation = state.pose.matrix[..., None, :, :]
     columns = []
     for k in range(3):
@@ -164,14 +165,14 @@ def _by_platform_anchor(state: Equilibrium, slopes: CableSlopes, compliance: Arr
 
 
 def _tension_by_length(state: Equilibrium, slopes: CableSlopes, by_length: Array) -> Array:
-    """d(tension at the frame end of cable i)/dL_j of the platform in equilibrium, shape (..., m, m)."""
+    """d(tension at the frame end of cable i)/dL_j with the platform in equilibrium, shape (..., m, m)."""
     by_motion, own = tension_slopes(state, slopes)
     found: Array = by_motion @ by_length + own[..., None] * np.eye(own.shape[-1])
     return found
 
 
 def _null_space(matrix: Array) -> Array:
-    """Orthonormal columns that matrices (..., n, m) take to zero, (..., m, m - n); NaN for a matrix with NaN."""
+    """Orthonormal basis of the null space of matrices (..., n, m), shape (..., m, m - n); NaN for a matrix with NaN."""
     n, m = matrix.shape[-2:]
     lost = np.isnan(matrix).any(axis=(-1, -2), keepdims=True)
     rows: Array = np.linalg.svd(np.where(lost, 0.0, matrix), full_matrices=True)[2][..., min(n, m) :, :]
@@ -179,16 +180,16 @@ def _null_space(matrix: Array) -> Array:
 
 
 def modes(state: Equilibrium) -> Modes:
-    """Natural frequencies and shapes of the platform on its cables, whose own mass does not swing.
+    """Natural frequencies and mode shapes of the platform on its cables; cable mass does not vibrate.
 
     Args:
-        state: An equilibrium, single or N of them. Its pattern's motions must have mass: give an inertia.
+        state: An equilibrium, single or N of them. The free motions must have mass: give an inertia.
 
     Returns:
-        Modes; NaN where the state has no lengths.
+        Modes; NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
 
     Examples:
         >>> import numpy as np
@@ -212,10 +213,10 @@ def modes(state: Equilibrium) -> Modes:
 
 
 def natural_frequency(squares: Array) -> Array:
-    """Frequencies [Hz] of squares of angular frequencies, shape (..., n), n those of one platform.
+    """Frequencies [Hz] from squares of angular frequencies, shape (..., n), n per platform.
 
-    What nothing holds and nothing pushes, as a turn about a single rope, has 0 Hz: squares that are rounding. What
-    falls has none: NaN.
+    A motion without stiffness, such as a rotation about a single rope, has 0 Hz: its square is only rounding. An
+    unstable motion has no frequency: NaN.
     """
     largest = np.abs(squares).max(axis=-1, keepdims=True, initial=0.0)
     known = np.where(squares > NEUTRAL * largest, squares, np.where(squares < -UNSTABLE * largest, np.nan, 0.0))
@@ -228,7 +229,7 @@ def _check_state(state: Equilibrium, cable_bytes: float) -> None:
 
 
 def compliance_of(freedom: Array, matrix: Array) -> Array:
-    """Inverse of a stiffness on the free motions (n, 6), zero on the others; NaN where it is singular."""
+    """Inverse of a stiffness on the free motions (n, 6), zero for the other motions; NaN if it is singular."""
     return freedom.T @ _inverse(freedom @ matrix @ freedom.T) @ freedom
 
 
@@ -238,7 +239,8 @@ def _inverse(matrix: Array) -> Array:
     known = np.where(np.isnan(matrix).any(axis=(-1, -2), keepdims=True), 0.0, matrix)
     diagonal = np.abs(np.einsum("...ii->...i", known))
     scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    balanced = known / (scale[..., :, None] * scale[..., None, :])  # newtons and newton meters alike
+    # equilibrated rows and columns, so that N and N m have the same scale
+    balanced = known / (scale[..., :, None] * scale[..., None, :])
     lost = np.abs(np.linalg.det(balanced))[..., None, None] < _SINGULAR
     inverse: Array = np.linalg.inv(np.where(lost, unit, known))
     return np.where(lost, np.nan, inverse)

@@ -1,4 +1,4 @@
-"""Cables as strings: the data of their vibrations about an equilibrium."""
+"""Cables as strings: data for their vibrations about an equilibrium."""
 
 from __future__ import annotations
 
@@ -17,22 +17,23 @@ from sagline.robot.batch import anchors_of, cables_of, first_of
 from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import cable_table
 
-FOLD = 1e-6  # of its weight: a cable whose least tension is below is folded, and has no linear vibration
-COUNTING = 0.75 * np.pi  # phase of an element [rad] for a count, below pi: errs by 1e-13 of a frequency
-SLACK = 1e-7  # of EA: one whose least tension is below is as slack; its two stiffnesses are too far apart to compute
+FOLD = 1e-6  # relative to its weight: a cable with a smaller minimum tension is folded and has no linear vibration
+COUNTING = 0.75 * np.pi  # phase of an element [rad] for the mode count, below pi: relative frequency error 1e-13
+# relative to EA: a cable with a smaller minimum tension is slack; its two stiffnesses differ too much to compute
+SLACK = 1e-7
 _TINY = 1e-300
 
 
 class Strings(NamedTuple):
-    """The cables of N states."""
+    """String data of the cables of N states."""
 
     table: Array  # columns as in `sagline.kernels.dynamics.string`, shape (N, m, STRING_COLUMNS)
-    axes: Array  # of each cable in the world: level along its plane, normal to the plane, upward, shape (N, m, 3, 3)
-    taut: Flags  # which have linear vibrations: neither folded nor slack, shape (N, m)
+    axes: Array  # axes of each cable in the world: horizontal in its plane, normal to it, upward, shape (N, m, 3, 3)
+    taut: Flags  # True for cables with linear vibrations: neither folded nor slack, shape (N, m)
 
 
 def strings_of(state: Equilibrium) -> Strings:
-    """Data of the cables of an equilibrium as strings."""
+    """String data of the cables of an equilibrium."""
     cables = state.cables
     m = cables.shape[-1]
     material = cables_of(state.robot)
@@ -61,7 +62,7 @@ def strings_of(state: Equilibrium) -> Strings:
 
 
 def strings_below(strings: Strings, frequency: Array) -> Indices:
-    """Number of natural frequencies of the cables with both ends held, by the count of Wittrick and Williams.
+    """Number of natural frequencies of the cables with both ends fixed, by the Wittrick-Williams count.
 
     Shapes: frequency (N, F) [Hz]; returns (N, F, m).
     """
@@ -77,7 +78,7 @@ def strings_below(strings: Strings, frequency: Array) -> Indices:
 
 
 def undamped(frequency: Array) -> Array:
-    """Frequencies as kernels take them.
+    """Undamped frequencies in the form for kernels.
 
     Shapes: frequency (N, F) [Hz]; returns (N, F, WAVE_COLUMNS).
     """
@@ -89,7 +90,7 @@ def undamped(frequency: Array) -> Array:
 
 
 def _axes(state: Equilibrium) -> Array:
-    """Axes of each cable, one a row, shape (..., m, 3, 3); those of a vertical cable are the world's."""
+    """Axes of each cable, one per row, shape (..., m, 3, 3); world axes for a vertical cable."""
     anchors = anchors_of(state.robot)
     turned = anchors.platform @ np.swapaxes(state.pose.matrix, -1, -2)
     level = (state.pose.position[..., None, :] + turned - anchors.frame)[..., :2]

@@ -1,4 +1,4 @@
-"""Robots and poses as kernels take them, and the chords of the cables."""
+"""Robots and poses in the form for kernels, and chord geometry of the cables."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def pose_rows(pose: Pose) -> Array:
 
 
 def robot_terms(robot: Robots) -> tuple[Array, Array, Array]:
-    """A robot, or several, as kernels take it.
+    """Data of one robot or of several in the form for kernels.
 
     Returns (n, 6).
     """
@@ -64,7 +64,7 @@ def _cable_rows(robot: Robot) -> Array:
 
 
 def _behind(robot: Robot) -> Array:
-    """Data behind the frame anchors: pulley radius, entry, dead length and its rise, (m, 4)."""
+    """Routing data of the cables: pulley radius, entry, dead length and its rise, (m, 4)."""
     none = np.zeros(robot.cable_count)
     run = (none, none) if robot.winches is None else (robot.winches.dead_cable, robot.winches.dead_rise)
     return np.stack((*pulleys_of(robot), *run), axis=1)
@@ -83,7 +83,7 @@ def chord_geometry(robot: Robots, pose: Pose) -> Array:
 
 
 def touching_angle(robot: Robot, pose: Pose) -> Array:
-    """Wrap angle psi of straight cables: where the lines from the platform ends touch the pulleys.
+    """Wrap angle psi of straight cables: defined by the tangents from the platform ends to the pulleys.
 
     Returns (m,) [rad].
     """
@@ -94,7 +94,7 @@ def touching_angle(robot: Robot, pose: Pose) -> Array:
 
 
 def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = None) -> None:
-    """Refuse poses at which a cable has no chord: its ends coincide, or no line from its pulley leads to its end."""
+    """Refuse poses at which a cable has no chord: its ends coincide, or no tangent to its pulley exists."""
     chord = (chord_geometry(robot, pose) if geometry is None else geometry)[:, rows.CHORD]
     missing = np.argwhere(~(chord >= SHORTEST_CHORD))
     if not len(missing):
@@ -114,10 +114,10 @@ def refuse_missing_chords(robot: Robots, pose: Pose, geometry: Array | None = No
 
 
 def _inside_pulley(item: str, robot: Robot, pose: Pose, cable: int, radius: float) -> CableGeometryError:
-    """The error of a platform end that no line from its pulley leads to, or that lies on the pulley."""
+    """Error for a platform end inside or on its pulley: no tangent to the pulley exists."""
     anchors = anchors_of(robot)
     away = pose.transform(anchors.platform)[cable] - anchors.frame[cable]
-    ahead = float(pulleys_of(robot).entry[cable] * away[2])  # along the cable's travel where it enters
+    ahead = float(pulleys_of(robot).entry[cable] * away[2])  # in the direction from drum to pulley at the entry
     half = np.sqrt(max(radius**2 - max(ahead, 0.0) ** 2, 0.0))
     near = f"< {radius - half:.6g} m or " if ahead > 0.0 else ""
     return CableGeometryError(

@@ -1,1 +1,1 @@
-"""Tension distribution of redundant cables: methods, limits, and the polygon of feasible tensions."""
+"""Tension distribution for redundant cables: methods, limits, and the polygon of feasible tensions."""

@@ -1,4 +1,4 @@
-"""Margins of a pose: tension limits, and extra load."""
+"""Margins of a pose: distance to tension limits, and additional load."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.tables import pose_rows, robot_terms
 from sagline.tension.method import LIMITS_OF
 
-BLOCK = 1 << 12  # poses at once: a tenth of a second, after which an interrupt is heard
+BLOCK = 1 << 12  # poses per block: a tenth of a second, after which an interrupt is handled
 
 
 def limit_margin(state: Equilibrium) -> Array:
-    """Distance of each pose's tensions to their nearest limit.
+    """Distance of the tensions of each pose to their nearest limit.
 
     Args:
-        state: Robot or robots, and cables, `plan.state` for instance.
+        state: Robot or robots, and cables; `plan.state` for instance.
 
     Returns:
-        Smallest distance [N] of the quantity that the robot's limits name, shape () or (N,): 0 where a cable is at its
-        limit, NaN where there are no tensions. It depends on the tension distribution.
+        Smallest distance [N] of the limited tension, shape () or (N,): 0 if a cable is at its limit, NaN where there
+        are no tensions. It depends on the tension distribution.
 
     Raises:
-        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
 
     Examples:
         >>> import sagline as sl
@@ -42,7 +42,7 @@ def limit_margin(state: Equilibrium) -> Array:
 
 
 def cable_margins(state: Equilibrium) -> Array:
-    """Distance of each cable's tension to its nearest limit: what `limit_margin` takes the smallest of.
+    """Distance of the tension of each cable to its nearest limit; `limit_margin` is the smallest of them.
 
     Returns (m,) or (N, m) [N].
     """
@@ -52,20 +52,21 @@ def cable_margins(state: Equilibrium) -> Array:
 
 
 def capacity_margin(state: Equilibrium) -> Array:
-    """Extra load that each pose can take, whatever its direction, before no tensions within the limits balance it.
+    """Largest additional force, in any direction, that tensions within the limits can balance at each pose.
 
-    The moment stays as it is. Exact for weightless cables; with sag the pulls stay those of the state. Grows with the
-    binomial of m over n - 1: 56 faces for eight cables, some twenty microseconds a pose.
+    The moment remains unchanged. Exact for weightless cables; for sagging cables, the sag forces of the state are kept.
+    The computing time grows with the binomial coefficient of m over n - 1: 56 faces for eight cables, about twenty
+    microseconds per pose.
 
     Args:
-        state: Robot or robots, poses, wrench and cables, `plan.state` for instance.
+        state: Robot or robots, poses, wrench and cables; `plan.state` for instance.
 
     Returns:
-        Force [N], shape () or (N,), for any tension distribution; infinite where no force alone can make the pose fail,
-        NaN where there are no tensions.
+        Force [N], shape () or (N,), independent of the tension distribution; infinite if no additional force makes the
+        pose infeasible, NaN where there are no tensions.
 
     Raises:
-        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).
 
     Examples:
         >>> import sagline as sl

@@ -1,4 +1,4 @@
-"""Interface of all tension distribution methods, and the form in which kernels take them."""
+"""Interface of all tension distribution methods, and their data in the form for kernels."""
 
 from __future__ import annotations
 
@@ -24,25 +24,25 @@ VARIABLES = {
     "frame_end": codes.FRAME_END_TENSION,
 }
 
-# rows of the preferences among cables
-ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; tension to be near [N]
+# rows of the array of cable preferences
+ROOT_WEIGHT, GOAL = 0, 1  # square root of a cable's weight; target tension [N]
 PREFERENCE_ROWS = 2
 
 
 @dataclass(frozen=True, slots=True)
 class TensionMethod:
-    """A choice among the feasible tensions: a code that the kernels understand, and its options.
+    """Rule that selects one of the feasible tension sets: a code for the kernels, and its options.
 
     Attributes:
         code: Code of the method in the kernels (`sagline.kernels.codes`).
-        needs_upper_limits: Whether every cable must have a finite upper limit.
-        most_redundant: Largest number of redundant cables it can share among; None for any.
-        continuous: Whether tensions follow the pose without jumps.
-        variable: The tension in which the choice is made: "chord" (default), "horizontal", the article's T_x, or
-            "frame_end", where a winch's load cell sits. Their minimum-norm answers differ. A vertical cable has no
-            horizontal tension: under an anchor such a choice finds the pose singular.
-        lowest_point_margin: The article's T_adj of (54) [N]: bounds T_x below by w D/(2 |tan phi|) + T_adj, which
-            keeps the lowest point of each cable outside its span. None (default) leaves the bound out.
+        needs_upper_limits: True if every cable must have a finite upper limit.
+        most_redundant: Largest number of redundant cables of the method; None for any number.
+        continuous: True if tensions follow the pose without jumps.
+        variable: The tension variable of the method: "chord" (default), "horizontal", the article's T_x, or
+            "frame_end", the tension at the winch's load cell. The minimum-norm results of the variables differ. A
+            vertical cable has no horizontal tension: directly under an anchor, the pose is singular in this variable.
+        lowest_point_margin: The article's T_adj of (54) [N]: requires T_x >= w D/(2 |tan phi|) + T_adj, which keeps the
+            lowest point of each cable outside its span. None (default): no such bound.
     """
 
     code: ClassVar[int]
@@ -64,22 +64,22 @@ class TensionMethod:
 
     @property
     def alone(self) -> TensionMethod:
-        """The method for a pose that has no pose before it; methods without memory stay what they are."""
+        """The method for a pose without a previous pose; methods without memory remain unchanged."""
         return self
 
     @property
     def parameter(self) -> float:
-        """The one number some methods have: an exponent, or which optimum."""
+        """The numerical parameter of some methods: an exponent, or the code of an optimum."""
         return 0.0
 
     def preference(self, cables: int) -> Array:
-        """Root weights and goals of the cables as kernels know them.
+        """Root weights and targets of the cables in the form for kernels.
 
         Args:
             cables: Number of cables m.
 
         Returns:
-            Array of shape (PREFERENCE_ROWS, m); goals in N.
+            Array of shape (PREFERENCE_ROWS, m); targets in N.
         """
         rows = np.zeros((PREFERENCE_ROWS, cables))
         rows[ROOT_WEIGHT] = 1.0
@@ -87,17 +87,17 @@ class TensionMethod:
 
     @property
     def variable_code(self) -> int:
-        """The variable as kernels know it."""
+        """Code of the tension variable for kernels."""
         return VARIABLES[self.variable]
 
     @property
     def validity(self) -> float:
-        """T_adj as kernels know it: NaN for none."""
+        """T_adj in the form for kernels: NaN for None."""
         return float("nan") if self.lowest_point_margin is None else float(self.lowest_point_margin)
 
 
 def shared_tension(state: Equilibrium, variable: Variable) -> Array:
-    """Tensions of a state in the variable of the distribution.
+    """Tensions of a state in the variable of the tension distribution method.
 
     Returns (m,) or (N, m) [N].
     """
@@ -113,22 +113,22 @@ LIMITS_OF = {"chord": codes.LIMITS_OF_CHORD, "frame_end": codes.LIMITS_OF_FRAME_
 
 
 class Options(NamedTuple):
-    """Model, method and limits as kernels take them first."""
+    """Model, method and limits: the first arguments of the kernels."""
 
     model: ModelTerms  # code, k_h, k_p
-    sharing: DistributionTerms  # method, parameter, variable, root weights and goals of the cables
-    limits: LimitTerms  # which quantity is limited, and the article's T_adj [N] or NaN
+    sharing: DistributionTerms  # method, parameter, variable, root weights and targets of the cables
+    limits: LimitTerms  # limited tension, and the article's T_adj [N] or NaN
 
 
 def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> Options:
-    """Model, method and limits as kernels take them first."""
+    """Model, method and limits: the first arguments of the kernels."""
     shared = first_of(robot)
     if isinstance(robot, Robot):
         check_sharing(robot, tension)
     else:
         for index, one in enumerate(robot):
             check_sharing(one, tension, f"robot[{index}]")
-    # a weightless cable has one tension, which is linear even where it is zero
+    # A weightless cable has the same tension everywhere, which is linear even at zero tension.
     alike = model.weightless and tension.variable == "frame_end"
     variable = codes.CHORD_TENSION if alike else tension.variable_code
     weight, goal = (locked(row) for row in tension.preference(shared.cable_count))
@@ -140,7 +140,7 @@ def kernel_options(robot: Robots, model: CableModel, tension: TensionMethod) -> 
 
 
 def takes_default_kernel(tension: TensionMethod) -> bool:
-    """True if a method is nearest to a reference in a linear variable: compiled first."""
+    """True if the method minimizes the distance to a reference in a linear variable; its kernel is compiled first."""
     return tension.code <= codes.QUADRATIC_PROGRAM and tension.variable_code != codes.FRAME_END_TENSION
 
 

@@ -1,4 +1,4 @@
-"""The twelve tension distribution methods, and all of them by name."""
+"""The twelve tension distribution methods, and a table of all of them by name."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from sagline.tension.method import GOAL, PREFERENCE_ROWS, ROOT_WEIGHT, TensionMe
 
 @dataclass(frozen=True, slots=True)
 class MinimumNorm(TensionMethod):
-    """The feasible tensions of least Euclidean norm: the projection of 0 onto the feasible set.
+    """The feasible tensions with the smallest Euclidean norm: the projection of 0 onto the feasible set.
 
-    Depends on the pose alone, so that a closed path closes; lets cables that are not needed go to their lower limits.
-    Choose it for plans that repeat and for low tensions throughout.
+    The result depends only on the pose, so that a closed path ends with the initial tensions. Cables that are not
+    needed are at their lower limits. Choose it for repeated motions and for low tensions in general.
 
     Source:
         Gia Luan & Truong Thinh 2020, (53); docs/model.md, section 5.
@@ -34,8 +34,8 @@ class MinimumNorm(TensionMethod):
 class Closest(TensionMethod):
     """The article's choice (55): nearest to the previous tension set, by projection onto the feasible polygon.
 
-    Follows a path smoothly, and depends on it: the first pose takes the minimum norm, and after a gap of
-    infeasible poses the last feasible set is the reference. In a batch of poses every pose stands alone.
+    Tensions change smoothly along a path but depend on it: the first pose takes the minimum norm, and after a gap of
+    infeasible poses the last feasible set is the reference. In a batch of poses, each pose is solved independently.
     Choose it for the smoothest tensions along one path.
 
     Source:
@@ -46,20 +46,20 @@ class Closest(TensionMethod):
 
     @property
     def alone(self) -> TensionMethod:
-        """The minimum norm."""
+        """The minimum norm: there is no previous tension set."""
         return MinimumNorm(self.variable, self.lowest_point_margin)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QuadraticProgram(TensionMethod):
-    """The feasible tensions of least sum of weights times squared distances to targets.
+    """The feasible tensions with the smallest weighted sum of squared distances to targets.
 
-    In tensions weighted by the roots this is again a projection onto the feasible set: exact, and without iterations
-    for two redundant cables or fewer. Continuous. Choose it to keep a pretension, or to spare some cables.
+    In tensions scaled by the root weights this is a projection onto the feasible set: exact, and without iterations for
+    up to two redundant cables. Continuous. Choose it to keep a pretension, or to reduce the load of some cables.
 
     Attributes:
         weights: Weight of each cable, > 0, shape () or (m,).
-        target: Tension to be near [N], in the variable, >= 0, shape () or (m,).
+        target: Target tension [N], in the tension variable, >= 0, shape () or (m,).
 
     Source:
         Côté, Cardou & Gosselin 2016, "A tension distribution algorithm for cable-driven parallel robots operating
@@ -71,13 +71,13 @@ class QuadraticProgram(TensionMethod):
     target: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
-        """Check the options; keep the caller's numbers as arrays of our own."""
+        """Check the options; copy the caller's numbers into write-locked arrays."""
         TensionMethod.__post_init__(self)
         object.__setattr__(self, "weights", checked(self.weights, "weights", "", above=0.0))
         object.__setattr__(self, "target", checked(self.target, "target", "N", low=0.0))
 
     def preference(self, cables: int) -> Array:
-        """Root weights, and targets times them.
+        """Root weights, and targets multiplied by them.
 
         Args:
             cables: Number of cables m.
@@ -86,7 +86,7 @@ class QuadraticProgram(TensionMethod):
             Array of shape (PREFERENCE_ROWS, m).
 
         Raises:
-            InvalidValueError: If there are weights or targets for another number of cables.
+            InvalidValueError: If weights or targets are given for another number of cables.
         """
         rows = np.empty((PREFERENCE_ROWS, cables))
         for row, name, values in (
@@ -105,11 +105,11 @@ class QuadraticProgram(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class LowestSum(TensionMethod):
-    """The feasible tensions of least 1-norm: a corner of the feasible set.
+    """The feasible tensions with the smallest 1-norm: a corner of the feasible set.
 
-    The least motor torque in all; as many cables as are redundant stay at their limits. The corner jumps to another
-    one where the path turns the polygon, so the tensions are not continuous. Where a whole side is lowest, its point
-    of least norm is taken (for more than two redundant cables, one of its corners). Choose it for static loads.
+    Smallest total motor torque; at least as many cables as are redundant are at their limits. The tensions are not
+    continuous: along a path the optimum can jump to another corner. If all points of a side are optimal, the one with
+    the smallest norm is taken (for more than two redundant cables, one of its corners). Choose it for static loads.
 
     Source:
         Borgstrom, Jordan, Sukhatme, Batalin & Kaiser 2009, "Rapid computation of optimally safe tension
@@ -122,10 +122,10 @@ class LowestSum(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class LowestMaximum(TensionMethod):
-    """The feasible tensions of least infinity-norm; of those with the same largest tension, the ones of least norm.
+    """The feasible tensions with the smallest infinity-norm; if not unique, those with the smallest Euclidean norm.
 
-    Spares the most loaded cable, and so the winches' size; continuous in its largest tension but not in the others.
-    Choose it to size cables and drives; for motion take `PNorm`, which comes near it smoothly.
+    Minimizes the largest cable load, and so the required size of the winches. The largest tension is continuous, the
+    other tensions are not. Choose it to size cables and drives; for motion take `PNorm`, a smooth approximation.
 
     Source:
         Gosselin & Grenier 2011, "On the determination of the force distribution in overconstrained cable-driven
@@ -136,15 +136,15 @@ class LowestMaximum(TensionMethod):
     continuous: ClassVar[bool] = False
 
 
-LARGEST = 32.0  # beyond, the powers of small tensions leave nothing for Newton's method to see
+LARGEST = 32.0  # with larger exponents, powers of small tensions are lost by rounding in Newton's method
 
 
 @dataclass(frozen=True, slots=True)
 class PNorm(TensionMethod):
-    """The feasible tensions of least p-norm, the p-th root of the sum of their p-th powers.
+    """The feasible tensions with the smallest p-norm, the p-th root of the sum of their p-th powers.
 
-    Continuous for every p: p = 2 is `MinimumNorm`, large p comes near `LowestMaximum` without its jumps. Choose it,
-    with p from 4 to 8, to spare the most loaded cable on a moving platform.
+    Continuous for every p: p = 2 is `MinimumNorm`, large p approximates `LowestMaximum` without its jumps. Choose it,
+    with p from 4 to 8, to reduce the largest cable load of a moving platform.
 
     Attributes:
         p: Exponent, 2 to 32.
@@ -172,11 +172,11 @@ class PNorm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class Centroid(TensionMethod):
-    """The centroid of the feasible polygon, the barycenter; the middle of the interval for one redundant cable.
+    """The centroid (barycenter) of the feasible polygon; the center of the interval for one redundant cable.
 
-    Continuous, and far from all limits, so that slack and overload are far too; costs more tension than needed. The
-    same point in every variable. For more than two redundant cables take `AnalyticCenter`. Choose it for a stiff,
-    robust setup where energy does not count. A set without end has no centroid: the pose is UNBOUNDED.
+    Continuous and far from all limits, so slack and overload are unlikely; tensions are higher than necessary. The
+    result is the same in every variable. For more than two redundant cables take `AnalyticCenter`. Choose it for a
+    stiff, robust setup where energy is unimportant. An unbounded set has no centroid: the pose is UNBOUNDED.
 
     Source:
         Mikelsons, Bruckmann, Hiller & Schramm 2008, "A real-time capable force calculation algorithm for redundant
@@ -191,9 +191,10 @@ class Centroid(TensionMethod):
 class AnalyticCenter(TensionMethod):
     """The feasible tensions with the largest product of distances to all limits.
 
-    Smooth wherever the feasible set has an inside: no limit ever becomes active. Near the border of the workspace,
-    where the set shrinks to a point, it follows. Any number of redundant cables; the same point in every variable.
-    Choose it for controllers that need differentiable tensions. A set without end has no center: UNBOUNDED.
+    Smooth wherever the feasible set has an interior: no limit ever becomes active. Near the border of the workspace,
+    the set shrinks to a point, and the result converges to it. Any number of redundant cables; the result is the same
+    in every variable. Choose it for controllers that need differentiable tensions. An unbounded set has no center:
+    UNBOUNDED.
 
     Source:
         Di Paola, Goldsztejn, Zoso & Caro 2023, "Analytic center based tension distribution for cable-driven
@@ -205,10 +206,10 @@ class AnalyticCenter(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class ClosedForm(TensionMethod):
-    """The balanced tensions nearest to the middle of the limits, if they keep them.
+    """The balanced tensions nearest to the middle of the limits, if they satisfy the limits.
 
-    Linear in the wrench and smooth, but it misses part of the feasible poses: those are NOT_COVERED. Choose it where
-    every microsecond counts and the platform stays in the inner workspace.
+    Linear in the wrench and smooth, but some feasible poses get no result: NOT_COVERED. Choose it if every microsecond
+    counts and the platform stays in the inner workspace.
 
     Source:
         Pott, Bruckmann & Mikelsons 2009, "Closed-form force distribution for parallel wire robots".
@@ -220,10 +221,10 @@ class ClosedForm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class ImprovedClosedForm(TensionMethod):
-    """The closed form, but a cable that misses its limit most is held there and the rest shared again.
+    """The closed form, iterated: the cable that violates its limit most is fixed at it, and the rest is solved again.
 
-    As many times as there are redundant cables; covers nearly all of the feasible poses, and says NOT_COVERED for the
-    others. Continuous except at changes of the held cable. Choose it where ClosedForm ends too early.
+    The number of iterations is at most the number of redundant cables. Nearly all feasible poses get a result; the
+    others are NOT_COVERED. Continuous except when the fixed cable changes. Choose it if ClosedForm fails too early.
 
     Source:
         Pott 2014, "An improved force distribution algorithm for over-constrained cable-driven parallel robots".
@@ -236,10 +237,10 @@ class ImprovedClosedForm(TensionMethod):
 
 @dataclass(frozen=True, slots=True)
 class Puncture(TensionMethod):
-    """Entry into the limits on the line from the minimum-norm solution to the (improved) closed form.
+    """First point within the limits on the line from the minimum-norm solution to the (improved) closed form.
 
-    Low tensions at the price of a closed form; covers what `ImprovedClosedForm` covers. Choose it for low tensions on
-    hardware that can afford no polygon.
+    Low tensions at the computing time of a closed form; covers the same poses as `ImprovedClosedForm`. Choose it for
+    low tensions on hardware too slow for a polygon.
 
     Source:
         Mueller, Reichert & Bruckmann 2015, "Analysis of a real-time capable cable force computation method".
@@ -258,8 +259,8 @@ _OPTIMA = {"1-norm": WALK_SUM, "2-norm": WALK_NORM, "centroid": WALK_CENTROID}
 class PolygonWalk(TensionMethod):
     """The algorithm for n + 2 cables: walk around the feasible polygon, take its best point.
 
-    Its answers are those of `LowestSum`, `MinimumNorm` and `Centroid`, which cut the polygon instead and are quicker.
-    Choose it to compare with that algorithm as published.
+    Its results equal those of `LowestSum`, `MinimumNorm` and `Centroid`, which are faster because they clip the polygon
+    instead. Choose it for comparison with the published algorithm.
 
     Attributes:
         optimum: "1-norm", "2-norm" (default) or "centroid".

@@ -1,4 +1,4 @@
-"""The feasible tensions of one pose as a picture: a polygon in the null space of two redundant cables."""
+"""The feasible tensions of one pose for plotting: a polygon in the null space of up to two redundant cables."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.core.results import Result
 
 
 class Side(NamedTuple):
-    """Limit that is a side of the polygon.
+    """Tension limit that forms a side of the polygon.
 
     Attributes:
         cable: Index of the cable.
@@ -28,22 +28,21 @@ class Side(NamedTuple):
 class TensionPolygon(Result):
     """All tensions that balance one pose within their limits: tensions = origin + lambda basis.
 
-    With a sagging cable the balance depends on the tensions: this is the polygon of the last linearization, with the
-    pulls T_z - tau sin phi that the cables have at the minimum-norm tensions (docs/model.md, section 5).
+    For sagging cables the balance depends on the tensions: this is the polygon of the last linearization, with the sag
+    forces T_z - tau sin phi at the minimum-norm tensions (docs/model.md, section 5).
 
     Attributes:
         vertices: The article's Omega_lambda: corners, counter-clockwise, in coordinates of the null space [N], shape
-            (h, 2); for one redundant cable the ends of an interval, shape (2, 1), infinite where it has none; for no
-            redundant cable one point without coordinates, shape (1, 0). Shape (0, r) where nothing is feasible.
-        tensions: The article's Omega_t: tensions at the vertices [N], in the distribution's variable, shape (h, m).
-        sides: The limit that each side is, from vertex k to vertex k + 1 (at vertex k for an interval); None where the
-            polygon has no such side: it is unbounded there, and the vertices at both ends only represent infinity.
-        bounded: Whether every side is a limit.
+            (h, 2); for one redundant cable the ends of an interval, shape (2, 1), possibly infinite; for no redundant
+            cable one point without coordinates, shape (1, 0). Shape (0, r) if no tensions are feasible.
+        tensions: The article's Omega_t: tensions at the vertices [N], in the tension variable, shape (h, m).
+        sides: The limit of each side, from vertex k to vertex k + 1 (at vertex k for an interval); None where the
+            polygon is unbounded: the vertices at both ends of such a side represent infinity.
+        bounded: True if every side is a limit.
         basis: Orthonormal basis of the null space, shape (r, m).
-        origin: The minimum-norm tensions of the balance without limits [N], shape (m,).
-        scale: The distribution's variable is scale times the chord tension plus offset, shape (m,): 1, or cos phi for
-        the
-            horizontal tension, or the slope of the frame-end tension.
+        origin: The minimum-norm tensions that balance the wrench, without limits [N], shape (m,).
+        scale: The tension variable is scale times the chord tension plus offset, shape (m,): 1, or cos phi for the
+            horizontal tension, or the derivative of the frame-end tension.
         offset: Zero except for the frame-end tension [N], shape (m,).
     """
 
@@ -57,16 +56,16 @@ class TensionPolygon(Result):
     offset: Array
 
     def coordinates(self, chord_tension: ArrayLike) -> Array:
-        """Coordinates of tensions of this pose in the polygon.
+        """Coordinates in the polygon of given tensions at this pose.
 
         Args:
-            chord_tension: Chord tensions that balance the pose [N], shape (..., m), as `Plan.chord_tension` has them.
+            chord_tension: Chord tensions that balance the pose [N], shape (..., m), as in `Plan.chord_tension`.
 
         Returns:
             Coordinates in the null space [N], shape (..., r); NaN for tensions that are NaN.
 
         Raises:
-            InvalidValueError: If they are no numbers, or not one a cable.
+            InvalidValueError: If they are not numbers, or not one per cable.
         """
         given = checked(chord_tension, "chord_tension", "N", missing=True)
         if given.ndim == 0 or given.shape[-1] != self.scale.size:

@@ -1,4 +1,4 @@
-"""Singular poses: the motion of the platform that no cable resists."""
+"""Singular poses: the unconstrained motion of the platform."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from sagline.statics.balance import structure_matrix
 
 
 class UnresistedMotion(NamedTuple):
-    """The motion that the cables of a pose resist least.
+    """The motion that the cables of a pose constrain least.
 
     Attributes:
         twist: Velocity of the center of mass and angular velocity, world axes, shape (6,); its angular part has length
-            1, or its linear part where it does not turn.
-        resistance: Largest rate of a cable's length in this motion, relative to that of the motion it resists
-            most; at a singular pose 0 up to rounding.
-        text: The motion in words.
+            1, or its linear part if the platform does not rotate.
+        resistance: Largest rate of a cable's length in this motion, relative to that in the most constrained motion; 0
+            up to rounding at a singular pose.
+        text: Description of the motion.
     """
 
     twist: Array
@@ -31,17 +31,17 @@ class UnresistedMotion(NamedTuple):
 
 
 def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
-    """The motion of the platform that changes the cables' lengths least, at a singular pose not at all.
+    """The motion of the platform that changes the cable lengths least; at a singular pose it does not change them.
 
     Args:
         robot: The robot.
         pose: One pose.
 
     Returns:
-        UnresistedMotion: the twist, how much the cables still resist it, and the motion in words.
+        UnresistedMotion: the twist, its resistance by the cables, and a description of the motion.
 
     Raises:
-        InvalidValueError: If there is not one pose.
+        InvalidValueError: If pose is not a single pose.
         CableGeometryError: If both ends of a cable coincide.
 
     Examples:
@@ -56,7 +56,8 @@ def unresisted_motion(robot: Robot, pose: Pose) -> UnresistedMotion:
     lever = float(np.linalg.norm(robot.platform_anchors - robot.center_of_mass, axis=1).max()) or 1.0
     units = np.where(np.linalg.norm(robot.freedom[:, 3:], axis=1) > 0.5, 1.0 / lever, 1.0)
     structure = units[:, None] * structure_matrix(robot, pose)
-    # the right vectors, as many as cables squared, are not asked for where the left ones are whole without
+    # The right singular vectors, whose number is that of the cables squared, are computed only if the left ones are not
+    # complete.
     left, values, _right = np.linalg.svd(structure, full_matrices=structure.shape[1] < structure.shape[0])
     twist = robot.freedom.T @ (units * left[:, -1])
     linear, angular = np.linalg.norm(twist[:3]), np.linalg.norm(twist[3:])
