@@ -1,1 +1,1 @@
-"""Motion of the robot in time."""
+"""Simulation of the robot's motion in time."""

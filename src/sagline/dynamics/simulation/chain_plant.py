@@ -27,15 +27,15 @@ from sagline.kernels.dynamics.progress import COUNTERS, FAILED
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LoadedPlatform:
-    """The rigid body of a platform with masses at its cables' ends; both have principal axes of their own."""
+    """Rigid body of the platform and the point masses at its cable ends, in its own principal axes."""
 
-    inertia: Array  # mass and principal moments of the whole, infinite where it does not turn, (4,)
-    center: Array  # of its mass, from that of the platform's, the platform's principal axes [m], (3,)
-    axes: Array  # its principal axes in those of the platform, one a column, (3, 3)
+    inertia: Array  # mass and principal moments of the whole body, infinite for a blocked rotation, (4,)
+    center: Array  # its center of mass relative to that of the platform, principal axes of the platform [m], (3,)
+    axes: Array  # its principal axes in those of the platform, one per column, (3, 3)
 
     @classmethod
     def of(cls, inertia: Array, masses: Array, ends: Array) -> LoadedPlatform:
-        """A platform and masses at places on it; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
+        """A platform with point masses at its cable ends; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
         mass = inertia[0] + masses.sum()
         center = (masses @ ends) / mass
         turns = np.isfinite(inertia[1:])
@@ -44,17 +44,17 @@ class LoadedPlatform:
         if turns.all():
             moments, axes = np.linalg.eigh(whole)
             axes[:, 0] *= np.sign(np.linalg.det(axes))
-        else:  # a planar motion, about the last axis, or none
+        else:  # a planar motion, about the last axis, or no rotation
             moments, axes = np.where(turns, np.diag(whole), np.inf), np.eye(3)
         return cls(np.array([mass, *moments]), center, axes)
 
     def levers(self, ends: Array) -> Array:
-        """Places on the platform (m, 3) as the whole sees them, from its center along its axes."""
+        """Positions on the platform (m, 3) relative to the center of the whole body, in its axes."""
         levers: Array = (ends - self.center) @ self.axes
         return levers
 
     def state(self, place: Array, turning: Array, velocity: Array, spin: Array) -> Array:
-        """The row of the whole's state, where the platform is and moves."""
+        """State row of the whole body from the pose and velocity of the platform."""
         # shapes: place (3,) [m]; turning (3, 3); velocity (3,) [m/s]; spin (3,) [rad/s]
         lever, axes = turning @ self.center, turning @ self.axes
         moments = np.where(np.isinf(self.inertia[1:]), 0.0, self.inertia[1:])
@@ -63,7 +63,7 @@ class LoadedPlatform:
         return np.concatenate((place + lever, quaternion, velocity + np.cross(spin, lever), momentum))
 
     def platform_states(self, states: Array) -> Array:
-        """States of the whole (N, 13) as those of the platform; both with the angular velocity in momentum's place."""
+        """Platform states from states of the whole body (N, 13); both contain angular velocity instead of momentum."""
         turning = Rotation.from_quat(states[:, body.TURN : body.VELOCITY]).as_matrix() @ self.axes.T
         lever, spin = turning @ self.center, states[:, body.MOMENTUM :]
         place = states[:, : body.TURN] - lever
@@ -71,56 +71,57 @@ class LoadedPlatform:
         return np.concatenate((place, Rotation.from_matrix(turning).as_quat(), velocity, spin), axis=1)
 
     def spin(self, state: Array) -> Array:
-        """Angular velocity of a state of the whole, world axes [rad/s], (3,)."""
+        """Angular velocity in a state of the whole body, world axes [rad/s], (3,)."""
         axes = Rotation.from_quat(state[body.TURN : body.VELOCITY]).as_matrix()
         spin: Array = axes @ ((axes.T @ state[body.MOMENTUM :]) / self.inertia[1:])
         return spin
 
 
 def _about(masses: Array, places: Array) -> Array:
-    """Inertia of point masses (m,) at places (m, 3) about the origin."""
+    """Inertia of point masses (m,) at positions (m, 3) about the origin."""
     squares = (places * places).sum(axis=1)
     inertia: Array = (masses * squares).sum() * np.eye(3) - (masses[:, None] * places).T @ places
     return inertia
 
 
-FEWEST, MOST = 4, 500  # elements a cable
-SHORTEST: Final = 0.86  # of l sqrt(rho/EA): the limit of steps where the element at the frame is 0.4 l
+FEWEST, MOST = 4, 500  # elements per cable
+# relative to l sqrt(rho/EA): the stability limit of the step while the element at the frame has length 0.4 l
+SHORTEST: Final = 0.86
 SPARE: Final = 8  # nodes
-TRAVELS: Final = 20.0  # of a stretch wave from end to end: a cable without tension for so long is slack
-STRETCH: Final = 1.1  # of the longest length that is asked for; winches may overshoot
+TRAVELS: Final = 20.0  # travel times of a stretch wave between the ends: a cable without tension for this long is slack
+STRETCH: Final = 1.1  # relative to the longest required length, because winches may overshoot
 
 
 class _ChainRecords(Records):
     """Records of N steps from the kernel, with the shapes of the cables."""
 
     def __init__(self, count: int, cables: int, points: int) -> None:
-        """Room for so many steps."""
+        """Allocate the arrays for a number of steps."""
         super().__init__(count, cables)
         self.points = np.full((count, cables, points, 3), np.nan)
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """As the kernel takes them."""
+        """The arrays in the form for the kernel."""
         assert self.points is not None
         return *super().arrays, self.points
 
 
 class ChainPlant(Plant):
-    """A robot on lumped cables in the midst of a motion.
+    """State of a robot with lumped-mass cables during a simulation.
 
-    The kernel moves the platform with what it carries of the cables, half an element of each; what it writes down is
-    turned into the platform's own motion.
+    The kernel moves the platform together with half an element of each cable; its records are converted to the motion
+    of the platform alone.
 
     Attributes:
-        nodes: Elements a cable at the start.
+        nodes: Elements per cable at the start.
     """
 
     kernel: ClassVar[Any] = staticmethod(chains.run_chains)
     cable_mass: ClassVar[str] = "lumped"
 
     def __init__(self, given: InitialConditions, data: Array, nodes: int, losses: Damping) -> None:
-        """Chains of a robot at rest, or at the speed of its path; data (DATA_ROWS, m)."""
+        """Chains of a robot at rest, or moving at the speed of its path; data (DATA_ROWS, m)."""
         state, robot = given.state, given.robot
         rest = chains_at_rest(state, nodes)
         super().__init__(robot, given.model, rest.pose, given.twist, state.unstrained_length, data)
@@ -150,14 +151,14 @@ class ChainPlant(Plant):
         self._set_node_speeds(velocity + np.cross(spin, self._ends @ turning.T), given.rate)
 
     def _set_node_speeds(self, at_platform: Array, rate: Array) -> None:
-        """Give the nodes the speeds between those of their cable's ends, of which one is that of what is let out."""
+        """Interpolate the node speeds between both cable ends, including the speed of cable paid out at the frame."""
         table, place, speed, n = self._chains[0], self._chains[1], self._chains[2], self.nodes
         at_exit = (rate / table[:, c.ELEMENT])[:, None] * (place[:, :, n - 1] - place[:, :, n])
         share = np.linspace(0.0, 1.0, n + 1)
         speed[:, :, : n + 1] = at_platform[..., None] * (1.0 - share) + at_exit[..., None] * share
 
     def arguments(self, rules: Any, numbers: Any, inputs: Any) -> Any:
-        """As those of `Plant`, for the kernel of chains."""
+        """Arguments as in `Plant`, for the kernel of chains."""
         lengths: TimeTable = inputs[0]
         if self._work.size != chain_run.ROOM + 2 * lengths.value.shape[1]:
             self._work = np.zeros(chain_run.ROOM + 2 * lengths.value.shape[1])
@@ -183,21 +184,21 @@ class ChainPlant(Plant):
         )
 
     def records(self, count: int) -> _ChainRecords:
-        """Room for records of so many steps."""
+        """Allocate records for a number of steps."""
         return _ChainRecords(count, len(self.cables), self.nodes + 1)
 
     def platform_states(self, states: Array) -> Array:
-        """Recorded states as those of the platform by itself."""
+        """Convert recorded states to states of the platform alone."""
         return self._carrier.platform_states(states)
 
     def remove_cable(self, cable: int) -> None:
-        """Take a cable away; half of its last element stays on the platform."""
+        """Remove a cable; half of its last element remains on the platform."""
         place = int(np.flatnonzero(self.cables == cable)[0])
         super().remove_cable(cable)
         self._chains = [np.delete(array, place, axis=0) for array in self._chains]
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Change the platform's mass [kg] and its inertia with it, while it carries as much of the cables as before."""
+        """Change the platform's mass [kg] and its inertia in proportion; the cable masses at its ends are unchanged."""
         before, state = self._carrier, self.state
         spin = before.spin(state)
         moving = np.concatenate((state[: body.MOMENTUM], spin))
@@ -206,7 +207,7 @@ class ChainPlant(Plant):
         self._carrier = after = LoadedPlatform.of(self.inertia, self._carried, self._ends)
         turning = Rotation.from_quat(own[body.TURN : body.VELOCITY]).as_matrix()
         self.state = after.state(own[: body.TURN], turning, own[body.VELOCITY : body.MOMENTUM], spin)
-        if at_rest:  # momentum, and moment of momentum about any point, are what they were
+        if at_rest:  # momentum and angular momentum about any point are conserved
             momentum = before.inertia[0] * state[body.VELOCITY : body.MOMENTUM]
             arm = state[: body.TURN] - self.state[: body.TURN]
             self.state[body.VELOCITY : body.MOMENTUM] = momentum / after.inertia[0]
@@ -232,7 +233,7 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
     table[:, c.ELEMENT] = state.free_length / nodes
     table[:, c.DENSITY], table[:, c.STIFFNESS] = material.linear_density, material.axial_stiffness
     table[:, c.LOSS_TIME], table[:, c.AIR_RATE] = losses.loss_time, losses.air_damping / material.linear_density
-    # the cable behind the exit has the strain of the element there
+    # cable between exit and drum has the strain of the element at the exit
     table[:, c.BEHIND] = state.unstrained_length - state.free_length
     last = np.linalg.norm(place[:, :, -1] - place[:, :, -2], axis=1)
     table[:, c.RUN] = table[:, c.BEHIND] * last / table[:, c.ELEMENT]
@@ -241,7 +242,7 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
 
 
 def checked_nodes(nodes: Any) -> int:
-    """Elements a cable."""
+    """Checked number of elements per cable."""
     return whole_number(nodes, "nodes", FEWEST, MOST)
 
 
@@ -257,7 +258,7 @@ def check_lumped(given: InitialConditions) -> None:
 
 
 def wave_frequency(given: InitialConditions, nodes: int) -> float:
-    """Highest angular frequency of cables in elements, one of which is as short as it may become [rad/s]."""
+    """Highest angular frequency of cables in elements, with the shortest possible element included [rad/s]."""
     material = given.robot.cables
     element = given.state.free_length / nodes
     return float((2.0 / SHORTEST / element * np.sqrt(material.axial_stiffness / material.linear_density)).max())

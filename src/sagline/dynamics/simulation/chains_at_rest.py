@@ -1,4 +1,4 @@
-"""Equilibrium of the platform on lumped-mass cables of given lengths, within the order of nodes^-2 of the exact one."""
+"""Equilibrium of the platform on lumped-mass cables of given lengths; differs from the exact one by order nodes^-2."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from sagline.robot.pose import Pose
 from sagline.statics.slopes import platform_end_forces
 
 STEPS = 60
-NEAR = 1e-8  # of a length, of a force: the error of Newton's method is then squared to rounding
-NEUTRAL = 1e-12  # of the largest stiffness: smaller ones are rounding
-LONGEST_STEP = 0.2  # of a force: a longer one is shortened, which keeps far starts from folding a chain
+NEAR = 1e-8  # relative error of a length or force; one more Newton step then reaches rounding error
+NEUTRAL = 1e-12  # relative to the largest stiffness: smaller values are rounding
+# relative to a force: longer steps are shortened, so that a chain does not fold when the start is far away
+LONGEST_STEP = 0.2
 
 
 class _ChainsAtRest(NamedTuple):
     """Chains in equilibrium with a platform."""
 
     pose: Pose  # of the platform
-    place: Array  # of the nodes, world axes, from the platform's end to the exit [m], shape (m, 3, nodes + 1)
-    # on the platform ends of the cables, half an element's weight included [N], shape (m, 3); the platform feels the
-    # opposite
+    place: Array  # nodes, world axes, from the platform end to the exit [m], shape (m, 3, nodes + 1)
+    # on the platform ends of the cables, including half an element's weight [N], shape (m, 3); the force on the
+    # platform is the opposite
     force: Array
 
 
@@ -33,12 +34,12 @@ class _LumpedCables(NamedTuple):
     """Cables divided into elements."""
 
     element: Array  # unstrained length of the elements [m], shape (m,)
-    weight: Array  # of a length [N/m], shape (m,)
+    weight: Array  # weight per length [N/m], shape (m,)
     stiffness: Array  # EA [N], shape (m,)
-    nodes: int  # elements a cable
+    nodes: int  # elements per cable
 
     def elements(self, force: Array) -> tuple[Array, Array]:
-        """Forces of the elements from the platform on, those of the cable at their middles, and their sizes."""
+        """Element forces, starting at the platform: forces in the cable at element centers, and their magnitudes."""
         # shapes: force (m, 3) [N]; returns (m, nodes, 3) [N]
         below = (np.arange(self.nodes) + 0.5) * (self.weight * self.element)[:, None]
         forces = np.repeat(force[:, None, :], self.nodes, axis=1)
@@ -46,12 +47,12 @@ class _LumpedCables(NamedTuple):
         return forces, np.linalg.norm(forces, axis=-1)
 
     def steps(self, force: Array) -> Array:
-        """The elements as vectors towards the platform [m], shape (m, nodes, 3); force (m, 3) [N]."""
+        """The elements as vectors toward the platform [m], shape (m, nodes, 3); force (m, 3) [N]."""
         forces, size = self.elements(force)
         return (self.element[:, None] * (1.0 / self.stiffness[:, None] + 1.0 / size))[..., None] * forces
 
     def compliance(self, force: Array) -> Array:
-        """Derivative of a chain's platform end by the force on it [m/N], shape (m, 3, 3); force (m, 3) [N]."""
+        """Derivative of a chain's platform end with respect to its force (m, 3) [N], shape (m, 3, 3) [m/N]."""
         forces, size = self.elements(force)
         unit = forces / size[..., None]
         across = np.eye(3) - unit[..., :, None] * unit[..., None, :]
@@ -61,9 +62,10 @@ class _LumpedCables(NamedTuple):
 
 
 def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
-    """The chains into which the cables of an equilibrium are divided, at rest at the same lengths."""
-    # An element's force is the exact cable's at its middle: a chain reaches as far as the midpoint rule says. Pose and
-    # forces therefore differ from the exact ones by the order of nodes^-2, and the wrench is balanced to rounding.
+    """Chains for the cables of an equilibrium, at rest with the same lengths."""
+    # The force in an element is that of the exact cable at the element's center, so the position of the chain's end
+    # follows from the midpoint rule. Pose and forces therefore differ from the exact ones by the order of nodes^-2; the
+    # wrench is balanced to rounding
     # source: docs/model.md, section 11
     robot, exits = state.one_robot, state.exit_point
     length, material = state.free_length, state.cables.cable
@@ -106,7 +108,7 @@ def _no_rest(item: str, value: str) -> InvalidValueError:
 
 
 def _solve_chains(chains: _LumpedCables, chord: Array, force: Array) -> Array:
-    """Forces on the platform ends of chains that reach along given chords (m, 3), from forces near them."""
+    """Forces on the platform ends of chains with given chords (m, 3), from nearby initial forces."""
     near = False
     for _ in range(STEPS):
         missing = chord - chains.steps(force).sum(axis=1)
@@ -120,14 +122,14 @@ def _solve_chains(chains: _LumpedCables, chord: Array, force: Array) -> Array:
 
 
 def _size(levers: Array) -> float:
-    """Reference length [m] for rotations: the longest lever, 1 where all cables meet in the center of mass."""
+    """Reference length [m] for rotations: the longest lever, or 1 if all cables meet in the center of mass."""
     longest = float(np.linalg.norm(levers, axis=1).max())
     return longest if longest > 0.0 else 1.0
 
 
 def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
-    """The motion that takes an unbalance away; none in directions in which the platform is neutral."""
-    # So turns a pendulum about its cable: neither a stiffness nor an unbalance is there, except for rounding
+    """The motion that balances the wrench; zero in directions without stiffness."""
+    # For example, a pendulum rotating about its cable: stiffness and unbalance are both zero, up to rounding
     units = np.array([1.0, 1.0, 1.0, size, size, size])
     slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
     found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]
@@ -135,21 +137,21 @@ def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: 
 
 
 def _platform_stiffness(blocks: Array, levers: Array, force: Array) -> Array:
-    """Derivative (6, 6) of the unbalance by displacement of the center and rotation, forces on the cables' ends."""
+    """Derivative (6, 6) of the unbalance with respect to platform motion; forces act on the cable ends."""
     turn = -_cross_matrix(levers)  # a rotation about an axis e moves the platform end by e x r
     across = _cross_matrix(levers)
     matrix = np.empty((6, 6))
     matrix[:3, :3] = blocks.sum(axis=0)
     matrix[:3, 3:] = (blocks @ turn).sum(axis=0)
     matrix[3:, :3] = (across @ blocks).sum(axis=0)
-    # the force keeps its direction while r turns: r T^T - (r.T) 1
+    # the force keeps its direction while r rotates: r T^T - (r.T) 1
     kept = levers[:, :, None] * force[:, None, :] - (levers * force).sum(axis=1)[:, None, None] * np.eye(3)
     matrix[3:, 3:] = (across @ blocks @ turn + kept).sum(axis=0)
     return matrix
 
 
 def _cross_matrix(vectors: Array) -> Array:
-    """Matrices (m, 3, 3) that multiply as r x does."""
+    """Matrices (m, 3, 3) of the cross product with r."""
     matrix = np.zeros((len(vectors), 3, 3))
     x, y, z = vectors.T
     matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = -z, y, -x

@@ -26,38 +26,38 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import differs
 from sagline.statics.balance import inertial_wrench
 
-TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and as many rows
+TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times with one row per time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimeTable:
-    """n numbers in time: a cubic between two instants, by values and rates at both; held before and after."""
+    """Time table of n numbers: cubic between instants, with given values and rates; constant before and after."""
 
     time: Array  # instants [s], shape (K,), increasing
     value: Array  # shape (K, n)
-    begin: Array  # rates where each interval begins, shape (K - 1, n)
-    end: Array  # rates where each ends, shape (K - 1, n)
+    begin: Array  # rates at the start of each interval, shape (K - 1, n)
+    end: Array  # rates at the end of each interval, shape (K - 1, n)
 
     @classmethod
     def constant(cls, value: Array) -> TimeTable:
-        """Numbers (n,) that do not change."""
+        """Constant numbers (n,)."""
         none = np.empty((0, value.size))
         return cls(np.zeros(1), np.array(value[None]), none, none)
 
     @classmethod
     def linear(cls, time: Array, value: Array) -> TimeTable:
-        """Straight lines between rows (K, n)."""
+        """Linear interpolation between rows (K, n)."""
         slope = np.diff(value, axis=0) / np.diff(time)[:, None]
         return cls(time, value, slope, slope)
 
     @classmethod
     def cubic(cls, time: Array, value: Array, rate: Array) -> TimeTable:
-        """Cubics through rows (K, n) whose rates are known."""
+        """Cubic interpolation between rows (K, n) with known rates."""
         return cls(time, value, np.ascontiguousarray(rate[:-1]), np.ascontiguousarray(rate[1:]))
 
     @property
     def arrays(self) -> CubicTableArrays:
-        """As kernels take it: read-only, C-contiguous."""
+        """Arrays in the form for kernels: read-only, C-contiguous."""
         time, value, begin, end = (
             locked(np.ascontiguousarray(array, dtype=np.float64).view())
             for array in (self.time, self.value, self.begin, self.end)
@@ -65,16 +65,16 @@ class TimeTable:
         return time, value, begin, end
 
     def columns(self, columns: Any) -> TimeTable:
-        """Some of the numbers."""
+        """Time table of some of the numbers."""
         return TimeTable(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
 
     def joined_columns(self, other: TimeTable) -> TimeTable:
-        """These numbers, then those of another course of the same instants."""
+        """Time table of these numbers, then those of another time table with equal instants."""
         pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
         return TimeTable(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
 
     def at(self, time: float | Array) -> tuple[Array, Array]:
-        """Values and rates (..., n) at times (...); where the rate jumps, the later one."""
+        """Values and rates (..., n) at times (...); at a discontinuity, the rate after it."""
         at = np.asarray(time)
         if len(self.time) == 1:
             value = np.zeros((*at.shape, 1)) + self.value[0]
@@ -109,7 +109,7 @@ class TimeTable:
         return TimeTable(times, values, begin, end)
 
     def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:
-        """A course of which some columns come to rest from a time on, their rates falling evenly in a duration [s]."""
+        """Time table in which some rates decrease linearly to zero from a given time, in a duration [s]."""
         table = self.with_instant(time).with_instant(time + duration)
         (start, rate), stop = table.at(time), time + duration
         later = np.flatnonzero(table.time >= time)
@@ -126,7 +126,7 @@ class TimeTable:
 
 
 def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: float) -> TimeTable:
-    """Rows in time as a caller gives them: one row that holds all the time, or times and rows, straight in between."""
+    """Time table from a caller: one constant row, or times and rows with linear interpolation."""
     # shapes: given (n,) [s]; begin [s]
     if not (isinstance(given, tuple | list) and len(given) == 2):
         return TimeTable.constant(exactly(given, item, unit, (columns,)))
@@ -144,24 +144,24 @@ def checked_time_table(given: Any, item: str, unit: str, columns: int, begin: fl
     return TimeTable.linear(time, rows) if time.size > 1 else TimeTable.constant(rows[0])
 
 
-ROUNDING = 1e-12  # of the largest force and moment: less is none
+ROUNDING = 1e-12  # relative to the largest force and moment: smaller values count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InitialConditions:
-    """A robot at the first instant, and what is given to it from then on."""
+    """Initial state of a robot, and its inputs."""
 
     robot: Robot
     model: CableModel  # cable model
-    state: Equilibrium  # state at the start, a single one
-    poses: Pose  # poses on the way, a batch
-    twist: Array  # velocity of the platform's origin and angular velocity at the start, world axes, (6,)
-    rate: Array  # dL/dt at the start [m/s], (m,): of a plan its own, else none
+    state: Equilibrium  # initial state, single
+    poses: Pose  # poses along the motion, a batch
+    twist: Array  # initial velocity of the platform's origin and angular velocity, world axes, (6,)
+    rate: Array  # initial dL/dt [m/s], (m,): that of a plan, otherwise zero
     lengths: TimeTable  # set points of the unstrained lengths [m]
-    tensions: TimeTable  # expected at the drums [N], at the same instants
-    wrench: TimeTable  # given on the platform
+    tensions: TimeTable  # expected tensions at the drums [N], at the same instants
+    wrench: TimeTable  # external wrench on the platform
     begin: float  # first time [s]
-    end: float  # last time of what is given [s]
+    end: float  # last time of the inputs [s]
 
 
 def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration: Any) -> InitialConditions:
@@ -192,7 +192,7 @@ def initial_conditions(start: Any, unstrained_length: Any, wrench: Any, duration
 
 
 def _from_plan(plan: Plan) -> InitialConditions:
-    """The start of a plan along a path, at the speed that the path has there."""
+    """Initial conditions of a plan along a path, with the initial speed of the path."""
     path, rate = plan.path, plan.length_rate
     if path is None or rate is None:
         step = "Plan along a Path, or give plan.state and a duration."
@@ -228,7 +228,7 @@ def _from_plan(plan: Plan) -> InitialConditions:
 
 
 def _from_equilibrium(state: Equilibrium, table: Any) -> InitialConditions:
-    """A robot at rest."""
+    """Initial conditions of a robot at rest."""
     if state.pose.shape:
         item = f"a batch of {len(state)} equilibria"
         raise InvalidValueError("start", item, "a single equilibrium, or a plan", "Give one of them: state[0].")

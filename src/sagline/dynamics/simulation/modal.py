@@ -21,26 +21,26 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import frame_end_forces, motions_of_ends
 from sagline.statics.stiffness import Stiffness, modes, stiffness
 
-UP_TO: Final = 1.5  # of the highest massless frequency: modes above answer as at rest
-SHARE: Final = 0.1  # radians of the highest frequency in a step
+UP_TO: Final = 1.5  # relative to the highest massless frequency: modes above it respond quasi-statically
+SHARE: Final = 0.1  # step times highest angular frequency [rad]
 LONGEST: Final = 1e-3  # s
 MOST_STEPS: Final = 10**9
 SHORTER: Final = "Simulate a shorter time, or record less often."
-SMALL: Final = 0.02  # of its length: what a cable may be let out
+SMALL: Final = 0.02  # relative to its length: largest change of a cable length
 
 
 class _ModalModel(NamedTuple):
     """Response of the modes of a state to changes u = (dL, dw) of lengths and wrench, (m + 6,)."""
 
     found: Vibration  # the modes
-    drive: Array  # of u on every mode, (K, m + 6)
-    motion: Array  # motion of the platform by u beyond what the modes have at rest, (6, m + 6)
-    pulled: Array  # tensions at the frame ends by every mode, (m, K) [N/(m sqrt(kg))]
-    tension: Array  # tensions by u beyond those of the modes at rest, (m, m + 6)
+    drive: Array  # force of u on every mode, (K, m + 6)
+    motion: Array  # platform motion due to u beyond the static response of the modes, (6, m + 6)
+    pulled: Array  # frame-end tensions per modal amplitude, (m, K) [N/(m sqrt(kg))]
+    tension: Array  # tensions due to u beyond the static response of the modes, (m, m + 6)
 
 
 class _ModalMotion(NamedTuple):
-    """Modes at N instants: amplitudes and rates, (N, K); work done on them and energy lost since the start, (N,)."""
+    """Modes at N instants: amplitudes and rates, (N, K); work done and energy lost since the start, (N,)."""
 
     amplitude: Array
     rate: Array
@@ -73,8 +73,8 @@ def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
 
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
-    """Changes of the forces at the frame ends in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))]."""
-    # Along a cable f = f_0 - g with g' = rho omega^2 u; its end moves by the integral of C f
+    """Changes of the frame-end forces in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))]."""
+    # Along a cable f = f_0 - g with g' = rho omega^2 u; the displacement of its end is the integral of C f
     material, length = state.cables.cable, state.free_length
     at_frame, points = frame_end_forces(state), found.cable_shape.shape[2]
     square = (2.0 * np.pi * found.frequency) ** 2
@@ -96,7 +96,7 @@ def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> A
 
 
 def modal_response(frequency: Array, ratio: Array, force: Array, step: float) -> _ModalMotion:
-    """Modes that rest at first, under forces that are straight between instants: exact except for rounding."""
+    """Response of modes, initially at rest, to piecewise linear forces: exact except for rounding."""
     # shapes: frequency (K,) [rad/s]; ratio (K,); force (N, K); step [s]
     ringing = frequency * np.sqrt(1.0 - ratio * ratio)
     root = -ratio * frequency + 1j * ringing
@@ -123,7 +123,7 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
-    """Small motion of a robot about its equilibrium at the start, with step and record in s."""
+    """Small motion of a robot about its initial equilibrium, with step and record in s."""
     state = given.state
     _check(given)
     model = modal_model(state, damping)
@@ -142,7 +142,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
         "duration", 8.0 * count * (5.0 * len(frequency) + 4.0 * cables + 3.0 * cables * points / every), SHORTER
     )
     time: Array = given.begin + size * np.arange(count + 1, dtype=np.float64)
-    kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # the end too
+    kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # includes the end
     lengths, wrenches = given.lengths.at(time)[0], given.wrench.at(time)[0]
     change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
     _check_small_changes(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)

@@ -24,25 +24,26 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
-MARGIN: Final = 5.0  # m of cable that a drum may let out beyond what it is asked for, and still remember
-BROKEN: Final = 1e-12  # of a cable's pull that is left when it is cut
-NOTES: Final = 1000  # of what begins by itself, between two events
+MARGIN: Final = 5.0  # m of cable beyond the required length for which a drum stores the strain
+BROKEN: Final = 1e-12  # share of the stiffness and weight of a cable that remains after it is cut
+NOTES: Final = 1000  # largest number of spontaneous events between two scheduled events
 
 
 class Records:
     """Records of N steps from the kernel.
 
     Attributes:
-        states: Center of mass, quaternion of the principal axes, velocity, angular velocity, (N, 13).
-        tensions: At the frame ends [N], (N, m).
-        lengths: Unstrained [m], (N, m).
-        energies: Kinetic, potential, supplied, lost [J], (N, 4).
-        notes: See `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS): a run pauses with more than NOTES.
-        points: Of cables with mass [m], (N, m, points, 3); None of cables without.
+        states: Center of mass, quaternion of the principal axes, velocity and angular velocity, (N, 13).
+        tensions: Tensions at the frame ends [N], (N, m).
+        lengths: Unstrained lengths [m], (N, m).
+        energies: Kinetic, potential, supplied and lost energy [J], (N, 4).
+        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS); a run pauses after NOTES
+            events.
+        points: Points of cables with mass [m], (N, m, points, 3); None without cable mass.
     """
 
     def __init__(self, count: int, cables: int) -> None:
-        """Room for so many steps."""
+        """Allocate records for a number of steps."""
         self.states = np.empty((count, body.STATE_COLUMNS))
         self.tensions = np.empty((count, cables))
         self.lengths = np.empty((count, cables))
@@ -52,32 +53,32 @@ class Records:
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """As the kernel takes them."""
+        """The arrays in the form for the kernel."""
         return self.states, self.tensions, self.lengths, self.energies, self.notes
 
 
 class Plant:
-    """A robot in the midst of a motion; mutable, with its own memory.
+    """State of a robot during a simulation; mutable, with its own memory.
 
-    The platform's axes are its principal ones here, with the origin at the center of mass.
+    The platform axes are its principal axes here, with the origin at the center of mass.
 
     Attributes:
-        robot: The robot as it was at the start.
+        robot: The robot at the start.
         model: Cable model.
-        axes: Principal axes in the platform frame, one a column, (3, 3).
+        axes: Principal axes in the platform frame, one per column, (3, 3).
         turn: Quaternion from principal axes to the platform frame, (4,).
-        turn_back: The reverse, (4,).
+        turn_back: The inverse quaternion, (4,).
         inertia: Mass and principal moments, (4,).
-        cables: Indices of the cables that are there, (m,).
-        state: As in `sagline.kernels.dynamics.rigid_body`, (13,).
-        rows: Of the cables, (CABLE_ROWS, m).
+        cables: Indices of the unbroken cables, (m,).
+        state: State row as in `sagline.kernels.dynamics.rigid_body`, (13,).
+        rows: Rows of the cables, (CABLE_ROWS, m).
         now: State of the drives, (DRIVE_ROWS, m).
         data: Parameters of the drives, (DATA_ROWS, m).
         audit: Sums over the run, (AUDIT_SIZE,).
-        counters: Of the kernel, (COUNTERS,).
+        counters: Counters of the kernel, (COUNTERS,).
         layers: Strain of the cable on the drums, (m, B).
-        kernel: Integrator: called with `arguments`, arrays of records, steps to take, and steps a record.
-        cable_mass: As `simulate` takes it.
+        kernel: Integrator, called with `arguments`, arrays of records, number of steps, and steps per record.
+        cable_mass: Cable mass option of `simulate`.
     """
 
     kernel: ClassVar[Any] = staticmethod(motion.run_massless)
@@ -107,8 +108,8 @@ class Plant:
         self._work = np.zeros(0)
 
     def remember_winding(self, longest: float) -> None:
-        """Let the drums remember the strain at which cable was wound in, up to a length off the drum [m] and MARGIN."""
-        # What lies farther in lies at the winding tension, and comes to it when it is wound in
+        """Make the drums store the strain of wound-in cable, up to a given length off the drum [m] plus MARGIN."""
+        # Cable further inside is at the winding tension; once paid out, it is wound in again at that tension
         self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
 
     def arguments(
@@ -128,19 +129,19 @@ class Plant:
         return terms, rules, numbers, robot, locked(self.data.view()), tuple(c.arrays for c in given), kept
 
     def records(self, count: int) -> Records:
-        """Room for records of so many steps."""
+        """Allocate records for a number of steps."""
         return Records(count, len(self.cables))
 
     def platform_states(self, states: Array) -> Array:
-        """Recorded states of what the kernel moves, (N, 13), as those of the platform."""
+        """Platform states from recorded states of the simulated body, (N, 13)."""
         return states
 
     def failure(self, time: float, step: float) -> InvalidValueError:
-        """Error for a kernel that stopped at a time [s], with steps of this length [s]."""
+        """Error for a kernel that stopped at a given time [s] with a given step [s]."""
         return energy_error(step, time, int(self.cables[int(self.counters[k.FAILED]) - 1]))
 
     def remove_cable(self, cable: int) -> None:
-        """Take a cable away, by its index among all that were ever there."""
+        """Remove a cable, by its index in the original robot."""
         place = int(np.flatnonzero(self.cables == cable)[0])
         self.cables = np.delete(self.cables, place)
         self._table = np.delete(self._table, place, axis=0)
@@ -148,19 +149,19 @@ class Plant:
         self.rows, self.now, self.data = (np.delete(array, place, axis=1) for array in (self.rows, self.now, self.data))
 
     def cut(self, places: Any) -> None:
-        """Let cables break in the midst of a run, by their places: the kernel's arrays stay as they are."""
-        # Stiffness and weight fall by one factor, so that every cable keeps its shape with zero force
+        """Break cables during a run, by their current indices; the kernel's arrays keep their size."""
+        # Stiffness and weight are reduced by one factor, so that every cable keeps its shape at nearly zero force
         for column in (tables.STIFFNESS, tables.DENSITY):
             self._table[places, column] *= BROKEN
         self.counters[k.READY] = 0  # compute all forces and energies again
 
     def lock_winches(self, places: Any) -> None:
-        """Lock winches, by their places among the cables that are there; what moves of them is lost at once."""
+        """Lock winches, by their current indices; their kinetic energy is lost immediately."""
         self.now[d.HELD, places] = 1.0
         self.now[d.RATE, places] = 0.0
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Change the mass [kg] and the inertia with it; what is taken up at rest shares the momentum there is."""
+        """Change the mass [kg] and the inertia in proportion; a mass picked up at rest shares the existing momentum."""
         factor = mass / self.inertia[0]
         self.inertia = self.inertia * factor
         if at_rest:
@@ -188,7 +189,7 @@ class Plant:
 
 
 def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
-    """Principal moments of the platform [kg m^2], (3,), infinite where it does not turn, and axes, one a column."""
+    """Principal moments of the platform [kg m^2], (3,), infinite for a blocked rotation, and axes, one per column."""
     if robot.motion_pattern == "3R3T":
         moments, axes = np.linalg.eigh(robot.inertia)
         if np.linalg.det(axes) < 0.0:
@@ -197,7 +198,7 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
     if robot.motion_pattern != "1R2T" or robot.plane_normal is None:
         return np.full(3, np.inf), np.eye(3)
     normal = pose.matrix.T @ robot.plane_normal
-    axes = np.linalg.svd(normal[None])[2].T[:, [1, 2, 0]]  # the normal last
+    axes = np.linalg.svd(normal[None])[2].T[:, [1, 2, 0]]  # normal in the last column
     axes[:, 2] = normal
     if np.linalg.det(axes) < 0.0:
         axes[:, 0] *= -1.0

@@ -19,17 +19,17 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-WHICH: Final = rule(most=9_999)  # cable or winch; no robot has more
+WHICH: Final = rule(most=9_999)  # number of a cable or winch; no robot has more
 TIME, MASS = rule("s"), rule("kg", above=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Break(NumberFields):
-    """A cable breaks: from then on it is not there. Its energy goes with it, as `energy.removed`.
+    """Break of a cable; it is removed together with its energy, which is counted in `energy.removed`.
 
     Attributes:
-        cable: Number of the cable, from 0.
-        time: When [s].
+        cable: Index of the cable, from 0.
+        time: Time of the event [s].
     """
 
     cable: int = field(metadata=WHICH)
@@ -38,11 +38,11 @@ class Break(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Stall(NumberFields):
-    """A winch stops at once, and stands from then on while the others go on.
+    """Sudden stop of a winch, which remains stopped while the other winches continue.
 
     Attributes:
-        winch: Number of the winch, from 0.
-        time: When [s].
+        winch: Index of the winch, from 0.
+        time: Time of the event [s].
     """
 
     winch: int = field(metadata=WHICH)
@@ -51,13 +51,13 @@ class Stall(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Brake(NumberFields):
-    """The rates that a winch is asked for, or those of all winches together, fall evenly to zero and stay there.
+    """Linear decrease of the length rates of one winch, or of all winches together, to zero, where they remain.
 
-    With one duration for all the platform keeps to the direction of its path.
+    With the same duration for all winches, the platform stays on its path direction.
 
     Attributes:
-        time: When [s].
-        winch: Number of the winch, from 0; None for all.
+        time: Time of the event [s].
+        winch: Index of the winch, from 0; None for all.
         duration: Duration [s], > 0.
     """
 
@@ -68,11 +68,11 @@ class Brake(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Drop(NumberFields):
-    """A part of the platform's mass falls off; the inertia shrinks with it, the center of mass stays where it is.
+    """Loss of a part of the platform's mass; the inertia decreases in proportion, the center of mass is unchanged.
 
     Attributes:
         mass: Mass [kg], > 0, less than the platform's.
-        time: When [s].
+        time: Time of the event [s].
     """
 
     mass: float = field(metadata=MASS)
@@ -81,13 +81,13 @@ class Drop(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class PickUp(NumberFields):
-    """A mass at rest is fixed to the platform: its momentum is then the momentum of both.
+    """Pick-up of a mass at rest; the total momentum of platform and mass is conserved.
 
-    The inertia grows with the mass, the center of mass stays where it is.
+    The inertia increases in proportion to the mass; the center of mass is unchanged.
 
     Attributes:
         mass: Mass [kg], > 0.
-        time: When [s].
+        time: Time of the event [s].
     """
 
     mass: float = field(metadata=MASS)
@@ -99,7 +99,7 @@ KINDS = {Break: "break", Stall: "stall", Brake: "brake", Drop: "drop", PickUp: "
 
 
 def event_cable(event: Event) -> int | None:
-    """Index of the cable or winch of an event; None for the platform's, and for that of all winches."""
+    """Index of the cable or winch of an event; None for events of the platform or of all winches."""
     return event.cable if isinstance(event, Break) else getattr(event, "winch", None)
 
 
@@ -158,15 +158,16 @@ class EnergyBalance(Result):
     """Energy balance of a simulation [J]; each of shape (N,).
 
     Attributes:
-        kinetic: Of platform, cables and drums.
-        potential: Of weight and of strain and height of the cables off the drums, frame ends and the origin at zero.
-        supplied: Work done on the robot since the start: by winches, given forces and wind.
-        lost: Work done by damping and friction since the start, strain that slipped on drums, and what chains lost
-            where nodes were born and merged.
-        removed: Energy that left the robot with cables that broke and loads that were dropped since the start, less
-            what loads brought that were picked up. Heights count in it as in `potential`, so it has either sign.
-        error: kinetic + potential - supplied + lost + removed, less its value at the start: what the integrator
-            invents.
+        kinetic: Kinetic energy of platform, cables and drums.
+        potential: Potential energy of weight, and of strain and height of the cables off the drums; zero at the frame
+            ends and the origin.
+        supplied: Work done on the robot since the start by winches, external forces and wind.
+        lost: Energy lost since the start by damping, friction, slip of strain on drums, and creation and merging of
+            chain nodes.
+        removed: Energy of broken cables and dropped loads since the start, minus the energy added by picked-up loads.
+            Heights count as in `potential`, so it has either sign.
+        error: kinetic + potential - supplied + lost + removed, minus its initial value: the numerical energy error of
+            the integrator.
     """
 
     kinetic: Array
@@ -179,14 +180,15 @@ class EnergyBalance(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Occurrence:
-    """Something that happened to the robot while it moved.
+    """Event during the motion of the robot.
 
     Attributes:
-        time: When [s].
-        kind: "break", "stall", "brake", "drop" or "pick up", as asked for; "saturate" or "slack" by itself.
-        cable: Number of the cable or winch, or None for the platform.
-        tension_before: Largest tension of that cable, or of all, before it [N].
-        tension_after: Largest tension of any cable after it, to the end or the next [N].
+        time: Time of the event [s].
+        kind: "break", "stall", "brake", "drop" or "pick up" for scheduled events; "saturate" or "slack" for spontaneous
+            ones.
+        cable: Index of the cable or winch, or None for the platform.
+        tension_before: Largest tension of this cable, or of all cables, before the event [N].
+        tension_after: Largest tension of any cable after the event, until the next event or the end [N].
     """
 
     time: float
@@ -202,23 +204,23 @@ class Simulation(Result, Saved):
 
     Attributes:
         robot: The robot.
-        time: [s], increasing, shape (N,): every so many steps, and the end.
+        time: Times of the samples [s], increasing, shape (N,): at a fixed number of steps, and at the end.
         pose: Poses of the platform, a batch of N.
         twist: Velocity of the platform's origin and angular velocity, world axes [m/s, rad/s], shape (N, 6).
-        tensions: At the frame ends [N], shape (N, m).
-        length: Unstrained lengths off the drum [m], shape (N, m); NaN of a cable that has broken.
+        tensions: Tensions at the frame ends [N], shape (N, m).
+        length: Unstrained lengths off the drum [m], shape (N, m); NaN for a broken cable.
         energy: Energies over time.
         events: Events in order.
         cable_mass: "none", "lumped" or "modal".
-        step: Of the integrator [s].
-        nodes: Position of every cable at its nodes, world axes [m], shape (N, m, P, 3); None without cable mass, NaN of
-            a cable that has broken.
-        integrator: "runge-kutta" or "splitting"; "exact" of modes.
+        step: Time step of the integrator [s].
+        nodes: Positions of the nodes of every cable, world axes [m], shape (N, m, P, 3); None without cable mass, NaN
+            for a broken cable.
+        integrator: "runge-kutta" or "splitting"; "exact" for modes.
         winches: "ideal", "robot" or SecondOrder(...).
         winding: "constant" or "remembered".
         damping: Energy losses of the cables.
-        largest_tension: Of each cable at the frame end at any step, also between samples [N], shape (m,); None where it
-            is not known.
+        largest_tension: Largest tension of each cable at the frame end at any step, including steps between samples
+            [N], shape (m,); None if not known.
     """
 
     robot: Robot
@@ -240,13 +242,13 @@ class Simulation(Result, Saved):
 
 
 def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Array, removed: Array) -> EnergyBalance:
-    """The balance of five energies [J], each of shape (N,)."""
+    """The energy balance from five energies [J], each of shape (N,)."""
     total = kinetic + potential - supplied + lost + removed
     return EnergyBalance(*map(locked, (kinetic, potential, supplied, lost, removed, total - total[0])))
 
 
 def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
-    """Pose after a motion (..., 6) [m, rad]: the center of mass displaced, the platform turned about it."""
+    """Pose after a motion (..., 6) [m, rad]: the center of mass displaced, the platform rotated about it."""
     center = pose.matrix @ robot.center_of_mass
     turned = Rotation.from_rotvec(motion[..., 3:])
     place = pose.position + center + motion[..., :3] - turned.as_matrix() @ center
@@ -254,7 +256,7 @@ def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
 
 
 def twist_of_origin(robot: Robot, pose: Pose, velocity: Array, spin: Array) -> Array:
-    """Twists of the platform frame's origin, as a path has them, from motions of the center of mass."""
+    """Twists of the platform frame's origin, as in a path, from motions of the center of mass."""
     # shapes: velocity (N, 3) [m/s]; spin (N, 3) [rad/s]; returns (N, 6)
     lever = pose.matrix @ robot.center_of_mass
     return locked(np.concatenate((velocity - np.cross(spin, lever), spin), axis=1))

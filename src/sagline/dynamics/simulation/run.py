@@ -28,7 +28,7 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 
-BLOCK: Final = 20_000  # steps at once: some 100 ms, after which an interrupt is heard
+BLOCK: Final = 20_000  # steps per block: about 100 ms, after which an interrupt is handled
 NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
 Inputs = tuple[TimeTable, TimeTable, TimeTable]
 
@@ -51,13 +51,13 @@ class SimulationRun:
         self._events, self._settings = list(events), settings or {}
         self.plant, self.every, self.steps = plant, every, steps
         self._rules, self._numbers, self._inputs = rules, numbers, inputs
-        self._record = plant.records(-(-steps // every) + 1)  # the last step too
+        self._record = plant.records(-(-steps // every) + 1)  # includes the last step
         self._record.tensions[:] = 0.0
         self._record.lengths[:] = np.nan
-        self._removed = np.zeros(len(self._record.energies))  # the kernel counts it as lost
+        self._removed = np.zeros(len(self._record.energies))  # removed energy, which the kernel counts as lost
         self._occurrences: list[Occurrence] = []
         self._largest = np.zeros(plant.robot.cable_count)
-        self._marks: list[int] = []  # of the scheduled events among them
+        self._marks: list[int] = []  # indices of the scheduled events in the event list
         self._arguments: Any = plant.arguments(rules, numbers, inputs)
         self._advance(0)
 
@@ -93,7 +93,7 @@ class SimulationRun:
             self._store_records(self._record_now(), last // self.every + 1)
 
     def _store_records(self, records: Records, row: int) -> None:
-        """Copy records of the kernel to the whole record, from a row on."""
+        """Copy kernel records into the complete record, starting at a row."""
         plant = self.plant
         rows = slice(row, row + int(plant.counters[k.RECORDS]))
         kept = slice(0, rows.stop - rows.start)
@@ -107,7 +107,7 @@ class SimulationRun:
         self._record.lengths[rows, plant.cables] = records.lengths[kept]
 
     def _store_notes(self, records: Records) -> None:
-        """Store the events that the kernel has noted."""
+        """Store the events noted by the kernel."""
         for row in records.notes[: int(self.plant.counters[k.NOTES])]:
             cable = int(self.plant.cables[int(row[k.NOTE_CABLE])])
             kind = NAMES[row[k.NOTE_KIND]]
@@ -123,7 +123,7 @@ class SimulationRun:
         return here
 
     def apply_event(self, event: Event) -> None:
-        """Integrate up to an event and apply it at the first step that is not earlier."""
+        """Integrate up to an event and apply it at the first step at or after its time."""
         plant = self.plant
         self._advance(self._step_of(event))
         time, before = self._time(int(plant.counters[k.STEPS])), _energy(self._record_now())
@@ -155,7 +155,7 @@ class SimulationRun:
             plant.lock_winches(plant.cables == event.winch)
         elif isinstance(event, Brake):
             chosen = np.ones(len(plant.cables), dtype=np.bool_) if event.winch is None else plant.cables == event.winch
-            columns = np.flatnonzero(np.tile(chosen, wide))  # the tensions that motors expect are held too
+            columns = np.flatnonzero(np.tile(chosen, wide))  # also keeps the expected tensions of the motors
             self._inputs = (lengths.with_stop(time, event.duration, columns), wrenches, winds)
         elif isinstance(event, Drop):
             plant.with_mass(plant.inertia[0] - event.mass, at_rest=False)
@@ -176,7 +176,7 @@ class SimulationRun:
         return self.until(math.inf)
 
     def until(self, time: float) -> Simulation:
-        """Continue to a time [s]; the simulation so far."""
+        """Continue to a time [s] and return the simulation up to it."""
         ahead = (time - float(self.plant.audit[d.BEGIN])) / self.step
         records = math.ceil(min(ahead, self.steps) / self.every - 1e-9)
         last = max(min(records * self.every, self.steps), int(self.plant.counters[k.STEPS]))
@@ -187,11 +187,11 @@ class SimulationRun:
         return self._result(-(-last // self.every) + 1)
 
     def _step_of(self, event: Event) -> int:
-        """The first step that is not earlier than an event."""
+        """The first step at or after the time of an event."""
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
     def _result(self, count: int) -> Simulation:
-        """Simulation of the first records."""
+        """Result from the first records."""
         plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
         kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)

@@ -54,54 +54,56 @@ def simulate(
     damping: Damping | None = None,
     record: float | None = None,
 ) -> Simulation:
-    """Move a robot in time: the platform is a free body on exact cables, whose lengths its winches change.
+    """Simulate a robot in time: the platform is a free body on exact cables whose lengths the winches change.
 
-    Cables have no inertia ("massless"): they are static catenaries at every instant, taut or slack as their
-    lengths say, over pulleys and with dead length as the robot has them.
+    Without cable mass ("none"), cables are static catenaries at every instant, taut or slack according to their
+    lengths, with the pulleys and dead lengths of the robot.
 
-    Between samples a plan's lengths are followed by cubics that have its `length_rate` there; at its samples they are
-    the plan's own. A plan that is sampled more often is followed more closely: give its path at 1 kHz.
+    The set points are the lengths of the plan at its samples. Between samples they are cubics with the plan's
+    `length_rate` as derivatives. More samples follow the exact lengths more closely: give the path at 1 kHz.
 
     Args:
-        start: A plan along a path, from the pose and at the speed that it begins with; its wrench, without the path's
-            inertia, acts. Or a single equilibrium, at rest.
-        duration: Duration [s]; lengths are constant after the end of the plan or table. None: as long as the plan, or
-            the table of lengths.
-        step: Of the integrator [s]; None: 0.2 radians of the highest frequency (massless, cables taut), at most 1 ms.
-        cable_mass: "none": cables are static catenaries at every instant. "lumped": each is a chain of nodes with
-            its mass, at fixed material points, which swings, and transmits its waves; new nodes are born at the frame
-            and merged there as cable is let out and wound in. A chain keeps the exit from its pulley of the start.
-            "modal": small motion about an equilibrium, each mode of `vibration` by itself; lengths and wrench may
-            change, and `Damping` may have modal_damping. No pulleys, events, winches or wind.
-        nodes: Elements a cable is divided into where it has mass, at the start, 4 to 500. At rest the pose differs from
-            the exact one by the order of nodes^-2.
-        integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2: its energy has no trend in long
-            runs. None: "runge-kutta"; "splitting" for winches="robot", which needs it.
-        winches: "ideal": lengths are what is given. SecondOrder(...): they lag. "robot": the robot's winches, with
-            inertia, limits of torque and speed, friction, and loops of position and speed that are closed every
-            millisecond; from the start on they expect the tensions of the plan.
+        start: A plan along a path; the simulation starts at its initial pose and speed, and its wrench acts without the
+            inertial wrench of the path. Or a single equilibrium, at rest.
+        duration: Duration [s]; lengths are constant after the end of the plan or table. None: duration of the plan or
+            of the table of lengths.
+        step: Time step of the integrator [s]; None: 0.2 rad of the highest frequency (massless, cables taut), at most 1
+            ms.
+        cable_mass: "none": cables are static catenaries at every instant. "lumped": each cable is a chain of nodes with
+            its mass, at fixed material points; it swings and transmits waves. Nodes are created and merged at the frame
+            while cable is paid out and wound in. A chain keeps the initial exit point of its pulley. "modal": small
+            motion about an equilibrium, with decoupled modes of `vibration`; lengths and wrench may change, and
+            `Damping` may have modal_damping. Not supported: pulleys, events, winches, wind.
+        nodes: Elements per cable with mass, at the start, 4 to 500. At rest the pose differs from the exact one by the
+            order of nodes^-2.
+        integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2, whose energy has no drift in long
+            runs. None: "runge-kutta"; "splitting" for winches="robot", which requires it.
+        winches: "ideal": lengths equal their set points. SecondOrder(...): lengths lag behind them. "robot": the
+            robot's winches with inertia, limits of torque and speed, friction, and position and speed loops with a
+            period of 1 ms; from the start they expect the tensions of the plan.
         winding: State of the cable on the drums. "constant": cable wound at the winches' winding_tension. "remembered":
-            cable that is wound in lies at its tension, until it is paid out. Of winches="robot" alone.
-        unstrained_length: Set points in time for an equilibrium: times [s] (K,) and lengths [m] (K, m), straight in
-            between; or one row (m,), which is kept from the start on.
-        events: Events, each at the first step that is not earlier: `Break`, `Stall`, `Brake`, `Drop`,
+            cable that is wound in keeps its tension until it is paid out. Only for winches="robot".
+        unstrained_length: Length set points for an equilibrium: times [s] (K,) and lengths [m] (K, m), linear in
+            between; or one row (m,), constant from the start.
+        events: Events, each applied at the first step at or after its time: `Break`, `Stall`, `Brake`, `Drop`,
             `PickUp`.
-        wrench: On the platform, in place of that of the start: one row (6,) [N, N m], or times and rows (K, 6).
-        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3). Half of its force on a cable, as if it were
-            straight, acts on the platform; needs the cables' diameter. The platform's own is a wrench.
-        damping: Energy losses of the cables; None: nothing.
-        record: Interval of the records [s], in whole steps; None: 0.01.
+        wrench: Wrench on the platform, replaces that of the start: one row (6,) [N, N m], or times and rows (K, 6).
+        wind: Velocity of the air [m/s], (3,), or times and rows (K, 3). Half of its force on a cable, computed for a
+            straight cable, acts on the platform; needs the cable diameters. Give the wind force on the platform itself
+            as a wrench.
+        damping: Energy losses of the cables; None: no losses.
+        record: Interval of the records [s], rounded to whole steps; None: 0.01.
 
     Returns:
-        Simulation. Its events name also when a cable began to be slack, and when a winch came to a limit.
+        Simulation. Its events also list when a cable became slack, and when a winch reached a limit.
 
     Raises:
-        InvalidValueError: If a plan has samples without an answer (it names the first), the step is above the limit of
-            stability, energy grows by itself (it names time and cable), an event names no cable, the robot lacks data
-            that its winches need, or an argument is of the wrong kind.
+        InvalidValueError: If a plan has samples without a solution (the message names the first), the step exceeds the
+            stability limit, the energy grows without input (it names time and cable), an event has a wrong cable index,
+            the robot lacks data of its winches, or an argument has the wrong type.
 
     Examples:
-        A gust that presses the platform down, and the work that it does:
+        A downward gust on the platform, and its work:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -177,7 +179,7 @@ def started_run(
 
 
 def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
-    """Set points of the drives: lengths; of drums lengths along the path of winding, and tensions."""
+    """Set points of the drives: lengths; for drums, lengths along the winding path, and tensions."""
     if kind != d.DRUMS:
         return given.lengths
     stretch, table = 1.0 + plant.data[d.WINDING_STRAIN], given.lengths
@@ -188,7 +190,7 @@ def _set_points(given: InitialConditions, plant: Plant, kind: int) -> TimeTable:
 def initial_plant(
     given: InitialConditions, winches: Winches, with_wind: bool, elements: int = 0, losses: Damping | None = None
 ) -> Plant:
-    """Plant at the start, its winches at the required speeds."""
+    """Plant at the start, with the winches at the required speeds."""
     length = given.state.unstrained_length
     data = drive_data(given.robot, winches, length, with_wind)
     if elements:
@@ -202,7 +204,7 @@ def initial_plant(
 
 
 def checked_damping(damping: Damping | None) -> Damping:
-    """Damping of a simulation in time; none for None."""
+    """Damping of a simulation in time; no damping for None."""
     found = optional(damping, Damping, "damping") or Damping()
     if found.modal_damping > 0.0:
         step = "Give loss_time or air_damping, which act on cables; a ratio belongs to a mode."
@@ -233,7 +235,7 @@ def time_step(
     events: Any,
     waves: float = 0.0,
 ) -> float:
-    """Checked step [s], by the lightest platform after all events; waves: highest frequency of the cables [rad/s]."""
+    """Checked step [s], for the lightest platform after all events; waves: highest frequency of the cables [rad/s]."""
     robot, lengths = given.robot, given.lengths.value
     platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
     highest = frequency_with_winches(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
@@ -241,7 +243,7 @@ def time_step(
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:
-    """Largest factor on the platform's frequency after loads are dropped."""
+    """Largest factor of the platform frequency due to dropped loads."""
     least = now = mass
     for event in events:
         now += event.mass if isinstance(event, PickUp) else -event.mass if isinstance(event, Drop) else 0.0
@@ -250,7 +252,7 @@ def _lightness(mass: float, events: tuple[Event, ...]) -> float:
 
 
 def load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
-    """The kernel's bits of what damps or loads."""
+    """Bits for the kernel: active damping and loads."""
     damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
     loaded = with_wind or bool(wrench.value.any())
     return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * with_wind

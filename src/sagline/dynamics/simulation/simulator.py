@@ -43,24 +43,24 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-NEAR: Final = 1e-6  # of a step: so far may a period be from whole steps
+NEAR: Final = 1e-6  # tolerance of a whole number of steps in a period
 MOST_STEPS: Final = 10**7  # in one period
 MOST_SEED: Final = 2**128
 
 
 class Reading(NamedTuple):
-    """Sensor readings and true values; the arrays are read-only, and the simulator's next step overwrites them.
+    """Sensor values and true values; the arrays are read-only, and the simulator's next step overwrites them.
 
     Attributes:
-        counts: Of the encoders, whole numbers as floats, shape (m,); None where data are missing that counts need.
-        load_cell: [N], shape (m,).
-        position: Of the platform's origin [m], shape (3,).
+        counts: Encoder counts, whole numbers as floats, shape (m,); None if data for counts are missing.
+        load_cell: Measured tensions of the load cells [N], shape (m,).
+        position: Position of the platform's origin [m], shape (3,).
         quaternion: Rotation platform -> world, scalar last, shape (4,).
         twist: Velocity of that origin and angular velocity, world axes [m/s, rad/s], shape (6,).
-        tension: At the frame ends [N], shape (m,).
+        tension: Tensions at the frame ends [N], shape (m,).
         length: Unstrained lengths off the drums [m], shape (m,).
-        force: Of the motors, at the cable, outward [N], shape (m,); 0 without the robot's winches.
-        saturated: Flags of the drives at a limit of torque or speed, not 0 there, shape (m,).
+        force: Motor forces on the cables, positive outward [N], shape (m,); 0 without the robot's winches.
+        saturated: Nonzero where a drive is at a limit of torque or speed, shape (m,).
     """
 
     counts: Array | None
@@ -75,10 +75,10 @@ class Reading(NamedTuple):
 
 
 class Simulator:
-    """The machine behind a controller: winches, cables without mass, platform and sensors.
+    """Simulated machine for a controller: winches, cables without mass, platform and sensors.
 
-    It goes where `simulate` goes, to the last bit where it is given the same periods, to rounding where a table says
-    the same at other times. It is not to be shared between threads.
+    Its motion equals that of `simulate` bit by bit for equal periods, and up to rounding if the same inputs are
+    tabulated at other times. Do not share it between threads.
     """
 
     def __init__(
@@ -97,20 +97,20 @@ class Simulator:
         """Place a robot at rest.
 
         Args:
-            robot: The machine that there is, which may be another than the one that is planned for.
-            start: A pose, at which the robot rests with the tensions of `inverse`; or a single equilibrium: where the
-                platform is, with the lengths that are off the drums there and the wrench that acts.
-            winches: As of `simulate`.
-            winding: As of `simulate`.
-            integrator: As of `simulate`.
-            step: As of `simulate`.
-            damping: As of `simulate`.
+            robot: The simulated robot, which may differ from the robot used for planning.
+            start: A pose, at which the robot rests with the tensions of `inverse`; or a single equilibrium, which gives
+                pose, lengths off the drums and wrench.
+            winches: Same as in `simulate`.
+            winding: Same as in `simulate`.
+            integrator: Same as in `simulate`.
+            step: Same as in `simulate`.
+            damping: Same as in `simulate`.
             load_cell_filter: Time constant of the load cells' first-order filter [s], >= 0.
-            seed: Of their noise.
+            seed: Seed of the load cell noise.
 
         Raises:
-            InvalidValueError: If the robot lacks data that its winches need, the step is above the limit of stability,
-                or an argument is of the wrong kind.
+            InvalidValueError: If the robot lacks data of its winches, the step exceeds the stability limit, or an
+                argument has the wrong type.
 
         Examples:
             >>> import sagline as sl
@@ -153,7 +153,7 @@ class Simulator:
         self._read()
 
     def _set_up_course(self, given: InitialConditions, m: int) -> None:
-        """The lengths between the last set points and the next; of drums with the tensions that are expected."""
+        """Prepare lengths between the last and the next set points; for drums, expected tensions too."""
         drums = self._kind == d.DRUMS
         stretch = 1.0 + self._plant.data[d.WINDING_STRAIN] if drums else np.ones(m)
         lengths = np.repeat(given.lengths.value, 2, axis=0)
@@ -166,7 +166,7 @@ class Simulator:
             self._length_table.value[:, m:] = given.tensions.value
         self._wrench_table = TimeTable(np.zeros(1), given.wrench.value.copy(), np.empty((0, 6)), np.empty((0, 6)))
         table, counters = self._length_table, self._plant.counters
-        # the new set points, copied to the run if all are possible
+        # new set points, copied to the run if all are valid
         self._given = np.zeros(m), np.zeros(wide - m), np.zeros(6)
         self._asked, self._expected, self._wrench = (array.data for array in self._given)
         writable = (table.time, table.value, table.begin, table.end)
@@ -185,7 +185,7 @@ class Simulator:
 
     @property
     def reading(self) -> Reading:
-        """Last reading."""
+        """Last sensor values."""
         return self._reading
 
     def step(
@@ -196,21 +196,22 @@ class Simulator:
         tension: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
     ) -> Reading:
-        """Go on for a period, in which the set points go straight to those that are given.
+        """Simulate one period with linear change of the set points to the given ones.
 
         Args:
             unstrained_length: Set points at the end of the period [m], shape (m,).
-            dt: The period [s], > 0, of whole steps.
-            tension: Expected at the drums at its end [N], shape (m,), which the motors hold; None: as before. Of
-                winches="robot" alone.
-            wrench: On the platform, throughout the period [N, N m], shape (6,); None: as before.
+            dt: Period [s], > 0, a whole number of steps.
+            tension: Expected tensions at the drums at the end of the period [N], shape (m,), which the motors hold;
+                None: unchanged. Only for winches="robot".
+            wrench: Wrench on the platform during the whole period [N, N m], shape (6,); None: unchanged.
 
         Returns:
-            What is read at the end of the period; the next step overwrites its arrays.
+            Sensor values at the end of the period; the next step overwrites its arrays.
 
         Raises:
-            InvalidValueError: If the period is not of whole steps, a length is not longer than its dead length, or an
-                argument is no such array: then nothing has changed. Or if energy grows by itself.
+            InvalidValueError: If the period is not a whole number of steps, a length is not longer than its dead
+                length, or an argument has the wrong type or shape; the state is then unchanged. Also if the energy
+                grows without input.
         """
         count = self._count(dt)
         copy_in(self._asked, unstrained_length, "unstrained_length", "m")
@@ -234,7 +235,7 @@ class Simulator:
         copy_in(self._expected, tension, "tension", "N")
 
     def _refuse(self, with_tension: bool) -> NoReturn:
-        """Raise the error of the first inadmissible set point."""
+        """Raise the error of the first invalid set point."""
         lengths, tension, wrench = self._given
         checked(lengths, "unstrained_length", "m", above=0.0)
         check_set_points(self._plant.robot, TimeTable.constant(lengths))
@@ -254,10 +255,10 @@ class Simulator:
         raise InvalidValueError("dt", f"{period:g} s", allowed, "Choose another, or give Simulator a step.")
 
     def hold(self, *winches: int) -> None:
-        """Lock drums at once, as brakes do; they stay so until `release`.
+        """Lock drums immediately, like brakes; they remain locked until `release`.
 
         Args:
-            winches: Numbers of the winches, from 0; none for all.
+            winches: Indices of the winches, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such winch.
@@ -265,12 +266,12 @@ class Simulator:
         self._plant.lock_winches(self._chosen(winches))
 
     def release(self, *winches: int) -> None:
-        """Let drums go that were locked: from where they stood they go straight to the next set points.
+        """Release locked drums: their set points change linearly from the locked to the next given values.
 
-        A motor is switched on with an empty integral: it only holds the expected tension.
+        The integral of a motor's loop starts at zero: at first it only holds the expected tension.
 
         Args:
-            winches: Numbers of the winches, from 0; none for all.
+            winches: Indices of the winches, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such winch.
@@ -279,20 +280,20 @@ class Simulator:
         chosen[self._chosen(winches)] = True
         freed = chosen & (plant.now[d.HELD] > 0.0)
         plant.now[d.HELD, freed] = plant.now[d.INTEGRAL, freed] = 0.0
-        if self._kind != d.SECOND_ORDER:  # which had other set points before as well
+        if self._kind != d.SECOND_ORDER:  # these also store previous set points
             stood = plant.now[d.WOUND] if self._kind == d.DRUMS else plant.rows[LENGTH]
             self._lengths[freed] = plant.rows[LENGTH, freed]
             self._length_table.value[1, : len(freed)][freed] = stood[freed]
 
     def shift(self, length: float, *winches: int) -> None:
-        """Let set points jump, as they do for a drive whose encoder loses counts; it comes after as its gains say.
+        """Shift set points suddenly, as when an encoder loses counts; the drive follows according to its gains.
 
         Args:
-            length: By how much the way to the next set points begins elsewhere [m].
-            winches: Numbers of the winches, from 0; none for all.
+            length: Shift of the current set points, from which the next ones are approached [m].
+            winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If there is no such winch, or the length is no number.
+            InvalidValueError: If there is no such winch, or the length is not a number.
         """
         chosen, by = self._chosen(winches), number(length, "length", "m")
         drums = self._kind == d.DRUMS
@@ -301,10 +302,10 @@ class Simulator:
         own[chosen] += by * (1.0 + self._plant.data[d.WINDING_STRAIN, chosen] if drums else 1.0)
 
     def cut(self, *cables: int) -> None:
-        """Let cables break: they pull and weigh no longer; their drums go on as they are asked to.
+        """Break cables: their forces and weights vanish; their drums still follow the set points.
 
         Args:
-            cables: Numbers of the cables, from 0; none for all.
+            cables: Indices of the cables, from 0; none for all.
 
         Raises:
             InvalidValueError: If there is no such cable.
@@ -312,14 +313,14 @@ class Simulator:
         self._plant.cut(self._chosen(cables, "cables"))
 
     def limit_force(self, force: float, *winches: int) -> None:
-        """Let drives give no more than so much, a motor that is too hot for instance.
+        """Limit the force of drives, for instance of a motor that is too hot.
 
         Args:
-            force: At the cable [N], >= 0.
-            winches: Numbers of the winches, from 0; none for all.
+            force: Largest force at the cable [N], >= 0.
+            winches: Indices of the winches, from 0; none for all.
 
         Raises:
-            InvalidValueError: If there is no such winch, the force is no such number, or the winches have no motors.
+            InvalidValueError: If there is no such winch, the force is not a number >= 0, or the winches have no motors.
         """
         if self._kind != d.DRUMS:
             step = "Leave it out: these winches have no motors."
@@ -341,7 +342,7 @@ class Simulator:
         return Reading(counts, *(locked(array.view()) for array in (self._cells.reading, *true)))
 
     def _read(self) -> None:
-        """Fill the reading."""
+        """Fill in the sensor values."""
         self._look(*self._seen)
         self._cells.read()
         if self._encoders is not None:

@@ -1,4 +1,4 @@
-"""Time step of a simulation, by the highest frequency of the robot with taut cables and of its winches."""
+"""Time step of a simulation, from the highest frequency of the robot with taut cables and of its winches."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from sagline.kernels.dynamics.massless import RUNGE_KUTTA, SPLITTING
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # of step times highest angular frequency
-SHARE: Final = 0.2  # radians of that frequency in a step, by default
-WAVE_SHARE: Final = 0.465  # of the limit of cables with mass, 0.4 l sqrt(rho/EA): what breaks shakes the shortest waves
+LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # limit of step times highest angular frequency
+SHARE: Final = 0.2  # default step times highest angular frequency [rad]
+# relative to the limit 0.4 l sqrt(rho/EA) of cables with mass: a break excites the shortest waves
+WAVE_SHARE: Final = 0.465
 LONGEST: Final = 1e-3  # s
 
 
 def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
-    """Highest angular frequency of the platform on cables that are all taut [rad/s]: sag only makes them softer."""
+    """Highest angular frequency of the platform with all cables taut [rad/s]; sag only reduces it."""
     # shapes: lengths (K, m) [m]
     rotation, freedom = poses.matrix, robot.freedom
     levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
@@ -64,8 +65,8 @@ def checked_step(
 
 
 def _limit(integrator: int, highest: float, damping: Damping) -> float:
-    """Longest step that is stable at an angular frequency [s]."""
-    ratio = 0.5 * damping.loss_time * highest  # of that frequency's damping
+    """Longest stable step at an angular frequency [s]."""
+    ratio = 0.5 * damping.loss_time * highest  # damping ratio at that frequency
     slower = math.sqrt(1.0 + ratio * ratio) - ratio
     return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
 

@@ -17,20 +17,20 @@ from sagline.kernels.jit import machine_code
 from sagline.robot.drum import drum_lever, drums_of, not_given
 from sagline.robot.robot import Robot
 
-AIR: Final = 1.2  # kg/m^3
-ROUND: Final = 1.2  # drag of a long round cable across the wind, by its diameter
+AIR: Final = 1.2  # kg/m^3, density of air
+ROUND: Final = 1.2  # drag coefficient of a long round cable in cross wind, based on its diameter
 NEEDED: Final = ("drum_radius", "inertia", "position_gain", "speed_gain", "integral_gain")
 
 
 @dataclass(frozen=True, slots=True)
 class SecondOrder(NumberFields):
-    """Winches whose lengths follow their set points as a damped mass on a spring does.
+    """Winches whose lengths follow their set points like a damped second-order system.
 
-    On a set point that moves at a steady rate they lag by 2 damping_ratio / (2 pi bandwidth) times that rate.
+    For a set point with constant rate, the lag is 2 damping_ratio / (2 pi bandwidth) times that rate.
 
     Attributes:
         bandwidth: Natural frequency [Hz], > 0.
-        damping_ratio: Of that oscillation, > 0.
+        damping_ratio: Damping ratio of the oscillation, > 0.
 
     Raises:
         InvalidValueError: If a value is not positive.
@@ -45,7 +45,7 @@ Winding: TypeAlias = Literal["constant", "remembered"]
 
 
 def winch_kind(winches: Any) -> int:
-    """The kernel's code of a kind of winches."""
+    """The kernel's code of a type of winches."""
     if isinstance(winches, SecondOrder):
         return d.SECOND_ORDER
     if isinstance(winches, str) and winches in ("ideal", "robot"):
@@ -62,7 +62,7 @@ def check_winding(winding: Any, kind: int) -> None:
 
 
 def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -> Array:
-    """The drives as kernels take them, (DATA_ROWS, m); length (m,) [m]."""
+    """The drives in the form for kernels, (DATA_ROWS, m); length (m,) [m]."""
     data = np.zeros((d.DATA_ROWS, robot.cable_count))
     if isinstance(winches, SecondOrder):
         data[d.BANDWIDTH] = 2.0 * np.pi * winches.bandwidth
@@ -81,13 +81,13 @@ def drive_data(robot: Robot, winches: Winches, length: Array, with_wind: bool) -
 
 
 def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
-    """Inertia, limits and gains at the cable, on the layer where each drum is at the start."""
+    """Inertia, limits and gains referred to the cable, on the initial layer of each drum."""
     winch = robot.winches
     missing = [f"winches: {name}" for name in NEEDED if winch is None or getattr(winch, name) is None]
     if winch is None or missing:
         step = "Give them in the robot file, or with robot.replace(winches=Winch(...))."
         raise InvalidValueError(*not_given(missing), 'known for winches="robot"', step)
-    ratio = np.abs(winch.gear) / drum_lever(robot, length)  # turns of the motor, in rad, for a meter of cable
+    ratio = np.abs(winch.gear) / drum_lever(robot, length)  # motor rotation [rad] per meter of cable
     data[d.INERTIA] = winch.inertia * ratio**2  # type: ignore[operator]
     data[d.FORCE_LIMIT] = np.inf if winch.torque_limit is None else winch.torque_limit * ratio
     data[d.SPEED_LIMIT] = np.inf if winch.speed_limit is None else winch.speed_limit / ratio
@@ -95,7 +95,7 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
     data[d.POSITION_GAIN] = winch.position_gain
     data[d.SPEED_GAIN] = winch.speed_gain
     data[d.INTEGRAL_GAIN] = winch.integral_gain
-    most = 2.0 * data[d.INERTIA] / d.LOOP_PERIOD  # a larger correction in a period turns the error over, and more
+    most = 2.0 * data[d.INERTIA] / d.LOOP_PERIOD  # a larger correction in one period reverses and increases the error
     if (wild := data[d.SPEED_GAIN] >= most).any():
         i = int(np.argmax(wild))
         allowed = f"< {most[i]:.4g} N s/m for {data[d.INERTIA, i]:.4g} kg at the cable, closed every millisecond"
@@ -114,7 +114,7 @@ class Encoders:
     """
 
     def __init__(self, robot: Robot, wound: Array, stretch: Array) -> None:
-        """Encoders of a robot whose data of drums are complete; wound (m,) [m]; stretch (m,)."""
+        """Encoders of a robot with complete drum data; wound (m,) [m]; stretch (m,)."""
         drums, m = drums_of(robot), robot.cable_count
         zero, rate = drums.zero_and_rate()
         self.counts = np.empty(m)
@@ -125,13 +125,13 @@ class Encoders:
 
     @staticmethod
     def are_on(robot: Robot) -> bool:
-        """True if a robot's winches and cables have all data that counts need."""
+        """True if a robot's winches and cables have all data for counts."""
         winch = robot.winches
         known = winch is not None and all(getattr(winch, name) is not None for name in COUNTED)
         return known and robot.cables.diameter is not None
 
     def read(self) -> None:
-        """Fill the counts."""
+        """Fill in the counts."""
         self._read(*self._arguments)
 
 
@@ -139,12 +139,12 @@ class LoadCells:
     """Load cells at the frame ends of the cables.
 
     Attributes:
-        reading: [N], (m,).
-        generator: Of the noise.
+        reading: Measured tensions [N], (m,).
+        generator: Random generator of the noise.
     """
 
     def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
-        """Make the load cells of a robot; without winches they read what is there."""
+        """Make the load cells of a robot; without winches their values are the true tensions."""
         # shapes: tension (m,) [N]
         m, winch = robot.cable_count, robot.winches
         cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])
@@ -158,6 +158,6 @@ class LoadCells:
         self._read: Any = machine_code(read_cells, self._arguments)
 
     def read(self) -> None:
-        """Fill the readings."""
+        """Fill in the measured tensions."""
         self.generator.standard_normal(out=self._noise)
         self._read(*self._arguments)

@@ -1,4 +1,4 @@
-"""The fastest motion along a path's curve that keeps the tension limits."""
+"""The fastest motion along a path's curve within the tension limits."""
 
 from __future__ import annotations
 
@@ -24,19 +24,20 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
 
-_PLACES: Final = 201  # along a move, at which limits are looked at
-_ITERATIONS: Final = 8  # of the cables' sag
-_CONVERGED: Final = 1e-7  # of the time, that a round changes
-_INSTANTS: Final = 4001  # of a move, at which its limits are checked in the end
-_SLOWER: Final = 1e-6  # of the time, that is given first where a limit is missed; four times as much each time
+_PLACES: Final = 201  # number of positions along a segment at which limits are evaluated
+_ITERATIONS: Final = 8  # largest number of iterations for the sag forces
+_CONVERGED: Final = 1e-7  # relative change of the time in an iteration
+_INSTANTS: Final = 4001  # number of instants of a segment for the final check of the limits
+# relative increase of the time after the first violation of a limit; four times as much after each further one
+_SLOWER: Final = 1e-6
 _TRIES: Final = 12
-_GENTLE: Final = 8  # of these, the margin of the rates for the winches
+_GENTLE: Final = 8  # increments of this size for the margin of the winch rates
 _ROUNDING: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class _TimedSegment:
-    """A move with its new motion: parameter of the curve over time, a little slower than it was found."""
+    """A segment with its new motion: curve parameter over time, slightly slower than the optimum found."""
 
     curve: Curve
     motion: SpeedProfile | JerkProfile
@@ -48,7 +49,7 @@ class _TimedSegment:
         return self.motion.duration * self.slower
 
     def at(self, time: Array) -> tuple[Pose, Array]:
-        """Poses, and twist, its rate and its jerk (3, N, 6)."""
+        """Poses, and twist with its first and second derivatives (3, N, 6)."""
         values = self.motion.at(np.clip(time / self.slower, 0.0, self.motion.duration))
         jet = self.curve.at(np.clip(values[0], 0.0, 1.0))
         return jet.pose, jet.twists(values / self.slower ** np.arange(4)[:, None])
@@ -63,31 +64,31 @@ def fastest(
     angular_jerk: float | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """The path's curve in the shortest time that the tension limits allow, each move from rest to rest.
+    """The path's curve in the shortest time within the tension limits, each segment from rest to rest.
 
-    The limits hold exactly, on sagging cables: at each sample, and 4,000 instants of each move, `inverse` finds
-    tensions that are the margin off them. Without a bound on the jerk the acceleration jumps, as no winch does. With
-    one, the motion is of 100 pieces of constant jerk (of the curve's parameter) a move, whose best is found to some
-    0.1 % of the time.
+    The limits hold exactly, with sagging cables: at each sample, and at 4,000 instants of each segment, `inverse` finds
+    tensions at the given margin from the limits. Without a jerk bound the acceleration is discontinuous, which no winch
+    can follow. With a jerk bound, each segment has 100 pieces of constant jerk (of the curve parameter); its time is
+    within about 0.1 % of the optimum.
 
-    Speed limits of the robot's winches hold for the platform's motion; where the jerk is bounded also for what cables
-    stretch, with the load shared by `Closest`.
+    Speed limits of the robot's winches apply to the platform motion. With a jerk bound they also include the elastic
+    length changes, for the tension distribution of `Closest`.
 
     Args:
-        robot: The robot. Its tension_min and tension_max are kept, of chords or at the frame ends as it says.
-        path: Its curve is followed, whatever its times; where it rests the new one rests too.
+        robot: The robot. Its tension_min and tension_max apply to the tension named in tension_limits_of.
+        path: Path whose curve is followed, independent of its times; the new path rests where this path rests.
         margin: Distance from both limits [N], >= 0.
         jerk: Largest jerk of the platform's origin [m/s^3], > 0; None for no bound.
-        angular_jerk: Largest second rate of the angular velocity [rad/s^3], > 0; None for no bound.
-        progress: Called after each move: how many are done, of how many.
+        angular_jerk: Largest second derivative of the angular velocity [rad/s^3], > 0; None for no bound.
+        progress: Called after each segment: number done, total number.
 
     Returns:
-        Path at the sample rate of the given one. Its jerk is None where no bound was given.
+        Path at the sample rate of the given one. Its jerk is None if no bound was given.
 
     Raises:
-        InvalidValueError: If the path is in motion at an end or turns around in the middle of a curve, if the robot
-            cannot hold a pose of it at rest with this margin (the message says where), if an argument is out of its
-            range, or winches with a speed_limit have no drum_radius.
+        InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve, the robot cannot
+            hold one of its poses at rest with this margin (the message names it), an argument is out of its range, or
+            winches with a speed_limit have no drum_radius.
 
     Source:
         Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018;
@@ -121,7 +122,7 @@ def fastest(
         plan = inverse(inner, new)
         slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
-            ratio = _speed_excess(plan)  # terms of the stretch fall with the cube of the time, others in proportion
+            ratio = _speed_excess(plan)  # elastic terms decrease with the cube of the time, others in proportion
             slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
         if slower == 1.0:
             return new
@@ -167,7 +168,7 @@ def _fastest_segment(
 
 
 def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) -> _TimedSegment:
-    """Segment that keeps its limits between the places too, if need be a little slower."""
+    """Segment that satisfies its limits also between the positions; slowed down slightly if necessary."""
     for again in range(_TRIES):
         pose, twists = timed.at(np.linspace(0.0, timed.duration, _INSTANTS))
         plan = inverse(robot, pose, wrench=inertial_wrench(robot, pose, twists[0], twists[1]))
@@ -175,7 +176,7 @@ def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) ->
         slower = max(1.0, *(np.cbrt(size / limit) for size, limit in zip(sizes, limits, strict=True)))
         if plan.feasible.all() and slower <= 1.0 + _ROUNDING:
             return timed
-        if not plan.feasible.all():  # at rest the limits hold, and what moves needs is the less the slower
+        if not plan.feasible.all():  # the limits hold at rest, and a slower motion needs smaller changes
             slower = max(slower, 1.0 + _SLOWER * 4.0**again)
         timed = replace(timed, slower=timed.slower * slower)
     raise _infeasible_error("in motion", plan)
@@ -199,7 +200,7 @@ def _has_speed_limits(robot: Robot) -> bool:
 
 
 def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
-    """Bounds on the squared speed by the speed limits of winches, from the rates of the chords."""
+    """Bounds on the squared speed from the speed limits of winches, by the rates of the chords."""
     if not _has_speed_limits(robot):
         return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
     fastest_cable = _fastest_rates(robot, rest.unstrained_length)
@@ -217,7 +218,7 @@ def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) ->
 
 
 def _fastest_rates(robot: Robot, length: Array) -> Array:
-    """The fastest that winches change lengths [m/s], at lengths (N, m)."""
+    """Largest length rates of the winches [m/s], at lengths (N, m)."""
     winch = robot.winches
     assert winch is not None
     assert winch.speed_limit is not None

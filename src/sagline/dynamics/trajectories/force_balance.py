@@ -16,17 +16,17 @@ from sagline.kinematics.plan import Plan
 from sagline.robot.robot import Robot
 from sagline.statics.balance import inertial_wrench, structure_matrix
 
-_NOTHING: Final = 1e-11  # of what a direction gains by the tension that it gains most by
-_BLOCK: Final = 40_000  # matrices taken apart at once
-_WIDER: Final = (1.0, 0.03)  # N: limits that a pose on their border is solved with
+_NOTHING: Final = 1e-11  # relative to the largest component of a direction: smaller values count as zero
+_BLOCK: Final = 40_000  # matrices per block
+_WIDER: Final = (1.0, 0.03)  # N: extensions of the limits for poses on their border
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HalfPlanes:
-    """Half planes at K places: rates @ (acceleration, square of the speed) <= bound, row by row."""
+    """Half planes at K positions: rates @ (acceleration, squared speed) <= bound, one per row."""
 
     rates: Array  # shape (K, R, 2)
-    bound: Array  # shape (K, R); infinite where a row says nothing
+    bound: Array  # shape (K, R); infinite for a row without effect
 
     def joined(self, other: HalfPlanes) -> HalfPlanes:
         """Half planes of both."""
@@ -35,24 +35,24 @@ class HalfPlanes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceBalance:
-    """The platform's balance at K places of a curve, on cables that pull as they do at tensions near by.
+    """Force balance of the platform at K positions of a curve, with sag forces at nearby tensions.
 
-    J tau = needed - u w_u - x w_x, u the acceleration and x the square of the speed along the curve's parameter. What
-    the cables pull beside their chords is that of the tensions last found: it is exact there, and hardly changes.
+    J tau = needed - u w_u - x w_x, with u the acceleration and x the squared speed of the curve parameter. The sag
+    forces are those at the last tensions found: exact there, and nearly constant nearby.
     """
 
-    robot: Robot  # the robot; its limits are those to keep
-    jet: Jet  # the places
+    robot: Robot  # the robot, with the tension limits
+    jet: Jet  # the positions
     wrenches: Array  # w_u and w_x: inertial wrenches for u = 1 and for x = 1, shape (2, K, 6)
-    normals: Array  # directions of wrenches that may bound what cables can give, shape (K, R, n)
-    gains: Array  # what a unit of each tension gives along them, shape (K, R, m), at most 1
-    standing: Array  # the needed wrench where u = x = 0, in free motions, shape (K, n)
+    normals: Array  # normals of wrench bounds, shape (K, R, n)
+    gains: Array  # components of unit tensions along the normals, shape (K, R, m), at most 1
+    standing: Array  # needed wrench at u = x = 0, in free motions, shape (K, n)
     low: Array  # lower limits of the chord tensions [N], shape (K, m)
     high: Array  # upper limits [N], shape (K, m)
 
     @classmethod
     def at(cls, robot: Robot, jet: Jet, plan: Plan) -> ForceBalance:
-        """The balance at places where a plan at rest is known."""
+        """The force balance at positions with a known plan at rest."""
         nothing = np.zeros(plan.chord_tension.shape)
         freedoms = robot.degrees_of_freedom
         one = np.zeros((len(nothing), 1, freedoms))
@@ -68,7 +68,7 @@ class ForceBalance:
         normals = np.concatenate(list(_normals(matrix)))
         gains = normals @ matrix
         size = np.maximum(np.abs(gains).max(axis=-1, keepdims=True), _NOTHING)
-        gains[np.abs(gains) <= _NOTHING * size] = 0.0  # of the columns in the plane; a limit may be infinite
+        gains[np.abs(gains) <= _NOTHING * size] = 0.0  # columns in the plane; a limit may be infinite
         wrenches = np.stack((by_rate, by_speed))
         return replace(self, jet=jet, wrenches=wrenches, normals=normals / size, gains=gains / size)
 
@@ -78,10 +78,10 @@ class ForceBalance:
         return total
 
     def with_sag_of(self, plan: Plan, motion: Array) -> ForceBalance:
-        """Force balance with the sag forces of a plan for motions (K, 2); infeasible poses keep theirs."""
+        """Force balance with the sag forces of a plan for motions (K, 2); infeasible poses keep their sag forces."""
         assert plan.needed is not None
         found, freedom = plan.feasible[:, None], self.robot.freedom.T
-        # a limit at the frame end is one of the chord tension that differs from it as it does here
+        # a frame-end limit is converted to a chord limit with the current difference of the two tensions
         chords = self.robot.tension_limits_of == "chord"
         below = 0.0 if chords else plan.state.cables.frame_end_tension - plan.chord_tension
         return replace(
@@ -93,8 +93,8 @@ class ForceBalance:
 
     def near_motion(self, motion: Array) -> ForceBalance:
         """Force balance with the sag forces at motions (K, 2), on the border of the limits or a little outside."""
-        # On the border itself tensions are all but fixed, but rounding may leave none: they are those within limits a
-        # little wider, the narrowest that have an answer
+        # On the border the tensions are nearly unique, and rounding may leave none; slightly wider limits are therefore
+        # used, the narrowest with a solution
         found, wrench = self, self.wrench(motion)
         for by in _WIDER:
             low, high = np.maximum(self.robot.tension_min - by, 0.0), self.robot.tension_max + by
@@ -103,8 +103,8 @@ class ForceBalance:
         return found
 
     def half_planes(self) -> HalfPlanes:
-        """The polygons: along no normal is more needed than the cables give within their limits."""
-        with np.errstate(invalid="ignore"):  # no share of an infinite limit
+        """Polygons of feasible motions: along every normal, the needed wrench is within the cables' range."""
+        with np.errstate(invalid="ignore"):  # zero component times an infinite limit
             ends = [np.where(self.gains == 0.0, 0.0, self.gains * limit[:, None]) for limit in (self.low, self.high)]
         most = np.maximum(*ends).sum(axis=-1)
         along = np.einsum("krn,ckn->krc", self.normals, self.wrenches @ self.robot.freedom.T)
@@ -112,9 +112,9 @@ class ForceBalance:
 
 
 def _normals(matrix: Array) -> Iterator[Array]:
-    """Both sides of every plane that n - 1 columns of matrices (K, n, m) span, shape (K, 2 S, n), block by block."""
-    # They hold all facets of the body that the columns make with bounded shares; of columns in a plane of less
-    # dimensions any normal is taken, which bounds it too
+    """Both normals of all planes spanned by n - 1 columns of matrices (K, n, m), shape (K, 2 S, n), in blocks."""
+    # They include all facets of the zonotope of the columns with bounded coefficients. For dependent columns any normal
+    # is taken; its bound is valid too
     n, m = matrix.shape[1:]
     sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
     step = max(1, _BLOCK // len(sets))
@@ -124,20 +124,20 @@ def _normals(matrix: Array) -> Iterator[Array]:
         yield np.concatenate((normal, -normal), axis=1)
 
 
-_FLAT = 1e-12  # of the largest: rates that are none
+_FLAT = 1e-12  # relative to the largest rate: smaller rates count as zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpeedProfile:
-    """Constant acceleration of the parameter from place to place."""
+    """Constant acceleration of the parameter between neighboring positions."""
 
     place: Array  # parameters, shape (K,)
-    square: Array  # squares of the speed there, shape (K,)
-    time: Array  # when they are passed [s], shape (K,)
+    square: Array  # squared speeds there, shape (K,)
+    time: Array  # times of the positions [s], shape (K,)
 
     @classmethod
     def of(cls, place: Array, square: Array) -> SpeedProfile:
-        """The profile with the times that follow."""
+        """The profile, with the times computed from the squared speeds."""
         speed = np.sqrt(square)
         return cls(place, square, np.append(0.0, np.cumsum(2.0 * np.diff(place) / (speed[1:] + speed[:-1]))))
 
@@ -148,18 +148,18 @@ class SpeedProfile:
 
     @property
     def acceleration(self) -> Array:
-        """From each place to the next, shape (K - 1,)."""
+        """Acceleration from each position to the next, shape (K - 1,)."""
         rate: Array = 0.5 * np.diff(self.square) / np.diff(self.place)
         return rate
 
     @property
     def motion(self) -> Array:
-        """Acceleration that follows and square of the speed at each place, shape (K, 2)."""
+        """Following acceleration and squared speed at each position, shape (K, 2)."""
         rate = self.acceleration
         return np.stack((np.append(rate, rate[-1]), self.square), axis=1)
 
     def at(self, time: Array) -> Array:
-        """Parameter and its first three derivatives by time, shape (4, N); the last is 0 where it is one."""
+        """Parameter and its first three time derivatives, shape (4, N); the third is 0 within each piece."""
         k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.place) - 2)
         since, rate, speed = time - self.time[k], self.acceleration[k], np.sqrt(self.square[k])
         place = self.place[k] + since * (speed + 0.5 * since * rate)
@@ -167,9 +167,9 @@ class SpeedProfile:
 
 
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
-    """The profile from rest to rest that is at each place as fast as any that stays within the bounds; place (K,)."""
-    # Backward, from which squares of the speed the end can be reached; forward, the largest acceleration that stays
-    # among them. A bound at both ends of a step holds within it, except for the bounds' curvature.
+    """Rest-to-rest profile with the largest speed within the bounds at each position; place (K,)."""
+    # Backward pass: squared speeds from which the end can be reached. Forward pass: the largest acceleration that stays
+    # within them. A bound at both ends of a step also holds within it, except for the curvature of the bounds.
     # source: Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018
     steps, last = np.diff(place), len(place) - 1
     reach = np.zeros((len(place), 2))
@@ -190,9 +190,9 @@ def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | No
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
-    """Bounds on (acceleration, square of the speed) at place i: there, at the next, and to stay in reach."""
+    """Bounds on (acceleration, squared speed) at position i: at i, at the next position, and for reachability."""
     sheared = planes.rates[i + 1].copy()
-    sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the square grows by 2 step times the acceleration
+    sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the squared speed grows by 2 step times the acceleration
     ahead = np.array([[2.0 * step, 1.0], [-2.0 * step, -1.0], [0.0, -1.0]])
     rates = np.concatenate((planes.rates[i], sheared, ahead))
     bound = np.concatenate((planes.bound[i], planes.bound[i + 1], [reach[1], -reach[0], 0.0]))
@@ -201,7 +201,7 @@ def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array,
 
 
 def _range(rates: Array, bound: Array) -> tuple[float, float]:
-    """Least and largest second variable that some first one goes with; the least the larger where there is none."""
+    """Smallest and largest second variable for which a first one exists; the smallest is larger if there is none."""
     flat = np.abs(rates[:, 0]) <= _FLAT * np.abs(rates[:, 0]).max()
     up, down = ~flat & (rates[:, 0] > 0.0), ~flat & (rates[:, 0] < 0.0)
     slope, level = rates[:, 1] / np.where(flat, 1.0, rates[:, 0]), bound / np.where(flat, 1.0, rates[:, 0])

@@ -14,25 +14,25 @@ from sagline.dynamics.trajectories.segments import Curve
 from sagline.kinematics.inverse import inverse
 from sagline.robot.robot import Robot
 
-Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # further conditions at parameters
+Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # further conditions at given parameters
 
-PIECES: Final = 100  # of constant jerk
+PIECES: Final = 100  # number of pieces of constant jerk
 _ITERATIONS: Final = 40
-_CONVERGED: Final = 1e-6  # of the time, that a round changes
-_SLOWER: Final = 1.2  # times the least time: where the iterations begin
+_CONVERGED: Final = 1e-6  # relative change of the time in an iteration
+_SLOWER: Final = 1.2  # initial time of the iterations, relative to the smallest time
 _NOTHING: Final = 1e-30
-_SIDES: Final = 32  # directions in which a polygon's border is looked for
+_SIDES: Final = 32  # number of directions in which a polygon's border is sampled
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JerkProfile:
-    """Constant jerk of the parameter in equal pieces of the time."""
+    """Piecewise constant jerk of the parameter, on equal pieces of the time."""
 
-    jerk: Array  # third derivative of the parameter by the share of the time, shape (P,)
+    jerk: Array  # third derivative of the parameter with respect to time over duration, shape (P,)
     duration: float  # the time [s]
 
     def at(self, time: Array) -> Array:
-        """Parameter and its first three derivatives by time, shape (4, N)."""
+        """Parameter and its first three time derivatives, shape (4, N)."""
         state = _integration_matrices(len(self.jerk)) @ self.jerk  # at the knots
         scaled = np.clip(time / self.duration, 0.0, 1.0) * len(self.jerk)
         k = np.minimum(scaled.astype(np.intp), len(self.jerk) - 1)
@@ -49,21 +49,22 @@ class JerkProfile:
 
 
 def _integration_matrices(pieces: int) -> Array:
-    """Parameter, its rate and its second rate at the knots by the jerk of each piece, shape (3, P + 1, P)."""
+    """Matrices from piece jerks to parameter and its first two derivatives at the knots, shape (3, P + 1, P)."""
     h = 1.0 / pieces
-    since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h  # since each piece's begin
-    left = np.maximum(since - h, 0.0)  # and its end
+    # time since the start of each piece
+    since = np.maximum(np.arange(pieces + 1)[:, None] - np.arange(pieces), 0.0) * h
+    left = np.maximum(since - h, 0.0)  # time since its end
     return np.stack([(since**k - left**k) / f for k, f in ((3, 6.0), (2, 2.0), (1, 1.0))])
 
 
 def fastest_jerk_profile(
     curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
 ) -> JerkProfile | None:
-    """The course from rest to rest in the shortest time that is found within tension limits and bounds on jerk."""
+    """Fastest rest-to-rest profile found within tension limits and jerk bounds."""
     # Linear in the jerk and in the square of the time, except for the position at each share of the time, the
     # square of its speed and the time's third power: those are computed again in iterations, each a linear program
     # units: limits [m/s^3]; least [s]
-    from scipy.optimize import linprog  # takes longer to load than all the rest of dynamics
+    from scipy.optimize import linprog  # this import takes longer than the rest of dynamics
 
     course = _first(curve, limits, least)
     state = _integration_matrices(PIECES)
@@ -79,7 +80,7 @@ def fastest_jerk_profile(
         planes = _without_redundant(balances.half_planes().joined(speeds(np.clip(place, 0.0, 1.0))))
         rows, bounds = zip(
             _within(planes, state, speed),
-            (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # never back
+            (np.hstack((-state[1, 1:-1], np.zeros((PIECES - 1, 1)))), np.zeros(PIECES - 1)),  # no backward motion
             *(
                 _jerk_rows(jet.rates[..., part], state, course, limit)
                 for part, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True)
@@ -98,7 +99,7 @@ def fastest_jerk_profile(
 
 
 def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfile:
-    """The profile of 5th degree, in a time in which it may keep the limits."""
+    """Initial profile: 5th-degree polynomial, with a time that probably satisfies the limits."""
     middle = (np.arange(PIECES) + 0.5) / PIECES
     jerk = 60.0 - 360.0 * middle + 360.0 * middle**2
     state = _integration_matrices(PIECES)
@@ -110,7 +111,7 @@ def _first(curve: Curve, limits: tuple[float, float], least: float) -> JerkProfi
 
 
 def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Array]:
-    """Rows of a linear program in (jerk, square of the time): the half planes at each knot, shape (K r, P + 1)."""
+    """Rows of a linear program in (jerk, squared time): the half planes at each knot, shape (K r, P + 1)."""
     by_rate, by_square = (planes.rates[..., k, None] for k in range(2))
     left = by_rate * state[2][:, None] + by_square * 2.0 * speed[:, None, None] * state[1][:, None]
     rows = np.concatenate((left, -planes.bound[..., None]), axis=-1).reshape(-1, PIECES + 1)
@@ -121,12 +122,13 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
 
 
 def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
-    """Rows that keep a jerk, R1 s''' + 3 R2 s' s'' + R3 s'^3, within its limit in some directions at all knots."""
-    # Along the way and across, and in its own direction, so that the iterations end with its size within the limit
+    """Rows that limit the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at all knots."""
+    # Directions: along and across the curve, and along the current jerk, so that the magnitude of the final jerk is
+    # within the limit
     # shapes: rates (3, P + 1, 3)
     _, speed, rate = (values[:, None] for values in state @ course.jerk)
     first, second, third = rates
-    rest = 3.0 * second * speed * rate + third * speed**3  # as it is now: it changes little from round to round
+    rest = 3.0 * second * speed * rate + third * speed**3  # current value; it changes little between iterations
     rows, bounds = [], []
     square = course.duration**2
     for knots in (slice(None, -1), slice(1, None)):  # both ends of each piece
@@ -149,7 +151,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _without_redundant(planes: HalfPlanes) -> HalfPlanes:
-    """Half planes that contain the origin, without those that the border shows in none of some directions."""
+    """Half planes that contain the origin, without those that bound the polygon in none of the sampled directions."""
     normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)
