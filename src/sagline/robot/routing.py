@@ -58,7 +58,7 @@ class _ExitState(NamedTuple):
     rolling: Array  # 1 + f while winding in, 1 - f while paying out, 1 at rest
 
     def entering(self, bend: Array) -> Array:
-        """Tension before the pulley, on the drum side [N], with an additional bend at the frame anchor [rad]."""
+        """Tension on the drum side of the pulley [N], after an additional bend at the frame anchor [rad]."""
         rubbed = self.tension * np.exp(self.friction * (self.wrap + bend)) * self.rolling
         drop = 2.0 * self.weight * self.radius * self.entry * self.sine / self.stiffness
         return _tension_after(rubbed, drop, self.stiffness)

@@ -49,7 +49,7 @@ class Winch:
             axes [m], shape (..., k, 3): the first is where the cable leaves the drum, and the frame anchor is not among
             them. Between two guides the cable is a free catenary. None: the whole dead length is guided. Stiffness and
             sensitivities are those of a straight guided run of the same length.
-        drum_radius: Radius of the drum at the lower side of the cable [m]; None if the drum is not known.
+        drum_radius: Radius of the drum to the surface under the cable [m]; None if the drum is not known.
         drum_width: Usable width along the drum axis [m], >= groove_pitch; a layer has drum_width/groove_pitch turns,
             not necessarily a whole number. None: wide enough for one layer.
         groove_pitch: Distance between adjacent turns along the drum axis [m].

@@ -46,7 +46,7 @@ class WinchDrive:
         """A winch with this drive.
 
         Args:
-            drum_radius: Radius of the drum at the bottom of the cable [m].
+            drum_radius: Radius of the drum to the surface under the cable [m].
             drum_inertia: Moment of inertia of the drum about its own axis [kg m^2], >= 0.
             fields: Other fields of `Winch`, position_gain for instance.
 

@@ -17,19 +17,20 @@ from sagline.motion.rest_to_rest import time_grid
 from sagline.motion.segments import QUINTIC, Segments
 from sagline.robot.pose import Pose
 
-_STOPPED: Final = 1e-6  # of the largest speed
-_NARROW: Final = 0.2  # of the mean step: knots of a spline are no nearer, as where a motion begins
+_STOPPED: Final = 1e-6  # relative to the largest speed
+# relative to the mean step: smallest distance of spline knots, for example at the start of a motion
+_NARROW: Final = 0.2
 
 
 class Jet(NamedTuple):
-    """Poses of a curve, and how they change with its parameter."""
+    """Poses of a curve, and their derivatives with respect to its parameter."""
 
     pose: Pose  # poses, a batch of N
-    # twist for a parameter that grows by 1 a second, and its first two derivatives by the parameter, shape (3, N, 6)
+    # twist at unit parameter rate, and its first two derivatives with respect to the parameter, shape (3, N, 6)
     rates: Array
 
     def twists(self, motion: Array) -> Array:
-        """Twist, its rate and its jerk of a motion along the curve, by the chain rule."""
+        """Twist and its first and second time derivatives for a motion along the curve, by the chain rule."""
         # shapes: motion (4, N); returns (3, N, 6)
         (first, second, third), (_, v, a, j) = self.rates, motion[:, :, None]
         return np.stack((first * v, second * v**2 + first * a, third * v**3 + 3.0 * second * v * a + first * j))
@@ -39,15 +40,15 @@ class Curve(Protocol):
     """A curve in the space of poses."""
 
     def at(self, parameter: Array) -> Jet:
-        """Poses and their change at parameters of shape (N,)."""
+        """Poses and their derivatives at parameters of shape (N,)."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LineCurve:
-    """A straight way with a turn about a fixed axis; its parameter is the share of both that is done."""
+    """Straight line with a rotation about a fixed axis; its parameter is the covered share of both."""
 
-    ends: Segments  # the one segment that it is
+    ends: Segments  # a single segment
 
     @classmethod
     def between(cls, pose: Pose) -> _LineCurve:
@@ -61,16 +62,16 @@ class _LineCurve:
 
     @property
     def direction(self) -> Array:
-        """Twist for a parameter that grows by 1 a second, shape (6,)."""
+        """Twist at unit parameter rate, shape (6,)."""
         return np.concatenate((self.ends.move[0], self.ends.turn[0]))
 
     def parameter(self, pose: Pose) -> Array:
-        """Parameters of poses that are on the line, shape (N,)."""
+        """Parameters of poses on the line, shape (N,)."""
         move, turn = self.ends.move[0], self.ends.turn[0]
         if (extent := move @ move) >= (angle := float(np.linalg.norm(turn))) ** 2:
             along: Array = (pose.position - self.ends.start[0]) @ move / extent
             return along
-        # half angles from -45 to 135 degrees: the sign of a quaternion means nothing
+        # half angles from -45 to 135 degrees, because q and -q are the same rotation
         half = np.arctan2(
             pose.quaternion @ self.ends.side_quaternion[0], pose.quaternion @ self.ends.start_quaternion[0]
         )
@@ -78,7 +79,7 @@ class _LineCurve:
         return turned
 
     def at(self, parameter: Array) -> Jet:
-        """Poses and their change at parameters of shape (N,)."""
+        """Poses and their derivatives at parameters of shape (N,)."""
         rates = np.zeros((3, parameter.size, 6))
         rates[0] = self.direction
         half = (0.5 * np.linalg.norm(self.ends.turn[0]) * parameter)[:, None]
@@ -89,15 +90,15 @@ class _LineCurve:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SplineCurve:
-    """A curve through samples, by splines of 5th degree in position and quaternion over its own length."""
+    """Curve through samples: 5th-degree splines of position and quaternion over its arc length."""
 
     position: Any  # spline of the position
-    quaternion: Any  # spline of a quaternion that need not be of unit length
+    quaternion: Any  # spline of a quaternion, not necessarily of unit length
 
     @classmethod
     def through(cls, pose: Pose, parameter: Array) -> SplineCurve:
-        """The splines through poses at ascending parameters; where these are too near each other, through some."""
-        from scipy.interpolate import make_interp_spline  # takes longer to load than all the rest of motion
+        """Splines through poses at ascending parameters; poses whose parameters are too close are left out."""
+        from scipy.interpolate import make_interp_spline  # this import takes longer than the rest of motion
 
         least, knots = _NARROW * parameter[-1] / len(parameter), [0]
         for k in range(1, len(parameter)):
@@ -111,10 +112,10 @@ class SplineCurve:
         return cls(*(make_interp_spline(parameter[knots], values[knots], k=degree) for values in columns))
 
     def at(self, parameter: Array) -> Jet:
-        """Poses and their change at parameters of shape (N,)."""
+        """Poses and their derivatives at parameters of shape (N,)."""
         place = [self.position(parameter, order) for order in range(4)]
         q = [self.quaternion(parameter, order) for order in range(4)]
-        # with w = 2 vec(q' q*)/(q . q), whatever the length of q: numerator, denominator and their derivatives
+        # with w = 2 vec(q' q*)/(q . q) for any length of q: numerator, denominator and their derivatives
         top = [2.0 * _vector(q[1], q[0]), 2.0 * _vector(q[2], q[0])]
         top.append(2.0 * _vector(q[3], q[0]) + 2.0 * _vector(q[2], q[1]))
         below = [np.sum(q[0] * q[k], axis=1)[:, None] * (1.0 if k == 0 else 2.0) for k in range(3)]
@@ -127,7 +128,7 @@ class SplineCurve:
 
 
 def _arc_lengths(time: Array, twist: Array, twist_rate: Array) -> Array:
-    """Length of the way at each sample, a radian counted as a meter, with its first two derivatives by time."""
+    """Arc length at each sample, with 1 rad counted as 1 m, and its first two time derivatives."""
     # shapes: time (N,) [s]; twist (N, 6); twist_rate (N, 6); returns (3, N)
     speed = np.linalg.norm(twist, axis=1)
     inside = speed[1:-1] <= _STOPPED * speed.max()
@@ -153,13 +154,13 @@ def _vector(a: Array, b: Array) -> Array:
 
 
 def piecewise(knots: Array, values: Array, at_end: int) -> Any:
-    """The piecewise polynomial with given derivatives at both ends of every piece: of 7th degree for four of each."""
+    """Piecewise polynomial with given derivatives at both ends of each piece; degree 7 for four per end."""
     # shapes: knots (n,); values (K, n)
-    from scipy.interpolate import PPoly  # takes longer to load than all the rest of motion
+    from scipy.interpolate import PPoly  # this import takes longer than the rest of motion
 
     step = np.diff(knots)
     known = len(values)
-    # derivatives as Taylor coefficients of a piece, its length taken as 1
+    # derivatives as Taylor coefficients of a piece, scaled to length 1
     left, right = (values[:, part] * _powers(step, known) for part in (slice(None, -1), slice(1, None)))
     pieces = np.concatenate((left, np.zeros_like(left)))
     pieces[:, :-1] = _pieces(left[:, :-1], right[:, :-1])
@@ -173,28 +174,30 @@ def _powers(step: Array, count: int) -> Array:
 
 
 def _pieces(left: Array, right: Array) -> Array:
-    """Coefficients of ascending order from Taylor coefficients at both ends, shape (left + right, pieces)."""
+    """Coefficients in ascending order from Taylor coefficients at both ends, shape (left + right, pieces)."""
     low, high = len(left), len(right)
     binomials = np.array([[float(comb(i, j)) for i in range(low + high)] for j in range(high)])
     rest = np.linalg.solve(binomials[:, low:], right - binomials[:, :low] @ left)
     return np.concatenate((left, rest))
 
 
-RESTING: Final = 1e-3  # of the path's largest speed or acceleration: splines through samples stand no better
-_STANDING: Final = 1e-9  # of its largest speed: in between, where it might only turn around
-_ON_A_LINE: Final = 1e-7  # of the way: how far samples may be off a line that they are on
+# relative to the path's largest speed or acceleration: accuracy of rest for splines through samples
+RESTING: Final = 1e-3
+# relative to its largest speed: stricter limit between the ends, where the platform might only reverse
+_STANDING: Final = 1e-9
+_ON_A_LINE: Final = 1e-7  # relative to the length: largest distance of samples from a line
 TINY: Final = 1e-300
-_SAME_TIME: Final = 1e-9  # of the path's duration
+_SAME_TIME: Final = 1e-9  # relative to the path's duration
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestToRestSegment:
-    """A motion from rest to rest."""
+    """Motion from rest to rest."""
 
-    begin: float  # when it begins [s]
-    end: float  # when it ends [s]
-    curve: Curve | None  # where it leads; None where the platform stands all the time
-    progress: Any  # parameter of the curve over the time since the begin: scipy's PPoly; None likewise
+    begin: float  # start time [s]
+    end: float  # end time [s]
+    curve: Curve | None  # curve of the motion; None if the platform is at rest all the time
+    progress: Any  # curve parameter over time since the start, a scipy PPoly; None if the curve is None
     sample: int  # index of its first sample
 
     @property
@@ -203,8 +206,9 @@ class RestToRestSegment:
         return self.end - self.begin
 
     def rates(self, time: Array) -> Array:
-        """Parameter of the curve and its first three derivatives at given times since the begin, shape (4, N)."""
-        # Before the begin and after the end it rests. A derivative that jumps is that of the later side.
+        """Parameter of the curve and its first three derivatives at given times since the start, shape (4, N)."""
+        # Before the start and after the end, the platform is at rest. At a discontinuity, a derivative has its later
+        # value.
         assert self.progress is not None
         held = np.clip(time, 0.0, self.duration)
         values = np.stack([self.progress(held, order) for order in range(4)])
@@ -214,8 +218,8 @@ class RestToRestSegment:
 
 def segments_of(path: Path) -> tuple[RestToRestSegment, ...]:
     """Rest-to-rest segments of a path, in order."""
-    # Between rests the parameter runs through the samples with all derivatives that the path knows: a polynomial of 7th
-    # degree from sample to sample, of 5th without jerk. Paths of `quintic_path` and `septic_path` are that exactly.
+    # Between rests the parameter is a polynomial between samples, with all derivatives known from the path: of 7th
+    # degree, or of 5th degree without jerk. Paths of `quintic_path` and `septic_path` are represented exactly.
     _check_ends(path)
     rests = path.rests if path.rests is not None else _standing(path)
     return tuple(_segment(path, float(first), float(last)) for first, last in pairwise(rests))
@@ -235,13 +239,13 @@ def _check_ends(path: Path) -> None:
 
 
 def _speed(twist: Array) -> Array:
-    """A radian counts as a meter, shape (N,)."""
+    """Speed with 1 rad counted as 1 m, shape (N,)."""
     speed: Array = np.linalg.norm(twist, axis=-1)
     return speed
 
 
 def _standing(path: Path) -> Array:
-    """Times of the samples at rest, the first and the last among them."""
+    """Times of the samples at rest, including the first and the last."""
     speed, rate = _speed(path.twist), _speed(path.twist_rate)
     still = (speed <= _STANDING * speed.max()) & (rate <= RESTING * rate.max())
     still[[0, -1]] = True
@@ -250,7 +254,7 @@ def _standing(path: Path) -> Array:
 
 
 def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
-    """Segment between two rests; rests between samples are reached by the polynomials beside them."""
+    """Segment between two rests; rests between samples are reached by extending the adjacent polynomials."""
     near = _SAME_TIME * max(path.duration, abs(begin))
     first, last = np.searchsorted(path.time, (begin - near, end + near))
     part = slice(int(first), int(last))
@@ -265,7 +269,8 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
     rates = [path.twist[part], path.twist_rate[part], *([] if path.jerk is None else [path.jerk[part]])]
     curve, values = _parametrized(time, path.pose[part], rates)
     standing, over = abs(time[0]) <= near, abs(time[-1] - (end - begin)) <= near
-    # a sample at a rest may belong to the next segment only; quintic paths are exact with 3 of 4, septic ones to h^7
+    # A sample at a rest may belong only to the next segment; quintic paths are exact with 3 of 4 derivatives, septic
+    # ones to h^7.
     at_end = 3 if path.jerk is not None or part.stop == len(path) else 2
     progress = piecewise(time, values, at_end if over else len(values))
     if not (standing and over):
@@ -274,13 +279,13 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
         held[:, int(not standing) :][:, : time.size] = values
         held[0] = progress(knots)
         if not standing and len(values) > 3:
-            held[3, 0] = progress(0.0, 3)  # it rests, but its jerk need not be zero
+            held[3, 0] = progress(0.0, 3)  # at rest, but its jerk can be nonzero
         progress = piecewise(knots, held, at_end if over else 3)
     return RestToRestSegment(begin, end, curve, progress, part.start)
 
 
 def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, Array]:
-    """A curve through samples, and its parameter with its derivatives at each, shape (K, n)."""
+    """A curve through samples, and its parameter with derivatives at each sample, shape (K, n)."""
     line = _LineCurve.between(pose)
     if line.moves:
         parameter, square = line.parameter(pose), float(line.direction @ line.direction)
@@ -288,7 +293,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
         there = line.at(parameter).pose
         off = [np.abs(there.position - pose.position).max() ** 2]
         off.append(1.0 - np.abs(np.sum(there.quaternion * pose.quaternion, axis=1)).min())
-        for rate, value in zip(rates, values[1:], strict=True):  # the last sample may be in the next move
+        for rate, value in zip(rates, values[1:], strict=True):  # the last sample may be in the next segment
             aside = np.abs(rate - value[:, None] * line.direction)[:-1].max()
             off.append((aside / max(np.abs(rate[:-1]).max(), TINY)) ** 2)
         if max(off) <= _ON_A_LINE**2 * max(1.0, square):
@@ -299,7 +304,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
 
 
 def sample_time(path: Path) -> float:
-    """The usual time from one sample to the next [s]; a rate that is all but a whole number is that."""
+    """Usual time between samples [s]; a sample rate close to a whole number is rounded to it."""
     if len(path) < 2:
         raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
     rate = 1.0 / float(np.median(np.diff(path.time)))
@@ -315,8 +320,8 @@ def joined_path(
     with_jerk: bool,
 ) -> Path:
     """Segments of a path with new durations [s], at its sample rate."""
-    # `motion` takes the number of a segment that moves and times since its begin; it returns poses and twists with
-    # their first two derivatives, (3, N, 6)
+    # `motion` takes the index of a moving segment and times since its start; it returns poses and twists with their
+    # first two derivatives, (3, N, 6).
     ends = np.cumsum(durations)
     rests = np.append(0.0, ends)
     time = time_grid(float(ends[-1]), 1.0 / sample_time(path))

@@ -20,20 +20,20 @@ from sagline.dynamics.trajectories.segments import RestToRestSegment, joined_pat
 from sagline.motion.path import Path, checked_time
 from sagline.robot.pose import Pose
 
-MOST_IMPULSES: Final = 10_000  # three for each of eight frequencies are 6,561
-_SAME: Final = 1e-12  # of a shaper's duration: impulses so near are one
-_ROUNDING: Final = 1e-9  # of the sum of the amplitudes
+MOST_IMPULSES: Final = 10_000  # three impulses for each of eight frequencies give 6,561
+_SAME: Final = 1e-12  # relative to a shaper's duration: closer impulses are merged
+_ROUNDING: Final = 1e-9  # relative to the sum of the amplitudes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shaper(Result):
-    """Impulses that a motion is convolved with: it is made of shares of itself, each a little later.
+    """Impulses for convolution with a motion; the result is a sum of scaled and delayed copies of the motion.
 
-    The product of two shapers convolves them: what either leaves at rest, the product leaves at rest.
+    The product of two shapers is their convolution: it cancels the vibrations that either of them cancels.
 
     Attributes:
-        time: When the impulses come [s], shape (K,), ascending, the first no earlier than 0.
-        amplitude: Share of the motion that starts at each, shape (K,), their sum 1.
+        time: Times of the impulses [s], shape (K,), ascending, the first >= 0.
+        amplitude: Amplitudes of the impulses, shape (K,); their sum is 1.
         frequency: Design frequencies [Hz], shape (F,); empty if unknown.
     """
 
@@ -45,12 +45,12 @@ class Shaper(Result):
         """Check the impulses.
 
         Args:
-            time: When they come [s], shape (K,), strictly increasing, >= 0.
-            amplitude: Their shares, shape (K,); they sum to 1.
+            time: Times of the impulses [s], shape (K,), strictly increasing, >= 0.
+            amplitude: Amplitudes of the impulses, shape (K,); their sum is 1.
             frequency: Design frequencies [Hz], > 0, shape (F,).
 
         Raises:
-            InvalidValueError: If they are no such impulses.
+            InvalidValueError: If times, amplitudes or frequencies do not satisfy these conditions.
 
         Examples:
             >>> import sagline as sl
@@ -69,20 +69,20 @@ class Shaper(Result):
 
     @property
     def duration(self) -> float:
-        """Delay of the end of a shaped motion [s]."""
+        """Additional duration of a shaped motion [s]."""
         return float(self.time[-1])
 
     def __mul__(self, other: Shaper) -> Shaper:
-        """Both, one after the other, in any order.
+        """Convolution of both shapers; the order is irrelevant.
 
         Args:
             other: A shaper.
 
         Returns:
-            Shaper with an impulse for each pair of impulses; those at one time are one.
+            Shaper with one impulse per pair of impulses; impulses at the same time are merged.
 
         Raises:
-            InvalidValueError: If the other is none, or there were more than 10,000 impulses.
+            InvalidValueError: If other is not a shaper, or the product would have more than 10,000 impulses.
         """
         theirs = instance(other, Shaper, "the other factor")
         if (count := self.time.size * theirs.time.size) > MOST_IMPULSES:
@@ -96,11 +96,11 @@ class Shaper(Result):
         return Shaper(times[first], merged, np.concatenate((self.frequency, theirs.frequency)))
 
     def residual(self, frequency: ArrayLike, damping_ratio: float = 0.0) -> Array:
-        """Share of the vibration that is left when a motion ends, of what the unshaped motion leaves.
+        """Residual vibration at the end of a motion, relative to that of the unshaped motion.
 
         Args:
-            frequency: Of the vibration, undamped [Hz], >= 0, of any shape.
-            damping_ratio: Of the vibration, >= 0, < 1.
+            frequency: Undamped frequency of the vibration [Hz], >= 0, of any shape.
+            damping_ratio: Damping ratio of the vibration, >= 0, < 1.
 
         Returns:
             |sum A_j exp((zeta w + i w_d) t_j)| exp(-zeta w t_K), w = 2 pi frequency, w_d = w sqrt(1 - zeta^2), of the
@@ -121,14 +121,14 @@ class Shaper(Result):
 
 
 def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
-    """Zero vibration: two impulses half a period apart leave nothing at the frequency.
+    """Zero vibration: two impulses half a period apart cancel the vibration at the frequency.
 
     Args:
-        frequency: Natural frequency [Hz], > 0; of several, shape (F,), the product of their shapers.
-        damping_ratio: Of the vibration, >= 0, < 1, one for all or one a frequency.
+        frequency: Natural frequency [Hz], > 0; for several, shape (F,), the product of their shapers.
+        damping_ratio: Damping ratio of the vibration, >= 0, < 1, one for all or one per frequency.
 
     Returns:
-        Shaper that makes a motion half a period longer.
+        Shaper that extends a motion by half a period.
 
     Raises:
         InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
@@ -146,14 +146,14 @@ def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa:
 
 
 def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
-    """Zero vibration and derivative: as `ZV`, and little is left where the frequency is a little off.
+    """Zero vibration and derivative: like `ZV`, but with little vibration also for a small frequency error.
 
     Args:
-        frequency: Natural frequency [Hz], > 0; of several, shape (F,), the product of their shapers.
-        damping_ratio: Of the vibration, >= 0, < 1, one for all or one a frequency.
+        frequency: Natural frequency [Hz], > 0; for several, shape (F,), the product of their shapers.
+        damping_ratio: Damping ratio of the vibration, >= 0, < 1, one for all or one per frequency.
 
     Returns:
-        Shaper of three impulses that makes a motion a period longer.
+        Shaper of three impulses that extends a motion by a period.
 
     Raises:
         InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
@@ -171,15 +171,15 @@ def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa
 
 
 def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N802
-    """Extra insensitive: leaves the tolerance at the frequency itself, nothing a little above and below.
+    """Extra insensitive: residual equal to the tolerance at the frequency, zero slightly above and below it.
 
     Args:
-        frequency: Natural frequency [Hz], > 0, of a vibration that is hardly damped; of several, shape (F,), the
+        frequency: Natural frequency [Hz], > 0, of a vibration with very low damping; for several, shape (F,), the
             product of their shapers.
-        tolerance: Share of the vibration that may be left, >= 0, < 1, one for all or one a frequency.
+        tolerance: Allowed share of residual vibration, >= 0, < 1, one for all or one per frequency.
 
     Returns:
-        Shaper of three impulses that makes a motion a period longer.
+        Shaper of three impulses that extends a motion by a period.
 
     Raises:
         InvalidValueError: If a frequency is not positive, or a tolerance out of its range.
@@ -197,7 +197,7 @@ def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N8
 
 
 def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[[float, float], Shaper]) -> Shaper:
-    """The product of the shapers of each frequency, each with its option, a number from 0 to below 1."""
+    """The product of the shapers of each frequency, each with its option, a number >= 0 and < 1."""
     frequencies, options = checked(frequency, "frequency", "Hz", above=0.0), checked(option, name, "", low=0.0)
     if (options >= 1.0).any():
         raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")
@@ -221,7 +221,7 @@ def _zero_vibration_and_derivative(frequency: float, damping_ratio: float) -> Sh
 
 
 def _half_period(frequency: float, damping_ratio: float) -> tuple[float, float]:
-    """Half a period of the damped vibration [s], and what is left of it after that."""
+    """Half a period of the damped vibration [s], and the remaining amplitude ratio after it."""
     root = np.sqrt(1.0 - damping_ratio**2)
     return 0.5 / (frequency * root), float(np.exp(-np.pi * damping_ratio / root))
 
@@ -245,32 +245,32 @@ def _damping_ratio(value: float) -> float:
     return ratio
 
 
-_BYTES: Final = 300.0  # a sample for each impulse, while it is shaped
+_BYTES: Final = 300.0  # memory per sample and impulse, during shaping
 
 
 def shaped(path: Path, shaper: Shaper) -> Path:
-    """The path, shaped: it leads along the same curve, a little later, and leaves the shaper's frequencies at rest.
+    """Shaped path: it follows the same curve with a delay and does not excite the shaper's frequencies.
 
-    How far along its curve the platform is at each time is convolved with the shaper's impulses, in each move from rest
-    to rest by itself; the next begins when the last has ended, later than before. Along a straight line with a turn
-    about a fixed axis the acceleration itself is so convolved, and a linear vibration cancels exactly; along a curve
-    the platform stays on it, and most cancels.
+    The curve parameter over time is convolved with the shaper's impulses, for each rest-to-rest segment separately;
+    each segment starts at the delayed end of the previous one. Along a straight line with a rotation about a fixed
+    axis, this convolves the acceleration itself, and a linear vibration cancels exactly. Along a curve the platform
+    stays on the curve, and most of the vibration cancels.
 
-    Paths of `quintic_path` and `septic_path` are the polynomials that they are, to rounding. Between the samples of
-    others splines of 5th or 7th degree are taken; along a curve poses are off it by the sixth power of the way from
-    sample to sample.
+    Paths of `quintic_path` and `septic_path` are represented exactly, up to rounding. For other paths, splines of 5th
+    or 7th degree connect the samples; along a curve, the pose error is of the sixth order in the distance between
+    samples.
 
     Args:
-        path: A path from rest to rest; where it does not know its rests (see `Path.rests`), they are the samples
-            without velocity and acceleration.
+        path: A path from rest to rest; if its rests are not known (see `Path.rests`), the samples without velocity and
+            acceleration count as rests.
         shaper: Shaper of the convolution: `ZV`, `ZVD`, `EI` of a frequency, or their product.
 
     Returns:
-        Path at the same sample rate, each of its moves longer by the shaper's duration.
+        Path at the same sample rate; each of its segments is longer by the shaper's duration.
 
     Raises:
-        InvalidValueError: If the path is in motion at an end or turns around in the middle of a curve, or a frequency
-            of the shaper is above half the path's sample rate.
+        InvalidValueError: If the path is in motion at an end or reverses in the middle of a curve, or a frequency of
+            the shaper is above half the path's sample rate.
 
     Source:
         Singhose, Command shaping for flexible systems: a review of the first 50 years, 2009;
@@ -303,7 +303,7 @@ def shaped(path: Path, shaper: Shaper) -> Path:
 
 
 def _shaped_parameter(segment: RestToRestSegment, shaper: Shaper, time: Array) -> Array:
-    """Parameter of a shaped move and its first three derivatives at times since its begin, shape (4, N)."""
+    """Parameter of a shaped segment and its first three derivatives at times since its start, shape (4, N)."""
     motion = np.zeros((4, time.size))
     for delay, share in zip(shaper.time, shaper.amplitude, strict=True):
         motion += share * segment.rates(time - delay)

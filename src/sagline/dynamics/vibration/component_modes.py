@@ -24,7 +24,7 @@ from sagline.statics.strings import Strings
 
 @cache
 def _lobatto() -> Lobatto:
-    """The nodes and what belongs to them."""
+    """Gauss-Lobatto nodes, weights and matrices."""
     n = LARGEST_DEGREE + 1
     rule = Lobatto(np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n, n)), np.zeros((n, n, n)))
     for p in range(2, n):
@@ -40,21 +40,21 @@ def _lobatto() -> Lobatto:
 
 
 def _slopes(nodes: Array, last: Array) -> Array:
-    """Slopes at the nodes of the polynomials that are 1 at one of them; last: Legendre's of the degree there."""
+    """Derivatives at the nodes of the Lagrange polynomials; last: Legendre polynomial of that degree at the nodes."""
     apart = nodes[:, None] - nodes
     np.fill_diagonal(apart, 1.0)
     slopes = last[:, None] / last / apart
     np.fill_diagonal(slopes, 0.0)
-    np.fill_diagonal(slopes, -slopes.sum(axis=1))  # a constant has none
+    np.fill_diagonal(slopes, -slopes.sum(axis=1))  # a constant has zero derivative
     return np.asarray(slopes)
 
 
 def _integrals(weights: Array, values: Array) -> Array:
-    """Integrals from -1 to the nodes of the same polynomials; values: Legendre's to one degree more at the nodes."""
+    """Integrals of the Lagrange polynomials from -1 to the nodes; values: Legendre polynomials, one degree more."""
     p = weights.size - 1
     scale = np.arange(p + 1) + 0.5
-    scale[p] = 0.5 * p  # the rule makes more of its square
-    shares = scale[:, None] * (values[:, : p + 1] * weights[:, None]).T  # of Legendre's polynomials, a node a column
+    scale[p] = 0.5 * p  # the quadrature rule overestimates its square
+    shares = scale[:, None] * (values[:, : p + 1] * weights[:, None]).T  # Legendre coefficients, one node per column
     odd = 2.0 * np.arange(1, p + 1) + 1.0
     sums = np.column_stack((values[:, 0] + values[:, 1], (values[:, 2:] - values[:, :p]) / odd))
     return np.asarray(sums @ shares)
@@ -64,16 +64,16 @@ _TINY = 1e-300
 
 
 class CableComponents(NamedTuple):
-    """Motions of the t taut cables of one state with both ends held, T together: those in the planes come first.
+    """Fixed-end modes of the t taut cables of one state, T in total; in-plane modes come first.
 
     Attributes:
-        square: Of their angular frequencies [1/s^2], shape (T,).
-        cable: Whose they are, shape (T,).
-        participation: P, by which an acceleration of the platform end drives them, world axes, shape (T, 3) [sqrt(kg)].
-        still: M_0, mass of every cable as its platform end moves it at rest, world axes, shape (m, 3, 3) [kg].
-        plane: The motions in the cables' planes, cable by cable.
-        normal: Those normal to them.
-        mesh: Where they are known.
+        square: Squared angular frequencies [1/s^2], shape (T,).
+        cable: Cable index of each mode, shape (T,).
+        participation: Participation P of an acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)].
+        still: M_0, mass of every cable for quasi-static motion of its platform end, world axes, shape (m, 3, 3) [kg].
+        plane: The modes in the cables' planes, cable by cable.
+        normal: The modes normal to the planes.
+        mesh: Nodes of the modes.
     """
 
     square: Array
@@ -85,14 +85,14 @@ class CableComponents(NamedTuple):
     mesh: StringMesh
 
     def planes(self, ends: Array, amplitudes: Array) -> tuple[tuple[PlaneModes, Array, Array], ...]:
-        """The motions in the planes and those normal to them, each with what moves them.
+        """In-plane and normal modes, each with their excitation.
 
         Args:
             ends: Displacements of all platform ends in K modes, world axes, shape (m, 3, K).
-            amplitudes: Of the components, shape (T, K).
+            amplitudes: Amplitudes of the components, shape (T, K).
 
         Returns:
-            Motions; displacements of the platform ends in their directions, (t, d, K); amplitudes, (t, k, K).
+            Modes; displacements of the platform ends in their directions, (t, d, K); amplitudes, (t, k, K).
         """
         own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
         swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])
@@ -106,8 +106,8 @@ class StringMesh(NamedTuple):
     Attributes:
         taut: Indices of the cables, t of them.
         table: Their rows of the table of strings, shape (t, STRING_COLUMNS).
-        axes: Level along the plane, normal to it, and up, shape (t, 3, 3).
-        omega: Angular frequency whose waves they carry [rad/s].
+        axes: Horizontal in the plane, normal to it, and upward, shape (t, 3, 3).
+        omega: Highest angular frequency that the nodes resolve [rad/s].
         points: Material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6).
     """
 
@@ -124,19 +124,19 @@ class StringMesh(NamedTuple):
 
 
 class PlaneModes(NamedTuple):
-    """Motions of the taut cables in one plane, k of each.
+    """Modes of the taut cables in one plane, k of each.
 
-    Displacements of a cable's u unknowns are times the roots of their masses.
+    The u unknowns of a cable are displacements multiplied by the roots of their masses.
     """
 
-    rest: Array  # of the nodes with the platform end displaced at rest, shape (t, u, d)
+    rest: Array  # quasi-static shape of the nodes for a displaced platform end, shape (t, u, d)
     square: Array  # angular frequencies squared, ascending [1/s^2], shape (t, k)
-    shape: Array  # of the nodes, shape (t, u, k)
-    drive: Array  # by the platform end, shape (t, k, d)
+    shape: Array  # mode shapes at the nodes, shape (t, u, k)
+    drive: Array  # excitation by the platform end, shape (t, k, d)
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents:
-    """Motions of the cables of one state, right up to a frequency; those above complete what the cables can do."""
+    """Modes of the cables of one state, accurate up to a frequency; higher ones complete the basis."""
     # units: up_to [Hz]
     omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
@@ -147,8 +147,8 @@ def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents
     points, carried, mass = np.empty((t, n, 6)), np.empty((t, n, 5)), np.empty((t, 4))
     plane, normal = np.empty((t, 2 * n, 2 * n)), np.empty((t, n, n))
     spectral_matrices(table, omega, _lobatto(), points, plane, normal, carried, mass)
-    free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is held
-    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # and so is a frame end that does not give way
+    free = (np.arange(n) < counts[:, None] - 1)[..., None]  # the platform end is fixed
+    first = 0 if table[:, columns.BEHIND_X :].any() else 1  # a rigid frame end is also fixed
     inside = _motions(plane, carried[:, :, :4].reshape(t, 2 * n, 2), np.repeat(free, 2, axis=1), 2 * first)
     aside = _motions(normal, carried[:, :, 4:], free, first)
     swings = inside.drive @ axes[:, ::2]
@@ -165,7 +165,7 @@ def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents
 
 
 def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
-    """Fixed-end modes in one plane, of the unknowns that move in any cable."""
+    """Fixed-end modes in one plane, for the unknowns that move in any cable."""
     last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
     square, own = np.linalg.eigh(matrix[:, first:last, first:last])
     shape = np.zeros((*matrix.shape[:2], last - first))
@@ -183,7 +183,7 @@ def _still(mass: Array, axes: Array, taut: Indices, count: int) -> Array:
 
 
 def _node_motion(components: CableComponents, ends: Array, amplitudes: Array) -> tuple[Array, Array]:
-    """Motion of the nodes times the roots of their masses: in the planes and normal to them."""
+    """Node displacements times the roots of their masses: in the planes and normal to them."""
     # shapes: ends (m, 3, K); amplitudes (T, K); returns (t, 2 nodes, K)
     plane, normal = (
         motions.rest @ end + motions.shape @ given for motions, end, given in components.planes(ends, amplitudes)
@@ -200,7 +200,7 @@ def cable_shapes(components: CableComponents, ends: Array, amplitudes: Array, co
     plane, normal = _node_motion(components, ends, amplitudes)
     inside = plane.reshape(t, n, 2, k)
     behind = mesh.table[:, [columns.BEHIND_X, columns.BEHIND_Z]]
-    slide = np.hypot(*behind.T)  # a frame end that gives way has one motion in the plane
+    slide = np.hypot(*behind.T)  # an elastic frame end has one motion in the plane
     inside[:, 0] = (behind / np.maximum(slide, _TINY)[:, None])[:, :, None] * inside[:, 0, :1]
     own = np.concatenate((inside, normal[:, :, None]), axis=2)
     turned = np.swapaxes(mesh.axes[:, None, [0, 2, 1]], -1, -2) @ own
@@ -212,13 +212,13 @@ def cable_shapes(components: CableComponents, ends: Array, amplitudes: Array, co
 
 
 def stretch_energy(components: CableComponents, ends: Array, amplitudes: Array) -> Array:
-    """Twice the energy of stretch in each mode of unit modal mass, (t, K) [1/s^2]."""
+    """Twice the stretch energy in each mode of unit modal mass, (t, K) [1/s^2]."""
     plane, _ = _node_motion(components, ends, amplitudes)
     return np.asarray(np.einsum("tik,tik->tk", plane, _stretch_matrices(components.mesh) @ plane))
 
 
 def stretch_stiffness(components: CableComponents) -> Array:
-    """Stiffness of stretch between displacements of the platform end at rest and the motions in the plane."""
+    """Stretch stiffness between quasi-static displacements of the platform end and the in-plane modes."""
     # returns (t, 2 + k, 2 + k)
     motions = components.plane
     basis = np.concatenate((motions.rest, motions.shape), axis=2)

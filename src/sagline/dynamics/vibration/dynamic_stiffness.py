@@ -25,10 +25,10 @@ class Damping(NumberFields):
     """Damping of a vibration; none by default.
 
     Attributes:
-        loss_time: Eta of the cables' stretch [s], >= 0: at the angular frequency omega EA becomes EA (1 + i omega eta)
-            (Kelvin-Voigt).
-        air_damping: Force on a cable against its velocity, a length [N s/m^2], >= 0.
-        modal_damping: Damping ratio of every mode, on top of the others, >= 0, < 1.
+        loss_time: Loss time eta of the cables' stretch [s], >= 0: at angular frequency omega, EA becomes EA (1 + i
+            omega eta) (Kelvin-Voigt).
+        air_damping: Drag force per length and velocity of a cable [N s/m^2], >= 0.
+        modal_damping: Additional damping ratio of every mode, >= 0, < 1.
 
     Raises:
         InvalidValueError: If a value is out of its range.
@@ -51,28 +51,29 @@ class Damping(NumberFields):
 
 EXACT = 0.45 * np.pi  # phase of a transverse wave in an element [rad]
 Complex = NDArray[np.complex128]
-_BYTES = 400.0  # a cable and frequency
+_BYTES = 400.0  # per cable and frequency
 
 
 def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> Complex:
-    """Force on the platform end of every cable by its displacement, while it vibrates about an equilibrium.
+    """Dynamic stiffness of every cable at its platform end, for vibration about an equilibrium.
 
-    Exact about the elastic catenary, in its plane and out of it, from taut string to deep sag; the frame end is held,
-    or on what gives way behind it. At frequency zero it is that of `stiffness`.
+    Exact for vibrations about the elastic catenary, in and out of its plane, from taut string to deep sag; the frame
+    end is fixed, or elastic due to cable on pulley and dead length. At frequency zero it equals the cable stiffness of
+    `stiffness`.
 
     Args:
         state: An equilibrium, a single one.
-        frequency: [Hz], >= 0, shape (F,) or a single one.
-        damping: Energy losses of the vibration; None: none. Its modal_damping is a loss factor twice as
-            large of all stiffness, which damps every mode by that ratio at its own frequency.
+        frequency: Frequencies [Hz], >= 0, shape (F,) or a single one.
+        damping: Energy losses of the vibration; None: no losses. Its modal_damping acts as a loss factor of all
+            stiffness, twice as large, so that every mode has this damping ratio at its own frequency.
 
     Returns:
         Complex array of shape (F, m, 3, 3), or (m, 3, 3) [N/m], world axes; NaN for folded or slack cables,
         which have no linear vibration.
 
     Raises:
-        InvalidValueError: If the state is no single Equilibrium with lengths, of exact or elastic cables; if a
-            frequency is negative, or so high that a cable would hold more than a hundred thousand waves.
+        InvalidValueError: If the state is not a single Equilibrium with lengths and with exact or elastic cables; if a
+            frequency is negative, or so high that a cable would contain more than a hundred thousand waves.
 
     Examples:
         >>> import numpy as np
@@ -100,7 +101,7 @@ def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping
 
 
 def single_state(state: Equilibrium) -> Equilibrium:
-    """A single equilibrium, as it is."""
+    """Check a single equilibrium and return it unchanged."""
     if instance(state, Equilibrium, "state").pose.shape:
         step = "Take the poses one by one: state[i]."
         raise InvalidValueError("state", f"a batch of {len(state)}", "a single state", step)
@@ -116,7 +117,7 @@ def check_solved(state: Equilibrium) -> None:
 
 
 def check_model(state: Equilibrium) -> None:
-    """Refuse cable models without vibrations: shallow models' forces have no energy, straight cables no stretch."""
+    """Refuse cable models without vibrations: forces of shallow models have no energy, straight cables no stretch."""
     model = state.cables.model
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Solve the pose with Catenary(), the default."
@@ -124,7 +125,7 @@ def check_model(state: Equilibrium) -> None:
 
 
 def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None) -> Complex:
-    """Dynamic stiffness of the cables of one state, less their stiffness at rest."""
+    """Dynamic stiffness of the cables of one state, minus their static stiffness."""
     # shapes: frequency (F,) [Hz]; returns (F, m, 3, 3) [N/m]
     waves = waves_of(frequency, damping)
     kind = np.float64 if damping is None else np.complex128
@@ -142,7 +143,7 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
 
 
 def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
-    """Refuse a frequency for which a cable has too many elements, or none that does."""
+    """Refuse a frequency at which a cable needs too many elements, or cannot be computed."""
     # shapes: counts (1, F, m, 2); frequency (F,) [Hz]
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:
@@ -154,7 +155,7 @@ def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
 
 
 def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
-    """Stiffness in the planes of cables, and normal to them, in the world."""
+    """Cable stiffness in its plane and normal to it, converted to world axes."""
     # shapes: found (F, m, FOUND); axes (m, 3, 3); returns (F, m, 3, 3)
     xx, xz, zz, yy = np.moveaxis(found, -1, 0)[..., None, None]
     level, normal, up = np.moveaxis(axes, 1, 0)
@@ -169,7 +170,7 @@ def in_world(found: NDArray[np.float64] | Complex, axes: Array) -> Complex:
 
 
 def waves_of(frequency: Array, damping: Damping | None) -> Complex:
-    """Frequencies and damping as kernels take them."""
+    """Frequencies and damping in the form for kernels."""
     # shapes: frequency (F,) [Hz]; returns (1, F, WAVE_COLUMNS)
     omega = 2.0 * np.pi * frequency
     waves = np.zeros((1, frequency.size, collocation.WAVE_COLUMNS), dtype=np.complex128)

@@ -1,4 +1,4 @@
-"""Derivatives of the flexibility of free cables by force, length and material: third order of their energy."""
+"""Derivatives of the flexibility of free cables with respect to force, length and material (third order of energy)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from sagline.core.arrays import Array, Flags
 from sagline.robot.equilibrium import Equilibrium
 
-_SMOOTH = 0.1  # of u = w L/(N_A + N_B): up to there twelve points integrate to the last digit
+_SMOOTH = 0.1  # limit of u = w L/(N_A + N_B): below it, twelve points integrate to rounding error
 _POINTS, _SHARES = (0.5 * np.array(values) for values in np.polynomial.legendre.leggauss(12))
 _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 
@@ -18,11 +18,12 @@ _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 class Flexibility(NamedTuple):
     """Derivatives of the flexibility of every cable, a symmetric matrix [m/N], in world axes."""
 
-    by_force: Array  # by the force on the platform end, symmetric in all three axes [m/N^2], shape (..., m, 3, 3, 3)
-    by_length: Array  # by the unstrained length, which enters at the frame end [1/N], shape (..., m, 3, 3)
-    by_density: Array  # by the linear density [m^2/(N kg)], shape (..., m, 3, 3)
-    by_stiffness: Array  # by the axial stiffness [m/N^2], shape (..., m, 3, 3)
-    stretch: Array  # integral of t t^T/EA ds, t the tangent: the part that is stretch [m/N], shape (..., m, 3, 3)
+    # with respect to the force on the platform end, symmetric in all axes [m/N^2], shape (..., m, 3, 3, 3)
+    by_force: Array
+    by_length: Array  # with respect to the unstrained length, added at the frame end [1/N], shape (..., m, 3, 3)
+    by_density: Array  # with respect to the linear density [m^2/(N kg)], shape (..., m, 3, 3)
+    by_stiffness: Array  # with respect to the axial stiffness [m/N^2], shape (..., m, 3, 3)
+    stretch: Array  # integral of t t^T/EA ds, t the tangent: the stretch part [m/N], shape (..., m, 3, 3)
 
 
 class _CatenaryState(NamedTuple):
@@ -33,8 +34,8 @@ class _CatenaryState(NamedTuple):
     b: Array  # vertical force at the platform end [N]
     size_a: Array  # tension at the frame end [N]
     size_b: Array  # tension at the platform end [N]
-    weight: Array  # a length [N/m]
-    length: Array  # [m]
+    weight: Array  # per length [N/m]
+    length: Array  # unstrained length [m]
 
     @property
     def product(self) -> Array:
@@ -47,12 +48,12 @@ class _CatenaryState(NamedTuple):
 
     @property
     def smooth(self) -> Flags:
-        """True where the force hardly changes along the cable."""
+        """True where the force is nearly constant along the cable."""
         return self.weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
 
 
 def flexibility(state: Equilibrium, force: Array) -> Flexibility:
-    """Derivatives of the flexibility of free cables, from where they leave the frame to their platform ends."""
+    """Derivatives of the flexibility of the free spans."""
     # shapes: force (..., m, 3) [N]
     cables = state.cables
     length = cables.unstrained_length
@@ -84,7 +85,7 @@ def flexibility(state: Equilibrium, force: Array) -> Flexibility:
 
 
 def _axes(force: Array) -> Array:
-    """Directions along a cable's span, across it and up, as rows, (..., m, 3, 3); any where the force is vertical."""
+    """Horizontal, normal and upward axes of a cable, as rows, (..., m, 3, 3); arbitrary if the force is vertical."""
     level = np.hypot(force[..., 0], force[..., 1])
     vertical = level == 0.0
     x = np.where(vertical, 1.0, force[..., 0]) / np.where(vertical, 1.0, level)
@@ -97,7 +98,7 @@ def _axes(force: Array) -> Array:
 
 
 def _turning(h: Array, v: Array, size: Array) -> Array:
-    """(1 - t t^T)/N where the force is (h, 0, v), shape (..., 3, 3)."""
+    """Matrix (1 - t t^T)/N for the force (h, 0, v), shape (..., 3, 3)."""
     force = np.stack((h, np.zeros_like(h), v), axis=-1)
     unit = force / size[..., None]
     found: Array = (np.eye(3) - unit[..., :, None] * unit[..., None, :]) / size[..., None, None]
@@ -126,7 +127,7 @@ def _by_force(hung: _CatenaryState) -> Array:
 
 
 def _turned(hung: _CatenaryState) -> Array:
-    """Integral of h/N^3, (sine_b - sine_a)/(h w), written so that it does not cancel."""
+    """Integral of h/N^3, (sine_b - sine_a)/(h w), in a form without cancellation."""
     cosine = (hung.h**2 + hung.a * hung.b) / hung.product
     near = hung.length / hung.product * hung.h * (1.0 / hung.size_a + 1.0 / hung.size_b) / (1.0 + cosine)
     far = (hung.b / hung.size_b - hung.a / hung.size_a) / (hung.h * hung.weight)
@@ -134,14 +135,14 @@ def _turned(hung: _CatenaryState) -> Array:
 
 
 def _by_weight(hung: _CatenaryState) -> Array:
-    """Derivative by the weight a length at fixed force on the platform end, (..., 3, 3)."""
+    """Derivative with respect to the weight per length at fixed platform-end force, (..., 3, 3)."""
     h, product = hung.h, hung.product
     lifted = -hung.length * hung.slope / product
     turned = _turned(hung)
     across = 2.0 * np.arctanh(hung.weight * hung.length / (hung.size_a + hung.size_b)) / hung.weight
-    whole = _plane_of(across - h * turned, across, h * lifted, h * turned)  # the part of the flexibility without EA
+    whole = _plane_of(across - h * turned, across, h * lifted, h * turned)  # part of the flexibility without EA
     force = np.stack((h, np.zeros_like(h), hung.b), axis=-1)
-    # that part is homogeneous in force and weight, of degree -1
+    # this part is homogeneous in force and weight, of degree -1
     steep = -(whole + np.einsum("...abc,...c->...ab", _by_force(hung), force)) / hung.weight[..., None, None]
     size, h, v, below = _points(hung)
     drop = -v / size**3
@@ -167,7 +168,7 @@ def _outer(hung: _CatenaryState) -> Array:
 
 
 def _points(hung: _CatenaryState) -> tuple[Array, Array, Array, Array]:
-    """Tension, horizontal and vertical force at points of integration, and the length below them, (..., P)."""
+    """Tension, horizontal and vertical force at integration points, and the length below them, (..., P)."""
     below = (0.5 - _POINTS) * hung.length[..., None]
     v = hung.b[..., None] - hung.weight[..., None] * below
     h = np.broadcast_to(hung.h[..., None], v.shape)
@@ -179,7 +180,7 @@ def _chosen(hung: _CatenaryState, even: Array, steep: Array) -> Array:
 
 
 def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:
-    """Matrices (..., 3, 3) without coupling between the plane and across it."""
+    """Matrices (..., 3, 3) without coupling between in-plane and normal directions."""
     whole = np.zeros((*along.shape, 3, 3))
     whole[..., _ALONG, _ALONG], whole[..., _ACROSS, _ACROSS], whole[..., _UP, _UP] = along, across, up
     whole[..., _ALONG, _UP] = whole[..., _UP, _ALONG] = mixed
@@ -187,7 +188,7 @@ def _plane_of(along: Array, across: Array, mixed: Array, up: Array) -> Array:
 
 
 def _symmetric(parts: dict[tuple[int, int, int], Array]) -> Array:
-    """A tensor that is symmetric in all three axes, from one of each of its elements that are equal."""
+    """A tensor that is symmetric in all three axes, from its independent elements."""
     whole = np.zeros((*next(iter(parts.values())).shape, 3, 3, 3))
     for place, values in parts.items():
         for turned in permutations(place):

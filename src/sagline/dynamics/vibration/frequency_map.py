@@ -33,7 +33,7 @@ from sagline.statics.stiffness import compliance_of
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest
 
-BLOCK: Final = 16  # poses at once: a twentieth of a second, after which an interrupt is heard
+BLOCK: Final = 16  # poses per block: a twentieth of a second, after which an interrupt is handled
 _CLOSEST: Final = Closest()
 _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
@@ -42,7 +42,7 @@ _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 class FrequencyMap(Result, Saved):
     """Result of `frequency_map` at N poses.
 
-    Numbers are NaN where the status is neither SOLVED nor FOLDED; frequencies also where no mode lies below up_to.
+    Values are NaN unless the status is SOLVED or FOLDED; frequencies also if no mode is below up_to.
 
     Attributes:
         robot: The robot.
@@ -50,12 +50,12 @@ class FrequencyMap(Result, Saved):
         up_to: Frequency below which modes are found [Hz].
         damping: Energy losses.
         status: Codes of `VibrationStatus`, shape (N,).
-        frequency: Lowest, with cable mass [Hz], shape (N,).
-        massless_frequency: Lowest of the platform on cables whose mass does not swing [Hz], shape (N,).
-        platform_share: Of the lowest mode with cable mass, shape (N,).
-        peak: Strongest answer, at rest or near a mode below up_to: displacement of the center of mass for a force on
-            it, in the direction that it answers to most, as of `frequency_response` [m/N], shape (N,); infinite
-            without damping.
+        frequency: Lowest natural frequency with cable mass [Hz], shape (N,).
+        massless_frequency: Lowest natural frequency of the platform with massless cables [Hz], shape (N,).
+        platform_share: Platform share of the kinetic energy in the lowest mode with cable mass, shape (N,).
+        peak: Largest receptance, static or near a mode below up_to: displacement of the center of mass per force on it,
+            in the direction of largest response, as in `frequency_response` [m/N], shape (N,); infinite without
+            damping.
         peak_frequency: Frequency of that peak [Hz], shape (N,).
     """
 
@@ -80,24 +80,23 @@ def frequency_map(
     damping: Damping | None = _ONE_PERCENT,
     progress: Progress | None = None,
 ) -> FrequencyMap:
-    """Lowest frequency and strongest answer of a robot at many poses, cables with mass.
+    """Lowest frequency and largest receptance of a robot at many poses, with cable mass.
 
-    Each pose as by `vibration`: all modes below up_to, their number proved by the exact count.
+    Each pose is evaluated as in `vibration`: all modes below up_to; the exact count confirms their number.
 
     Args:
         robot: The robot.
         poses: A batch of N.
-        up_to: Frequency below which modes are wanted [Hz], > 0.
+        up_to: Upper limit of the mode frequencies [Hz], > 0.
         tension: Tension distribution method, as in `inverse`.
-        damping: Energy losses, for the largest response; a modal damping of 1 % by default; None:
-            nothing.
-        progress: Called after every few poses: how many are done, of how many.
+        damping: Energy losses, for the largest response; a modal damping of 1 % by default; None: no losses.
+        progress: Called after every few poses: number done, total number.
 
     Returns:
         FrequencyMap.
 
     Raises:
-        InvalidValueError: If an argument is of the wrong kind, up_to is not positive, or too many modes lie below it.
+        InvalidValueError: If an argument has the wrong type, up_to is not positive, or too many modes are below it.
         SaglineError: If modes and count disagree; the message names the pose.
 
     Examples:
@@ -139,7 +138,7 @@ def frequency_map(
 
 
 def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
-    """Status of a pose, and the lowest frequency on massless cables [Hz]."""
+    """Status of a pose, and the lowest frequency with massless cables [Hz]."""
     if np.isnan(model.stiffness[row]).any():
         return VibrationStatus.NO_LENGTHS, np.nan
     frequency, leaving = massless_modes(model, row)
@@ -152,7 +151,7 @@ def _status(model: VibrationModel, row: int) -> tuple[VibrationStatus, float]:
 def _numbers_of_pose(
     state: Equilibrium, model: VibrationModel, row: int, up_to: float, damping: Damping, lowest: float
 ) -> tuple[float, ...]:
-    """Numbers of one pose in the order of `FrequencyMap`; `lowest` is the lowest frequency on massless cables [Hz]."""
+    """Values of one pose in the order of `FrequencyMap`; `lowest` is the lowest massless frequency [Hz]."""
     freedom = model.freedom
     rest = compliance_of(freedom, model.stiffness[row])[:3, :3]
     found = state_modes(model, row, up_to)

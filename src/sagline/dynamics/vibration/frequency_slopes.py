@@ -29,28 +29,32 @@ from sagline.statics.stiffness import modes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencySlopes(Result):
-    """Result of `frequency_slopes`: derivatives of K frequencies, the platform settling in its new equilibrium.
+    """Result of `frequency_slopes`: derivatives of K frequencies, with the platform moving to its new equilibrium.
 
-    All else is held: the lengths off the drums, the wrench. Where the lengths are to follow a pose, by a way of
-    sharing, add length_sensitivity times what they change by.
+    All other data are constant: the lengths off the drums, the wrench. If the lengths follow a pose by a tension
+    distribution method, add length_sensitivity times the length changes.
 
-    Equal frequencies have no separate derivatives: with a growing datum they separate, by the values in their
-    rows, ascending; where it shrinks the same apart from the sign. The mean over them has their mean as derivative.
+    Equal frequencies have no separate derivatives. With an increasing parameter they split; the derivatives are then
+    the values in their rows, ascending. With a decreasing parameter they are the same except for the sign. The mean
+    of equal frequencies has the mean of the values as derivative.
 
     Attributes:
         state: The state.
-        cable_mass: Whether the cables' mass swings; if not, the frequencies are massless ones.
-        frequency: [Hz], shape (K,).
+        cable_mass: True if the cable mass vibrates; False for massless frequencies.
+        frequency: Natural frequencies [Hz], shape (K,).
         group: Group of each frequency; equal frequencies have the same number, shape (K,).
-        length_sensitivity: By the length of each cable, shape (K, m) [Hz/m].
-        density_sensitivity: By the linear density of each cable, its weight included, shape (K, m) [Hz m/kg].
-        stiffness_sensitivity: By the axial stiffness of each cable, shape (K, m) [Hz/N].
-        mass_sensitivity: By the mass, its weight included, the inertia held, shape (K,) [Hz/kg].
-        inertia_sensitivity: By the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]: the sum over its elements
-            times a symmetric change.
-        pose_sensitivity: By (displacement of the center of mass, rotation vector), world axes, at fixed lengths, the
-            wrench being what holds the platform there, shape (K, 6) [Hz/m, Hz/rad].
-        wrench_sensitivity: By the wrench about the center of mass, world axes, shape (K, 6) [Hz/N, Hz/(N m)].
+        length_sensitivity: Derivative with respect to the length of each cable, shape (K, m) [Hz/m].
+        density_sensitivity: Derivative with respect to the linear density of each cable, including its weight, shape
+            (K, m) [Hz m/kg].
+        stiffness_sensitivity: Derivative with respect to the axial stiffness of each cable, shape (K, m) [Hz/N].
+        mass_sensitivity: Derivative with respect to the mass, including its weight, at constant inertia, shape (K,)
+            [Hz/kg].
+        inertia_sensitivity: Derivative with respect to the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]:
+            multiply its elements by those of a symmetric change and sum.
+        pose_sensitivity: Derivative with respect to (displacement of the center of mass, rotation vector), world axes,
+            at fixed lengths, with the wrench that holds the platform there, shape (K, 6) [Hz/m, Hz/rad].
+        wrench_sensitivity: Derivative with respect to the wrench about the center of mass, world axes, shape (K, 6)
+            [Hz/N, Hz/(N m)].
     """
 
     state: Equilibrium
@@ -70,19 +74,19 @@ def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> 
     """Sensitivities of every natural frequency to the robot's data, its pose and the wrench; all analytic.
 
     Args:
-        state: An equilibrium, a single one, for the massless frequencies, those of `modes`; or a vibration, for those
-            with cable mass. Cables are exact or weightless and start at their anchors.
-        together: Relative difference up to which neighboring frequencies count as one.
+        state: A single equilibrium, for the massless frequencies of `modes`; or a vibration, for frequencies with cable
+            mass. Cables are exact or weightless and start at their anchors.
+        together: Relative difference up to which adjacent frequencies count as equal.
 
     Returns:
-        FrequencySlopes; NaN where a frequency is none.
+        FrequencySlopes; NaN where a frequency is NaN.
 
     Raises:
-        InvalidValueError: If the state is neither (of a plan: plan.state), a batch, one without lengths, of shallow
-            cables, or of cables with something behind them; if the vibration was not solved.
+        InvalidValueError: If the state is neither (of a plan: plan.state), is a batch, has no lengths, or has shallow
+            cables, pulleys or dead lengths; if the vibration was not solved.
 
     Examples:
-        Which cable to stiffen for a higher first frequency, massless, and how a heavier platform lowers it:
+        The cable to stiffen for a higher first frequency, massless, and the effect of a heavier platform:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -127,7 +131,7 @@ def _rest(state: Equilibrium) -> StateSlopes:
 
 
 def _groups(frequency: Array, together: float) -> Iterator[Indices]:
-    """Indices of neighbors that count as one frequency; the frequencies ascend."""
+    """Index groups of adjacent frequencies that count as equal; the frequencies are ascending."""
     apart = ~(np.diff(frequency) <= together * frequency[1:])
     borders = [0, *(np.flatnonzero(apart) + 1).tolist(), len(frequency)]
     for first, last in pairwise(borders):
@@ -136,7 +140,7 @@ def _groups(frequency: Array, together: float) -> Iterator[Indices]:
 
 
 def _massless(rest: StateSlopes, flexible: Flexibility, motion: Array, square: float) -> ModeGroup:
-    """Modes in which the force is the same all along a cable."""
+    """Modes with constant force change along each cable."""
     ends = motion[:3].T + np.cross(motion[3:].T, rest.slopes.levers[:, None])
     force = ends @ np.swapaxes(rest.slopes.blocks, -1, -2)
     data = np.stack((flexible.by_length, flexible.by_density, flexible.by_stiffness))

@@ -39,23 +39,23 @@ _WRENCH_UNITS = ("N",) * 3 + ("N m",) * 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearized(Result):
-    """Result of `linearized`: dx/dt = A x + B u, y = C x + D u, all deviations from a state; massless cables.
+    """Result of `linearized`: dx/dt = A x + B u, y = C x + D u, in deviations from a state; massless cables.
 
     Motions are (displacement of the center of mass, rotation vector), wrenches act on the platform about its center of
-    mass; both in world axes. n is the number of free motions, m that of cables.
+    mass; both in world axes. n is the number of free motions, m the number of cables.
 
     Attributes:
         state: The state.
         damping: Energy losses.
-        A: Shape (X, X); X = 2 n, or 2 n + m with winch speeds as inputs.
-        B: Shape (X, m + 6).
-        C: Shape (6 + 2 m, X).
-        D: Shape (6 + 2 m, m + 6).
-        state_names: Of the X states.
-        input_names: Lengths of the cables off the drums, or their rates, then the wrench.
-        input_units: Of these.
-        output_names: Motion of the platform, tensions at the frame ends, lengths off the drums.
-        output_units: Of these.
+        A: System matrix, shape (X, X); X = 2 n, or 2 n + m with winch speeds as inputs.
+        B: Input matrix, shape (X, m + 6).
+        C: Output matrix, shape (6 + 2 m, X).
+        D: Feedthrough matrix, shape (6 + 2 m, m + 6).
+        state_names: Names of the X states.
+        input_names: Names of the inputs: lengths of the cables off the drums, or their rates, then the wrench.
+        input_units: Units of the inputs.
+        output_names: Names of the outputs: motion of the platform, tensions at the frame ends, lengths off the drums.
+        output_units: Units of the outputs.
     """
 
     state: Equilibrium
@@ -72,28 +72,28 @@ class Linearized(Result):
 
     @property
     def poles(self) -> Any:
-        """Eigenvalues of A [rad/s], complex, shape (X,): i omega of the massless modes where nothing damps them."""
+        """Eigenvalues of A [rad/s], complex, shape (X,): i omega of the massless modes if undamped."""
         return locked(np.linalg.eigvals(self.A).astype(complex))
 
     def state_space(self) -> StateSpace:
-        """The system as SciPy's, for its simulations, responses and controller design.
+        """The system as a SciPy object, for simulation, responses and controller design.
 
         Returns:
             A `scipy.signal.StateSpace`.
         """
-        from scipy.signal import StateSpace  # takes a while to load
+        from scipy.signal import StateSpace  # a slow import
 
         return StateSpace(self.A, self.B, self.C, self.D)
 
 
 def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Inputs = "lengths") -> Linearized:
-    """The robot about a state as a linear system, from winches and wrench to pose, tensions and lengths.
+    """Linear model of the robot about a state, from winches and wrench to pose, tensions and lengths.
 
-    The cables have no mass of their own here: what is above the first string frequency is not the robot's (see
-    `vibration`). At rest the gains are the compliance and the sensitivities of `stiffness`, the poles are `modes`.
+    The cables have no mass here: the model is not valid above the first string frequency (see `vibration`). The static
+    gains are the compliance and the sensitivities of `stiffness`, the poles are `modes`.
 
     Args:
-        state: An equilibrium, a single one, from `inverse` or `forward`. An unstable one gives poles that grow.
+        state: A single equilibrium, from `inverse` or `forward`. An unstable one has growing poles.
         damping: `loss_time` of the cables' stretch, to first order in it, and `modal_damping`; none by default.
         inputs: Inputs of the winches: "lengths" off the drums, or "speeds", their rates, with lengths as states.
 
@@ -101,12 +101,12 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
         The system.
 
     Raises:
-        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state), a batch, or one without lengths; for
-            `air_damping`, which acts on cables with mass; for `loss_time` with "lengths" as inputs: tensions then
-            follow the speeds of the winches.
+        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state), is a batch, or has no lengths;
+            for `air_damping`, which acts on cables with mass; for `loss_time` with "lengths" as inputs, because
+            tensions then depend on winch speeds.
 
     Examples:
-        Where 1 mm of cable 0, wound in, leaves the platform in the end:
+        Final displacement of the platform after 1 mm of cable 0 is wound in:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -167,7 +167,7 @@ def _system(state: Equilibrium, damping: Damping, inputs: Inputs) -> Linearized:
 
 
 def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
-    """States are the free motions, their rates, and the lengths."""
+    """System with the free motions, their rates, and the lengths as states."""
     robot, slopes = state.one_robot, _solved_slopes(state)
     freedom, n, m = robot.freedom, len(robot.freedom), robot.cable_count
     freed = np.linalg.inv(freedom @ mass_matrix(state) @ freedom.T) @ freedom  # from wrench to acceleration
@@ -194,7 +194,7 @@ def _driven_by_speeds(state: Equilibrium, damping: Damping) -> _Matrices:
 
 
 def _driven_by_lengths(found: _Matrices, size: int) -> _Matrices:
-    """The lengths as inputs, where nothing follows their rates."""
+    """System with lengths as inputs; no output depends on their rates."""
     A, B, C, D = found
     m = len(A) - size
     B, D = (np.concatenate(pair, axis=1) for pair in ((A[:size, size:], B[:size, m:]), (C[:, size:], D[:, m:])))
@@ -210,15 +210,15 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
 
 
 def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
-    """Loss of the stretch to first order: K(omega) = K + i omega eta K S K, S the part that is stretch."""
-    # Wrenches against the platform's velocity (6, 6) and the rates of the lengths (6, m); tensions at the frame ends by
-    # that velocity (m, 6) and by the rate of the cable's own length (m,)
+    """Stretch loss to first order: K(omega) = K + i omega eta K S K, with S the stretch part."""
+    # Wrenches due to platform velocity (6, 6) and length rates (6, m); frame-end tensions due to platform velocity (m,
+    # 6) and to the rate of the cable's own length (m,)
     m = state.one_robot.cable_count
     if not loss_time:
         return np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m)
     follows = loss_time * slopes.blocks @ flexibility(state, slopes.force).stretch
-    per_motion = follows @ slopes.blocks  # N s/m, of the platform ends
-    per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # paid-out cable has no stretch
+    per_motion = follows @ slopes.blocks  # N s/m, at the platform ends
+    per_speed = (follows @ slopes.by_length[..., None])[..., 0]  # paid-out cable is unstretched
     if not np.isfinite(per_motion).all():
         step = "Give modal_damping instead, or tighten the cable."
         raise InvalidValueError("state", "one with a folded cable", "cables that stretch, for loss_time", step)
@@ -235,7 +235,7 @@ def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> 
 
 
 def _modal_drag(state: Equilibrium, ratio: float) -> Array:
-    """Drag on the platform with the same damping ratio for every stable massless mode, shape (6, 6)."""
+    """Drag on the platform that gives every stable massless mode the same damping ratio, shape (6, 6)."""
     found, mass = modes(state), mass_matrix(state)
     momenta = mass @ found.shape
     drag: Array = momenta * (2.0 * ratio * 2.0 * np.pi * np.nan_to_num(found.frequency)) @ momenta.T

@@ -1,4 +1,4 @@
-"""List of modes for reading, and displacements of cables without inertia."""
+"""List of modes for display, and displacements of cables without inertia."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def end_displacements(state: Equilibrium, shape: Array) -> Array:
 
 
 def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:
-    """Damping ratio that the loss in the cables' stretch gives each massless mode, to first order."""
+    """Damping ratio of each massless mode due to the loss in the cables' stretch, to first order."""
     # Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
     # free and behind their exits; the rest is in sag and swivel
     # shapes: loss_time [s]; returns (n,)
@@ -43,7 +43,7 @@ def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Arr
 
 
 def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> Array:
-    """Displacement of the cables that follow their platform ends without inertia, to first order."""
+    """Quasi-static displacement of the cables for given displacements of their platform ends, to first order."""
     # shapes: ends (m, 3); returns (m, count, 3)
     middles = (np.arange(count - 1) + 0.5) / (count - 1)
     tangent, sag, stretch = _along(state, middles)
@@ -59,14 +59,14 @@ def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> A
 
 
 def _behind(strings: Strings) -> Array:
-    """Direction in which what is behind each cable's exit gives way [sqrt(m/N)], world axes, (m, 3)."""
+    """Flexibility direction of the routing of each cable [sqrt(m/N)], world axes, (m, 3)."""
     table, axes = strings.table[0], strings.axes[0]
     return np.asarray(table[:, columns.BEHIND_X, None] * axes[:, 0] + table[:, columns.BEHIND_Z, None] * axes[:, 2])
 
 
 def _along(state: Equilibrium, place: Array) -> tuple[Array, Array, Array]:
     """Unit tangents (m, s, 3) at shares of the length (s,), the length over what holds it across, and over EA."""
-    # Across its tangent a cable gives way by L (1/N + 1/EA), along it by L/EA [m/N]
+    # The flexibility of a cable is L (1/N + 1/EA) across its tangent and L/EA along it [m/N]
     cables, robot = state.cables, state.one_robot
     length = cables.unstrained_length[:, None]
     weight = np.zeros_like(length) if cables.model.weightless else cables.cable_weight[:, None]
@@ -86,12 +86,12 @@ WITH_MASS, MASSLESS = "with cable mass", "massless"
 class ListedMode(NamedTuple):
     """One mode."""
 
-    number: int  # from 1 on, among those of its kind
+    number: int  # from 1, among the modes of its kind
     kind: str  # "with cable mass" or "massless"
     frequency: float  # [Hz]
-    platform_share: float  # share of the kinetic energy that is the platform's
-    cable: int | None  # the cable that has the largest share; None where no cable has any
-    cable_share: float  # its share
+    platform_share: float  # platform share of the kinetic energy
+    cable: int | None  # cable with the largest share; None if no cable has a share
+    cable_share: float  # share of this cable
     loss: float  # damping ratio
 
     @property
@@ -101,14 +101,14 @@ class ListedMode(NamedTuple):
 
     @property
     def swings(self) -> str:
-        """Part with the largest share of the kinetic energy, in words."""
+        """Name of the part with the largest share of the kinetic energy."""
         if self.cable is None or self.platform_share >= self.cable_share:
             return "platform"
         return f"cable {self.cable}"
 
 
 def listed_modes(vibration: Vibration) -> list[ListedMode]:
-    """All modes with cable mass, then the massless ones, each ascending."""
+    """All modes with cable mass, then the massless ones, each in ascending order."""
     most = np.argmax(vibration.cable_share, axis=0) if vibration.frequency.size else ()
     swinging = [
         ListedMode(
@@ -132,9 +132,9 @@ def listed_modes(vibration: Vibration) -> list[ListedMode]:
 
 
 def mode_correlation(vibration: Vibration) -> Array:
-    """For each massless mode the share of its motion that is found in each mode with cable mass, shape (n, K)."""
-    # A share is the square of the mass-weighted product of both motions of the platform; over all modes, those beyond
-    # `up_to` included, the shares of a massless mode sum to less than 1 by what the cables keep
+    """Share of each massless mode's motion in each mode with cable mass, shape (n, K)."""
+    # A share is the squared mass-weighted product of the platform motions of both modes. Over all modes, including
+    # those above `up_to`, the shares of a massless mode sum to less than 1; the difference is in the cables
     massless = modes(vibration.state).shape
     mass = np.linalg.pinv(massless @ massless.T)
     return np.asarray((massless.T @ mass @ vibration.shape) ** 2)

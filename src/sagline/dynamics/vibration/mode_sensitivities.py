@@ -15,38 +15,40 @@ from sagline.statics.stiffness import mass_matrix, stiffness
 
 
 class StateSlopes(NamedTuple):
-    """A state, and how it settles."""
+    """A state, and derivatives of its equilibrium."""
 
     state: Equilibrium  # the state, a single one
-    slopes: CableSlopes  # of its cables
-    by_datum: Array  # force on the platform ends by length, linear density and axial stiffness, shape (3, m, 3)
-    settling: Array  # motion by each of the same, shape (3, 6, m)
+    slopes: CableSlopes  # derivatives of cable forces
+    # derivatives of platform-end forces with respect to length, density and axial stiffness, shape (3, m, 3)
+    by_datum: Array
+    settling: Array  # derivatives of the equilibrium motion with respect to the same data, shape (3, 6, m)
     compliance: Array  # shape (6, 6)
-    mass: Array  # of the platform, shape (6, 6)
+    mass: Array  # mass matrix of the platform, shape (6, 6)
 
 
 class ModeGroup(NamedTuple):
-    """Some modes of one frequency, g of them: the forms of what cables change by, for each two of them."""
+    """The g modes of one frequency, with bilinear forms of cable parameter changes for each pair."""
 
-    motion: Array  # of the platform, unit modal mass, shape (6, g)
-    square: float  # of the angular frequency [1/s^2]
-    end_force: Array  # of the cables on their platform ends, shape (m, g, 3)
-    by_force: Array  # integral of f^T dC f by the force at rest on the platform end, shape (m, g, g, 3)
-    by_datum: Array  # the same by length, linear density (with that of mu u^2) and axial stiffness, shape (3, m, g, g)
+    motion: Array  # platform motion, unit modal mass, shape (6, g)
+    square: float  # squared angular frequency [1/s^2]
+    end_force: Array  # force of the cables on their platform ends, shape (m, g, 3)
+    by_force: Array  # derivatives with respect to static platform-end force, integral of f^T dC f, shape (m, g, g, 3)
+    # derivatives with respect to length, linear density (including that of mu u^2) and axial stiffness
+    by_datum: Array  # shape (3, m, g, g)
 
 
 class SquareDerivatives(NamedTuple):
-    """Forms whose eigenvalues are derivatives of the square of the frequency, each (..., g, g)."""
+    """Matrices (..., g, g) whose eigenvalues are the derivatives of the squared angular frequency."""
 
-    datum: Array  # by length, linear density and axial stiffness of each cable, shape (3, m, g, g)
-    pose: Array  # by motions at fixed lengths, shape (6, g, g)
-    wrench: Array  # shape (6, g, g)
-    mass: Array  # shape (g, g)
-    inertia: Array  # shape (3, 3, g, g)
+    datum: Array  # with respect to length, linear density and axial stiffness of each cable, shape (3, m, g, g)
+    pose: Array  # with respect to motions at fixed lengths, shape (6, g, g)
+    wrench: Array  # with respect to the wrench, shape (6, g, g)
+    mass: Array  # with respect to the mass, shape (g, g)
+    inertia: Array  # with respect to the inertia, shape (3, 3, g, g)
 
 
 def state_slopes(state: Equilibrium) -> StateSlopes:
-    """Slopes, compliance and mass of a state."""
+    """Force derivatives, compliance and mass of a state."""
     slopes, known = cable_slopes(state), stiffness(state)
     return StateSlopes(
         state,
@@ -59,7 +61,7 @@ def state_slopes(state: Equilibrium) -> StateSlopes:
 
 
 def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivatives:
-    """Derivatives of the square of a frequency, the platform settling in its new equilibrium."""
+    """Derivatives of a squared frequency, with the platform moving to its new equilibrium."""
     robot, pose = rest.state.one_robot, _by_pose(rest, swings)
     turns = rest.state.pose.matrix.T @ swings.motion[3:]
     spins = np.einsum("ia,jb->ijab", turns, turns)
@@ -77,10 +79,10 @@ def square_derivatives(rest: StateSlopes, swings: ModeGroup) -> SquareDerivative
 
 
 def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
-    """By motions of the platform in its pattern at fixed lengths, (6, g, g)."""
+    """Derivatives with respect to platform motions in its pattern at fixed lengths, (6, g, g)."""
     slopes, turns = rest.slopes, swings.motion[3:]
     unit = np.eye(6)
-    moved = np.cross(unit[:, None, 3:], slopes.levers)  # levers turn
+    moved = np.cross(unit[:, None, 3:], slopes.levers)  # rotation of the levers
     forces = np.einsum("mij,kmj->kmi", slopes.blocks, unit[:, None, :3] + moved)
     form = -np.einsum("mabc,kmc->kab", swings.by_force, forces)
     onto = np.cross(turns.T[:, None, None], moved)  # of mode b, by motion k, of cable m
@@ -98,7 +100,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
 
 
 def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
-    """Geometric stiffness of forces on levers against rotations: r T^T - r.T, in its symmetric part."""
+    """Geometric stiffness of forces on levers for rotations: symmetric part of r T^T - r.T."""
     # shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g)
     along, pulled = levers @ turns, force @ turns
     mixed = along[..., :, None] * pulled[..., None, :]
@@ -108,18 +110,18 @@ def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
 
 
 def _cross_matrices() -> Array:
-    """Matrices that take a vector to the cross product of each axis with it, (3, 3, 3)."""
+    """Matrices of the cross products of each axis with a vector, (3, 3, 3)."""
     return np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), -1, -2)
 
 
-PHASE = 0.45 * np.pi  # of a transverse wave in an element [rad]
-HALVINGS = 40  # of a cable: about a fold elements would become ever shorter
-CLOSE = 1e-5  # relative difference of two frequencies, by which the equations' change is taken
+PHASE = 0.45 * np.pi  # phase of a transverse wave in an element [rad]
+HALVINGS = 40  # largest number of bisections of a cable: elements at a fold would become ever shorter
+CLOSE = 1e-5  # relative frequency difference for the numerical derivative of the equations
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 class StringData(NamedTuple):
-    """A cable at rest: force on its platform end (3,) [N], weight a length, length, EA and density."""
+    """A cable at rest: force on its platform end (3,) [N], weight per length, length, EA and density."""
 
     force: Array
     weight: float
@@ -133,14 +135,14 @@ class _Waves(NamedTuple):
 
     force: Array  # in the cable at rest, shape (P, 3) [N]
     below: Array  # length from the point to the platform end, shape (P,) [m]
-    share: Array  # of the length, shape (P,) [m]
-    moved: Array  # displacement, one component of the force a column, shape (P, 3, 3)
+    share: Array  # length belonging to the point, shape (P,) [m]
+    moved: Array  # displacement, one column per force component, shape (P, 3, 3)
     pulled: Array  # change of the force, shape (P, 3, 3)
-    end: Array  # both at the platform end, shape (2, 3, 3)
+    end: Array  # displacement and force at the platform end, shape (2, 3, 3)
 
 
 def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
-    """The cables of a state, as strings."""
+    """String data of the cables of a state."""
     cables = rest.state.cables
     gravity = 0.0 if cables.model.weightless else cables.gravity
     density, stiffness = (
@@ -153,9 +155,9 @@ def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
 
 
 def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Array) -> ModeGroup:
-    """Modes of neighboring frequencies [Hz] that count as one."""
+    """Modes of adjacent frequencies [Hz] that count as equal."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
-    omega *= 1.0 + _correction(rest, cables, omega, group)  # leaves CLOSE of the error
+    omega *= 1.0 + _correction(rest, cables, omega, group)  # reduces the error by the factor CLOSE
     waves = [_waves(cable, omega) for cable in cables]
     matrix, scale = _equations(rest, waves, omega)
     vectors = scale[:, None] * np.linalg.svd(matrix)[2][-group:].T
@@ -171,7 +173,7 @@ def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Arr
 
 
 def _correction(rest: StateSlopes, cables: tuple[StringData, ...], omega: float, group: int) -> float:
-    """Relative error of a frequency, to first order, by the singular values of the equations."""
+    """Relative frequency error, to first order, from the singular values of the equations."""
     matrix, scale = _equations(rest, [_waves(cable, omega) for cable in cables], omega)
     near = omega * (1.0 + CLOSE)
     other, _ = _equations(rest, [_waves(cable, near) for cable in cables], near, scale)
@@ -182,7 +184,7 @@ def _correction(rest: StateSlopes, cables: tuple[StringData, ...], omega: float,
 
 
 def _equations(rest: StateSlopes, waves: list[_Waves], omega: float, scale: Array | None = None) -> tuple[Array, Array]:
-    """Balance of the free motions and ends that meet, (n + 3 m, n + 3 m), and what its columns were multiplied by."""
+    """Balance of free motions and continuity at cable ends, (n + 3 m, n + 3 m), and the scale of its columns."""
     freedom, levers = rest.state.one_robot.freedom, rest.slopes.levers
     n, ends = len(freedom), motions_of_ends(levers)
     matrix = np.zeros((n + 3 * len(waves), n + 3 * len(waves)))
@@ -226,7 +228,7 @@ def _waves(cable: StringData, omega: float) -> _Waves:
 
 
 def _flexible(force: Array, stiffness: float) -> Array:
-    """C where the cable carries a force, (..., 3, 3)."""
+    """Matrix C where the cable has a force, (..., 3, 3)."""
     size = np.linalg.norm(force, axis=-1)[..., None, None]
     tangent = force[..., :, None] * force[..., None, :] / size**2
     found: Array = np.eye(3) / stiffness + (np.eye(3) - tangent) / size
@@ -234,7 +236,7 @@ def _flexible(force: Array, stiffness: float) -> Array:
 
 
 def _edges(cable: StringData, omega: float) -> Array:
-    """Borders of elements that are short against N/w and against a transverse wave."""
+    """Borders of elements that are short relative to N/w and to a transverse wave."""
     edges = np.array([0.0, cable.length])
     for _ in range(HALVINGS):
         size = np.diff(edges)
@@ -246,7 +248,7 @@ def _edges(cable: StringData, omega: float) -> Array:
 
 
 def _longest(cable: StringData, omega: float, start: Array, end: Array) -> Array:
-    """Longest elements [m] that parts of a cable allow."""
+    """Largest allowed element lengths [m] in parts of a cable."""
     low, high = (cable.force[2] - cable.weight * (cable.length - s) for s in (start, end))
     least = np.hypot(np.hypot(*cable.force[:2]), np.maximum(np.maximum(low, -high), 0.0)) + TINY
     slowness = np.sqrt(cable.density * (1.0 / least + 1.0 / cable.stiffness))
@@ -275,11 +277,11 @@ def _forms(
 
 
 def _turned(force: Array, pulled: Array) -> Array:
-    """f^T dC f by the force at rest, for each two modes, (P, g, g, 3)."""
+    """Derivatives of f^T dC f with respect to the static force, for each pair of modes, (P, g, g, 3)."""
     size = np.linalg.norm(force, axis=-1)[:, None, None]
     along = np.einsum("pi,pig->pg", force, pulled)
     both = np.einsum("pia,pib->pab", pulled, pulled)
-    mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # of a, and component of b
+    mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # along of mode a, component of mode b
     straight = 3.0 * along[:, :, None] * along[:, None, :] / size**2 - both
     turned = straight[..., None] * force[:, None, None, :] - mixed - np.swapaxes(mixed, 1, 2)
     found: Array = turned / size[..., None] ** 3

@@ -13,22 +13,24 @@ from sagline.dynamics.vibration.component_modes import CableComponents, PlaneMod
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, moving_stiffness
 from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
 
-LOWEST: Final = 1.0  # Hz: modes up to there are taken at least
-TAKEN: Final = 1.6  # of the highest frequency: modes up to there are taken
-COUPLED: Final = 1.5  # of the same: losses couple modes up to there, those beyond lose each by itself
-BLOCK: Final = 128  # frequencies at once
+LOWEST: Final = 1.0  # Hz: modes up to this frequency are always included
+TAKEN: Final = 1.6  # relative to the highest frequency: modes up to this limit are included
+# relative to the highest frequency: losses couple the modes below this limit; higher modes are damped separately
+COUPLED: Final = 1.5
+BLOCK: Final = 128  # frequencies per block
 
 
-FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]  # of one state; loss matrices of their stretch, if any
+# components of one state; loss matrices of their stretch, if any
+FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]
 
 
 class Receptance(NamedTuple):
     """Receptance of the platform."""
 
-    model: VibrationModel  # of one state, with a leading axis 1
-    matrix: Array  # stiffness of the platform, not symmetric where a moment is given, shape (6, 6)
-    cables: Array  # that of the cables' platform ends, shape (m, 3, 3)
-    damping: Damping  # what takes energy out
+    model: VibrationModel  # model of one state, with a leading axis 1
+    matrix: Array  # stiffness of the platform, not symmetric with an external moment, shape (6, 6)
+    cables: Array  # stiffness of the cables at their platform ends, shape (m, 3, 3)
+    damping: Damping  # energy losses
 
     def fixed_end_modes(self, up_to: float) -> FixedEndModes:
         """Fixed-end modes of the cables up to a frequency [Hz]."""
@@ -36,7 +38,7 @@ class Receptance(NamedTuple):
         return components, stretch_stiffness(components) if self.damping.loss_time > 0.0 else None
 
     def by_modes(self, frequency: Array, held: FixedEndModes) -> tuple[Complex, Complex]:
-        """The compliance by the modes of the cables, and that on massless cables."""
+        """Compliance with cable mass, from the cables' modes, and compliance with massless cables."""
         # shapes: frequency (F,) [Hz]; returns (F, 6, 6)
         found = np.empty((2, frequency.size, 6, 6), dtype=np.complex128)
         for part in blocks(frequency.size, BLOCK):
@@ -46,15 +48,15 @@ class Receptance(NamedTuple):
         return found[0], found[1]
 
     def exact(self, frequency: Array) -> Complex:
-        """The compliance by the exact stiffness of the cables; frequency (F,) [Hz]; returns (F, 6, 6)."""
+        """Compliance from the exact dynamic stiffness of the cables; frequency (F,) [Hz]; returns (F, 6, 6)."""
         strings = self.model.strings
         moving = moving_stiffness(strings, frequency, self.damping)
-        moving -= 2j * self.damping.modal_damping * self.cables  # which the whole stiffness has already
+        moving -= 2j * self.damping.modal_damping * self.cables  # the whole stiffness already includes it
         moving[:, ~strings.taut[0]] = 0.0
         return self._compliance(frequency, moving)
 
     def _compliance(self, frequency: Array, moving: Complex) -> Complex:
-        """Inverse of what a wrench meets, moving what the cables add to their stiffness, (F, m, 3, 3)."""
+        """Inverse of the dynamic stiffness; moving: dynamic part of the cables' stiffness, (F, m, 3, 3)."""
         model, omega = self.model, 2.0 * np.pi * frequency[:, None, None]
         ends, freedom = model.ends[0], model.freedom
         on_platform = np.einsum("mai,fmab,mbj->fij", ends, moving, ends, optimize=True)
@@ -63,7 +65,7 @@ class Receptance(NamedTuple):
             return np.asarray(freedom.T @ np.linalg.inv(freedom @ whole @ freedom.T) @ freedom)
 
     def _moving(self, components: CableComponents, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
-        """Stiffness that vibrating cables add, with their mass and without, (F, m, 3, 3) each."""
+        """Dynamic part of the cables' stiffness, with and without their mass, (F, m, 3, 3) each."""
         mesh, model = components.mesh, self.model
         density = mesh.density[:, None, None]
         square = omega**2 - 1j * omega * self.damping.air_damping / density[:, 0]  # (t, F)
@@ -89,7 +91,7 @@ def _in_world(own: Complex, axes: Array) -> Complex:
 
 
 def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Complex:
-    """Stiffness that fixed-end modes add to the platform end, undamped or all damped alike, (t, F, d, d)."""
+    """Stiffness due to fixed-end modes at the platform end, undamped or with equal damping, (t, F, d, d)."""
     with np.errstate(all="ignore"):
         shares = square[..., None] ** 2 / (loss * motions.square[:, None] - square[..., None])
     return np.asarray(-np.einsum("tka,tfk,tkb->tfab", motions.drive, shares, motions.drive, optimize=True))
@@ -98,11 +100,11 @@ def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Co
 def _driven_stiffness_with_loss(
     motions: PlaneModes, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
-    """The same with the loss in stretch, by modes and end (t, d + k, d + k), and the loss at rest alone."""
+    """Same stiffness with stretch loss, by modes and end (t, d + k, d + k), and the static loss alone."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
     alone = loss * motions.square[:, None] - square[..., None]
-    near = int((motions.square < COUPLED**2 * np.abs(square).max()).sum(axis=1).max())  # of each, ascending
+    near = int((motions.square < COUPLED**2 * np.abs(square).max()).sum(axis=1).max())  # of each cable, ascending
     own = factor * lost[:, None, d : d + near, d : d + near]
     index = np.arange(near)
     own[..., index, index] += alone[..., :near]
@@ -112,16 +114,17 @@ def _driven_stiffness_with_loss(
     return -np.swapaxes(by_end, -1, -2) @ moved, factor * lost[:, None, :d, :d]
 
 
-ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacement by force (F, 3, 3) at frequencies (F,)
+ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacement per force (F, 3, 3) at frequencies (F,)
 
-LIKELY: Final = 0.4  # of the strongest answer at a mode: those near whose modes a stronger one is looked for
-REFINEMENTS: Final = 2  # of looking more closely
-CLOSER: Final = 5  # frequencies between two
-WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # of half a peak, about a mode: where
+# relative to the largest response at a mode: the search covers the modes with at least this response
+LIKELY: Final = 0.4
+REFINEMENTS: Final = 2  # number of refinements of the search
+CLOSER: Final = 5  # frequencies between two adjacent ones
+WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in half peak widths
 
 
 def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
-    """Receptance by the modes of a robot with one loss factor of all stiffness, which does not couple them."""
+    """Receptance from the modes of a robot with a common loss factor of all stiffness, which does not couple modes."""
     # shapes: rest (3, 3)
     natural = (2.0 * np.pi * found.frequency) ** 2
     products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)
@@ -144,7 +147,7 @@ def coupled_receptance(receptance: Receptance, up_to: float) -> ForceReceptance:
 def peak_receptance(
     receptance: ForceReceptance, natural: Array, ratios: Array, damping: Damping
 ) -> tuple[float, float]:
-    """Largest displacement for a force in any direction, at rest or near a mode."""
+    """Largest displacement per force in any direction, static or near a mode."""
     # shapes: natural (K,) [Hz]; ratios (K,); returns [m/N], [Hz]
     if damping == Damping():
         return np.inf, float(natural[0])
@@ -165,7 +168,7 @@ def peak_receptance(
 
 
 def _parabola_peak(frequency: Array, norms: Array) -> tuple[float, float]:
-    """The top of a peak through three values: near it one over their square is a parabola."""
+    """Maximum of a peak through three values, at which the inverse square is approximated by a parabola."""
     (before, after), flat = np.diff(frequency), norms**-2.0
     left, right = np.diff(flat) / (before, after)
     bend = (right - left) / (before + after)

@@ -21,8 +21,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import modes, stiffness
 
-CHECKS: Final = 8  # frequencies at which the answer is compared with the exact one
-_BYTES: Final = 20_000.0  # a frequency
+CHECKS: Final = 8  # frequencies at which the response is compared with the exact one
+_BYTES: Final = 20_000.0  # per frequency
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,17 +30,17 @@ class FrequencyResponse(Result):
     """Result of `frequency_response` at F frequencies.
 
     Motions are (displacement of the center of mass [m], rotation vector [rad]), wrenches (force [N], moment [N m])
-    about it, world axes, both complex amplitudes of what goes with exp(i omega t).
+    about it, world axes. Both are complex amplitudes with the time factor exp(i omega t).
 
     Attributes:
         state: The state, a single one.
         damping: Energy losses.
-        frequency: [Hz], shape (F,).
-        compliance: Motion by wrench with cable mass, shape (F, 6, 6) [m/N, rad/N, ...]; zero in motions that the
-            robot's pattern does not have.
-        massless_compliance: The same on cables whose mass does not swing, of the same shape.
-        checked_frequency: Those at which the compliance was compared with the exact one [Hz], shape (C,).
-        deviation: By how much it is off there, of the exact one's norm, shape (C,).
+        frequency: Frequencies [Hz], shape (F,).
+        compliance: Motion per wrench with cable mass, shape (F, 6, 6) [m/N, rad/N, ...]; zero for motions outside the
+            robot's motion pattern.
+        massless_compliance: Motion per wrench with massless cables, of the same shape.
+        checked_frequency: Frequencies at which the compliance was compared with the exact one [Hz], shape (C,).
+        deviation: Relative difference from the exact compliance at these frequencies, in its norm, shape (C,).
     """
 
     state: Equilibrium
@@ -53,23 +53,23 @@ class FrequencyResponse(Result):
 
 
 def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> FrequencyResponse:
-    """Motion of the platform for an oscillating wrench, cables with mass; and on massless cables, to compare.
+    """Motion of the platform for an oscillating wrench, with cable mass and, for comparison, with massless cables.
 
-    From the modes of every cable with its ends held; at some of the frequencies the exact stiffness of the cables is
-    taken too, and the deviation is reported.
+    The response is computed from the fixed-end modes of every cable. At some of the frequencies it is compared with the
+    response for the exact stiffness of the cables, and the deviation is reported.
 
     Args:
         state: An equilibrium, a single one.
-        frequency: [Hz], >= 0, shape (F,).
-        damping: Energy losses; None: none, with infinite response at the natural frequencies. Its
-            modal_damping is a loss factor twice as large of all stiffness, as in `dynamic_stiffness`.
+        frequency: Frequencies [Hz], >= 0, shape (F,).
+        damping: Energy losses; None: no losses, with infinite response at the natural frequencies. Its modal_damping
+            acts as a loss factor of all stiffness, twice as large, as in `dynamic_stiffness`.
 
     Returns:
         FrequencyResponse.
 
     Raises:
-        InvalidValueError: If the state is no single Equilibrium with lengths, of exact or elastic cables; if a
-            frequency is negative, or more than 2,000 modes lie below it.
+        InvalidValueError: If the state is not a single Equilibrium with lengths and with exact or elastic cables; if a
+            frequency is negative, or more than 2,000 modes are below it.
 
     Examples:
         >>> import numpy as np
@@ -109,25 +109,26 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
 
 MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
 UNITS = {(False, False): "m/N", (False, True): "1/N", (True, False): "1/N", (True, True): "rad/(N m)"}
-SAMPLES = 900  # evenly in the logarithm
-NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # about a peak: the denser the nearer
-BESIDE = 0.03  # of a peak's frequency: how far these reach
-BELOW = 6.0  # lowest frequency of a mode over that at which the curves begin
+SAMPLES = 900  # number of frequencies, logarithmically spaced
+NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # spacing about a peak, denser close to it
+BESIDE = 0.03  # range of these frequencies, relative to a peak's frequency
+BELOW = 6.0  # ratio of the lowest mode frequency to the start of the curves
 
 
 class ResponseCurves(NamedTuple):
-    """Two answers to the same force."""
+    """Two responses to the same force."""
 
     frequency: Array  # [Hz], ascending, shape (F,)
-    with_mass: Array  # amplitude of the motion over that of the force, cables with mass, in `unit`, shape (F,)
-    massless: Array  # the same on cables whose mass does not swing, shape (F,)
-    static: float  # the same at rest
-    unit: str  # of all of them
+    with_mass: Array  # amplitude of motion per force, with cable mass, in `unit`, shape (F,)
+    massless: Array  # the same with massless cables, shape (F,)
+    static: float  # the same for a static force
+    unit: str  # unit of all responses
 
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """The platform's motion for a force at its center of mass, over frequency, up to where all modes are known."""
-    # Both are of `frequency_response`; air damping, which only swinging cables feel, has no part in the massless one
+    """Platform motion per force at its center of mass over frequency, up to the limit of known modes."""
+    # Both curves are from `frequency_response`; air damping acts only on vibrating cables, so the massless curve has
+    # none
     state = instance(vibration, Vibration, "vibration").state
     if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
         reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"
@@ -139,7 +140,7 @@ def response_curves(vibration: Vibration, force: str = "x", motion: str | None =
 
 
 def curves_of_response(response: FrequencyResponse, force: str = "x", motion: str | None = None) -> ResponseCurves:
-    """One element of what `frequency_response` found, as far as logarithmic axes can show it."""
+    """One element of the result of `frequency_response`, within the range of logarithmic axes."""
     row, column = _places(force, motion)
     answers = np.abs([one[:, row, column] for one in (response.compliance, response.massless_compliance)])
     kept = np.flatnonzero((response.frequency > 0.0) & np.isfinite(answers).all(axis=0))
@@ -153,13 +154,13 @@ def curves_of_response(response: FrequencyResponse, force: str = "x", motion: st
 
 
 def _places(force: str, motion: str | None) -> tuple[int, int]:
-    """Row and column of a motion for a force."""
+    """Row and column of the compliance for a motion and a force."""
     column = MOTIONS.index(choice(force, "force", MOTIONS))
     return column if motion is None else MOTIONS.index(choice(motion, "motion", MOTIONS)), column
 
 
 def _grid(natural: Array, highest: float) -> Array:
-    """Frequencies evenly in the logarithm, and close to each peak."""
+    """Frequencies with logarithmic spacing, and additional ones close to each peak."""
     even = np.geomspace(natural.min() / BELOW, highest, SAMPLES)
     near = (natural[:, None] * (1.0 + BESIDE * NEAR)).ravel()
     return np.unique(np.concatenate((even, near[(near > even[0]) & (near < highest)])))

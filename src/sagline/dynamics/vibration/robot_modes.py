@@ -1,4 +1,4 @@
-"""Modes of a robot whose cables have mass, by component mode synthesis, checked against the exact count."""
+"""Modes of a robot with cable mass, by component mode synthesis, checked against the exact count."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from sagline.statics.slopes import cable_slopes, motions_of_ends
 from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
 from sagline.statics.strings import COUNTING, Strings, strings_of, undamped
 
-KEPT = 1.05  # of the frequency asked for: the cables' modes up to there are unknowns
-LEVELS = 4  # pairs of moments of those above that are matched
+KEPT = 1.05  # relative to the requested frequency: fixed-end modes up to this limit are unknowns
+LEVELS = 4  # number of pairs of moments matched for the higher modes
 _TINY = 1e-300
 
 
@@ -29,13 +29,13 @@ class VibrationModel(NamedTuple):
     """Stiffness, mass and cables of N states, for their vibrations."""
 
     strings: Strings  # their cables
-    ends: Array  # of each cable, what takes a motion of the platform to that of the platform end, shape (N, m, 3, 6)
-    stiffness: Array  # of the platform, symmetric, shape (N, 6, 6)
-    mass: Array  # of the platform, shape (N, 6, 6)
-    freedom: Array  # rows that pick the free motions, shape (n, 6)
+    ends: Array  # matrices from platform motion to platform-end motion, shape (N, m, 3, 6)
+    stiffness: Array  # stiffness of the platform, symmetric, shape (N, 6, 6)
+    mass: Array  # mass matrix of the platform, shape (N, 6, 6)
+    freedom: Array  # matrix that selects the free motions, shape (n, 6)
 
     def at(self, row: int) -> VibrationModel:
-        """One of them, with a leading axis 1."""
+        """Model of one state, with a leading axis 1."""
         part = slice(row, row + 1)
         strings = Strings(self.strings.table[part], self.strings.axes[part], self.strings.taut[part])
         return VibrationModel(strings, self.ends[part], self.stiffness[part], self.mass[part], self.freedom)
@@ -44,15 +44,15 @@ class VibrationModel(NamedTuple):
 class _ReducedModel(NamedTuple):
     """The eigenproblem of one state."""
 
-    matrix: Array  # symmetric, shape (n + k, n + k): first the platform, then motions of the cables [1/s^2]
-    platform: Array  # its first unknowns to motions of the platform, shape (6, n)
-    driven: Array  # the same to what the motions are driven by, shape (k, n)
-    kept: Flags  # which components of the cables are motions by themselves, the first of the k, shape (T,)
-    beyond: Array  # the others by the last of the k, shape (T - those, b)
+    matrix: Array  # symmetric, shape (n + k, n + k): first the platform, then the cable modes [1/s^2]
+    platform: Array  # matrix from the first unknowns to platform motions, shape (6, n)
+    driven: Array  # matrix from the first unknowns to the excitation of the cable modes, shape (k, n)
+    kept: Flags  # components that are unknowns themselves, the first of the k, shape (T,)
+    beyond: Array  # remaining components from the last of the k unknowns, shape (T - kept, b)
     components: CableComponents  # of the cables
 
     def amplitudes(self, vectors: Array) -> Array:
-        """Amplitudes of the components beside their motion at rest; vectors (n + k, K); returns (T, K)."""
+        """Amplitudes of the components in addition to quasi-static motion; vectors (n + k, K); returns (T, K)."""
         n = self.platform.shape[1]
         own = vectors[n:] - self.driven @ vectors[:n]
         found = np.empty((self.kept.size, vectors.shape[1]))
@@ -114,7 +114,7 @@ def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
 
 
 def massless_modes(model: VibrationModel, row: int) -> tuple[Array, Array]:
-    """Vibrations of the platform alone, and how it leaves an unstable equilibrium, (n,) [Hz], (6, d)."""
+    """Natural frequencies with massless cables (n,) [Hz], and unstable directions of the platform (6, d)."""
     freedom = model.freedom
     upper = np.linalg.inv(np.linalg.cholesky(freedom @ model.mass[row] @ freedom.T)).T
     squares, vectors = np.linalg.eigh(upper.T @ freedom @ model.stiffness[row] @ freedom.T @ upper)
@@ -122,21 +122,21 @@ def massless_modes(model: VibrationModel, row: int) -> tuple[Array, Array]:
 
 
 def dynamic_matrix(model: VibrationModel, row: int, moving: Array, omega: float) -> Array:
-    """D: what a force on the free motions takes for a vibration, exactly."""
+    """Dynamic stiffness D for the free motions, exact."""
     # shapes: moving (m, 3, 3) [N/m]; omega [rad/s]; returns (n, n)
     matrix = model.stiffness[row] + _on_platform(moving, model.ends[row]) - omega**2 * model.mass[row]
     return np.asarray(model.freedom @ matrix @ model.freedom.T)
 
 
 def _on_platform(of_cables: Array, ends: Array) -> Array:
-    """Matrices (m, 3, 3) of platform ends as one of the platform, (6, 6)."""
+    """Matrices (m, 3, 3) of platform ends as one matrix of the platform, (6, 6)."""
     return np.asarray((np.swapaxes(ends, -1, -2) @ of_cables @ ends).sum(axis=0))
 
 
 def modes_below(model: VibrationModel, row: int, frequency: float) -> int:
-    """Number of modes of the robot with its cables' mass below a frequency [Hz]."""
-    # By Wittrick and Williams: those that the taut cables have with both ends held, and the negative eigenvalues of
-    # what the platform then feels
+    """Number of modes of the robot with cable mass below a frequency [Hz]."""
+    # Wittrick-Williams count: number of fixed-end modes of the taut cables, plus number of negative eigenvalues of the
+    # platform's dynamic stiffness
     taut = np.flatnonzero(model.strings.taut[row])
     given = np.array([frequency])
     found = np.empty((1, 1, taut.size, collocation.FOUND))
@@ -155,8 +155,8 @@ def _negatives(matrix: Array) -> int:
 
 
 MOST_MODES: Final = 2_000
-SLOW: Final = 1e-2  # of up_to: lower frequencies may be those of motions that nothing holds
-BORDER: Final = 1e-6  # of a frequency, within which the count says on which side of it a mode is
+SLOW: Final = 1e-2  # relative to up_to: lower frequencies may belong to motions without stiffness
+BORDER: Final = 1e-6  # relative frequency accuracy of the count for a mode
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,11 +164,11 @@ class StateModes:
     """Modes of one state below a frequency."""
 
     frequency: Array  # [Hz], shape (K,)
-    platform: Array  # motion of the platform, shape (6, K)
+    platform: Array  # platform motion, shape (6, K)
     ends: Array  # displacements of the platform ends, shape (m, 3, K)
-    number: int  # how many, by the exact count
-    problem: _ReducedModel  # whose solutions they are
-    vectors: Array  # solutions of the problem, shape (n + k, K)
+    number: int  # number of modes by the exact count
+    problem: _ReducedModel  # reduced model of the modes
+    vectors: Array  # eigenvectors of the reduced model, shape (n + k, K)
 
     @property
     def components(self) -> CableComponents:
@@ -177,12 +177,12 @@ class StateModes:
 
     @cached_property
     def amplitudes(self) -> Array:
-        """Amplitudes of the fixed-end modes beside their motion at rest, shape (T, K)."""
+        """Amplitudes of the fixed-end modes in addition to quasi-static motion, shape (T, K)."""
         return self.problem.amplitudes(self.vectors)
 
 
 def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
-    """Modes of one state below a frequency [Hz], as many as the exact count has."""
+    """Modes of one state below a frequency [Hz]; their number is compared with the exact count."""
     count = modes_below(model, row, up_to)
     check_mode_count(count, up_to, "up_to")
     problem = reduced_model(model, row, up_to)
@@ -192,7 +192,8 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
     if not border[0] <= count <= border[1]:
         text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
         raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
-    if count and frequency[0] < SLOW * up_to:  # at rest the mass of the cables has no part: as many are exactly at 0 Hz
+    # cable mass has no static effect: the number of modes at exactly 0 Hz is unchanged
+    if count and frequency[0] < SLOW * up_to:
         frequency[: np.count_nonzero(massless_modes(model, row)[0] == 0.0)] = 0.0
     vectors = vectors[:, :count]
     platform = problem.platform @ vectors[: problem.platform.shape[1]]
@@ -207,7 +208,7 @@ def check_mode_count(count: int, frequency: float, item: str) -> None:
 
 
 def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
-    """Share of each mode's kinetic energy that is each cable's, (m, K)."""
+    """Cable shares of the kinetic energy of each mode, (m, K)."""
     parts, ends, own = found.components, found.ends, found.amplitudes
     shares = np.asarray((ends * (parts.still @ ends)).sum(axis=1))
     for motions, end, given in parts.planes(ends, own):
@@ -216,7 +217,7 @@ def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
 
 
 def damping_ratios(density: Array, found: StateModes, shares: Array, damping: Damping) -> Array:
-    """Damping ratio of each mode, to first order: power lost over that of a critically damped one."""
+    """Damping ratio of each mode, to first order: power loss relative to that of critical damping."""
     # shapes: density (m,) [kg/m]; returns (K,)
     omega = 2.0 * np.pi * found.frequency
     lost = np.zeros(omega.size)

@@ -1,4 +1,4 @@
-"""All modes below a frequency of a robot whose cables have mass, and their excitation by a path."""
+"""All modes of a robot with cable mass below a frequency, and their excitation by a path."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from sagline.statics.stiffness import Modes
 
 
 class VibrationStatus(IntEnum):
-    """Status of a vibration: the kind of equilibrium and of its cables."""
+    """Status of a vibration: type of equilibrium and of its cables."""
 
     SOLVED = 0
     UNSTABLE = 1
@@ -52,12 +52,12 @@ _TEXTS = {
 }
 
 
-_NEAR: Final = 3.0  # times: excitations that differ by less both count
-_INSTANTS: Final = 2000  # of a move, where its inertia is taken
+_NEAR: Final = 3.0  # factor: two excitations count if their ratio is smaller
+_INSTANTS: Final = 2000  # number of instants of a segment for its inertial wrench
 
 
 def _most_excited(state: Equilibrium, frequency: Array, shape: Array, path: Path) -> Array:
-    """The frequencies that a path excites most: one, or two where the second is excited a third as much or more."""
+    """Frequencies most excited by a path: one, or two if the second excitation is at least a third of the first."""
     # shapes: frequency (K,) [Hz]; shape (6, K); returns (1,) or (2,) [Hz]
     segments = [segment for segment in segments_of(instance(path, Path, "path")) if segment.curve is not None]
     known = np.flatnonzero(frequency > 0.0)
@@ -81,7 +81,7 @@ def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape
     motion = segment.rates(time)
     jet = segment.curve.at(motion[0])
     twist, twist_rate, _ = jet.twists(motion)
-    force = inertial_wrench(robot, jet.pose, twist, twist_rate) @ shape  # of each mode over time
+    force = inertial_wrench(robot, jet.pose, twist, twist_rate) @ shape  # modal force of each mode over time
     turning = 2.0 * np.pi * frequency
     transform = np.trapezoid(force * np.exp(-1j * np.outer(time, turning)), time, axis=0)
     seen: Array = np.abs(transform) * np.linalg.norm(shape, axis=0) / turning
@@ -90,28 +90,29 @@ def excitation(robot: Robot, segment: RestToRestSegment, frequency: Array, shape
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Vibration(Result):
-    """Result of `vibration`: all modes below a frequency, of the platform and of the strings that its cables are.
+    """Result of `vibration`: all modes below a frequency, of platform and strings.
 
-    Modes have unit modal mass, so that shapes are in m/sqrt(kg); K is their number.
+    Modes have unit modal mass, so the shapes are in m/sqrt(kg); K is the number of modes.
 
     Attributes:
         state: The state, a single one.
         up_to: Frequency below which all modes are found [Hz].
-        damping: Their energy losses.
-        status: Whether the state has linear vibrations.
-        frequency: Of the modes with cable mass [Hz], ascending, shape (K,).
-        shape: Motion of the platform (displacement of the center of mass, rotation vector, world axes), one mode a
+        damping: Energy losses of the modes.
+        status: `VibrationStatus`: type of equilibrium, and existence of linear vibrations.
+        frequency: Natural frequencies with cable mass [Hz], ascending, shape (K,).
+        shape: Motion of the platform (displacement of the center of mass, rotation vector, world axes), one mode per
             column, shape (6, K) [m/sqrt(kg), rad/(sqrt(kg) m)].
-        platform_share: Share of the kinetic energy that is the platform's, shape (K,).
-        cable_share: Share of it that is each cable's, shape (m, K); with platform_share they sum to 1.
+        platform_share: Platform share of the kinetic energy, shape (K,).
+        cable_share: Share of each cable in the kinetic energy, shape (m, K); with platform_share they sum to 1.
         cable_shape: Displacement of the cables at equally spaced material points from frame to platform end, world
             axes, shape (K, m, P, 3) [m/sqrt(kg)].
         loss: Damping ratio of each mode, to first order in the damping, shape (K,).
-        massless_frequency: Of the platform on cables whose mass does not swing [Hz], as in `modes`, shape (n,).
-        count: Number of modes below up_to by the exact count, which uses no modes: K if the modes are complete.
-        negative_directions: Motions in which the platform leaves an unstable equilibrium, one a column, shape (6, d);
-            no columns where it is stable.
-        slack_cables: Indices of the cables that have no linear vibration.
+        massless_frequency: Natural frequencies of the platform with massless cables [Hz], as in `modes`, shape (n,).
+        count: Number of modes below up_to by the exact count, which is independent of the modes; equals K if none is
+            missing.
+        negative_directions: Unstable motions of the platform, one per column, shape (6, d); no columns at a stable
+            equilibrium.
+        slack_cables: Indices of the cables without linear vibrations.
     """
 
     state: Equilibrium
@@ -131,45 +132,45 @@ class Vibration(Result):
 
     @property
     def complete(self) -> bool:
-        """True if no mode is missing: as many modes as the exact count has."""
+        """True if no mode is missing: the number of modes equals the exact count."""
         return self.status is VibrationStatus.SOLVED and self.count == self.frequency.size
 
     def to_shape(self, path: Path) -> Array:
-        """The frequencies that a path excites most, for a shaper: see `sagline.to_shape`.
+        """Frequencies most excited by a path, for a shaper: see `sagline.to_shape`.
 
         Args:
-            path: A path from rest to rest, best one that ends where the modes were taken.
+            path: A path from rest to rest; preferably, it ends at the pose of the modes.
 
         Returns:
             Frequencies [Hz], shape (1,) or (2,), the most excited first.
 
         Raises:
-            InvalidValueError: As `sagline.to_shape`.
+            InvalidValueError: In the cases listed for `sagline.to_shape`.
         """
         return _most_excited(self.state, self.frequency, self.shape, path)
 
 
-POINTS: Final = 41  # of a cable's shape
+POINTS: Final = 41  # number of points of a cable's shape
 
 
 def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = None) -> Vibration:
-    """All modes below a frequency of a robot whose cables have mass.
+    """All modes of a robot with cable mass below a frequency.
 
-    A cable is a string: besides the platform on its cables, each of them rings, about its catenary, in its plane and
-    out of it. None is missing: the number of modes is compared with an exact count that needs no mode.
+    A cable is a string: in addition to the platform modes, each cable vibrates about its catenary, in and out of its
+    plane. The number of modes is compared with an independent exact count, so that none is missing.
 
     Args:
-        state: An equilibrium, a single one, from `inverse` or `forward`.
-        up_to: Frequency below which modes are wanted [Hz], > 0.
-        damping: Energy losses of the vibration, for `loss`; None: none.
+        state: A single equilibrium, from `inverse` or `forward`.
+        up_to: Upper limit of the mode frequencies [Hz], > 0.
+        damping: Energy losses of the vibration, for `loss`; None: no losses.
 
     Returns:
-        Vibration. Its status reports an unstable equilibrium, and folded or slack cables: these have no
-        linear vibration, and the modes are those of all else.
+        Vibration. Its status reports an unstable equilibrium, and folded or slack cables; these cables have no linear
+        vibrations and are not included in the modes.
 
     Raises:
-        InvalidValueError: If the state is no single Equilibrium, of exact or elastic cables; if up_to is not positive,
-            or more than 2,000 modes lie below it.
+        InvalidValueError: If the state is not a single Equilibrium with exact or elastic cables; if up_to is not
+            positive, or more than 2,000 modes are below it.
         SaglineError: If modes and count disagree.
 
     Examples:
@@ -221,17 +222,17 @@ def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = Non
 
 
 def to_shape(modes: Modes | Vibration, path: Path) -> Array:
-    """The frequencies that a path excites most: one, or two where the second is excited a third as much or more.
+    """Frequencies most excited by a path: one, or two if the second excitation is at least a third of the first.
 
-    A mode is excited by its share of the platform's inertia on the way, at its own frequency, and it is seen by how
-    much it moves the platform: the larger |phi . M d| |phi| |A(w)|/w, phi its shape, d the direction of the way, A the
-    Fourier transform of the acceleration along it. This measure is plausible, not proved: it finds what to shape, not
-    how much is left.
+    The excitation of a mode is measured by |phi . M d| |phi| |A(w)|/w, with phi its shape, d the direction of the
+    motion, and A the Fourier transform of the acceleration along it. The measure combines the force on the mode at its
+    own frequency with the resulting platform motion. It is plausible but not proved: it finds the frequencies to shape,
+    not the residual vibration.
 
     Args:
-        modes: Of the robot at a single state, best the one where the path ends: `modes(plan.state[-1])`, without the
-            mass of the cables, or `vibration(plan.state[-1])`, with it.
-        path: A path from rest to rest; of several moves, the one that excites a mode most counts.
+        modes: Modes of the robot at a single state, preferably at the end of the path: `modes(plan.state[-1])`, without
+            cable mass, or `vibration(plan.state[-1])`, with it.
+        path: A path from rest to rest; for each mode, the segment with the largest excitation counts.
 
     Returns:
         Frequencies [Hz], shape (1,) or (2,), the most excited first.
