@@ -253,12 +253,12 @@ class CableState(Result):
     def __getitem__(self, index: int | slice | NDArray[Any]) -> CableState:
         """The state of a part of the cables, along the first axis.
 
-        index: A number (negative: from the end), a slice, or an array of numbers or booleans.
-            index: A number, which may count from the end; a slice; or an array of numbers or booleans.
+        Args:
+            index: A number (negative: from the end), a slice, or an array of numbers or booleans.
 
-        NoBatchError: If the state is that of a single cable (also a TypeError).
+        Raises:
+            NoBatchError: If the state is that of a single cable (also a TypeError).
             NoSuchEntryError: If there is no such entry (also an IndexError).
-            NoSuchEntryError: If there is no such entry; it is an IndexError too.
         """
         part = part_of(index, self.shape, "state of a single cable")
         arrays: dict[str, Any] = {name: locked(getattr(self, name)[part, ...]) for name in _ARRAYS}

@@ -61,8 +61,8 @@ class Design:
     """Data of an initial robot design.
 
     Attributes:
+        name: Name of the robot.
         frame: Edges of the frame [m], shape (3,); it is on the floor, centered at the origin.
-        frame: Edges of the frame [m], shape (3,); on the floor, around the origin.
         platform: Edges of the platform [m], shape (3,).
         mass: Mass of the platform with its payload [kg].
         rope: Name in the catalogue of ropes.

@@ -107,8 +107,8 @@ def structure_matrix(robot: Robot | Sequence[Robot], pose: Pose) -> Array:
     Returns:
         Columns (u_i; r_i x u_i) along the platform's free motions, shape (n, m) or (N, n, m).
 
-    InvalidValueError: If there is not one robot per pose, or several robots do not fit together.
-        InvalidValueError: If several robots are not one a pose, or do not fit together.
+    Raises:
+        InvalidValueError: If there is not one robot per pose, or several robots do not fit together.
         CableGeometryError: If both ends of a cable coincide, or one is inside its pulley; the message names pose and
             cable.
 
