@@ -31,7 +31,7 @@ _INSTANTS: Final = 4001  # number of instants of a segment for the final check o
 # relative increase of the time after the first violation of a limit; four times as much after each further one
 _SLOWER: Final = 1e-6
 _TRIES: Final = 12
-_GENTLE: Final = 8  # increments of this size for the margin of the winch rates
+_GENTLE: Final = 8  # number of the first tries, in which the time grows by the cube root of the speed excess
 _ROUNDING: Final = 1e-12
 
 

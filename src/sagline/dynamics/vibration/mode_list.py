@@ -65,7 +65,7 @@ def _behind(strings: Strings) -> Array:
 
 
 def _along(state: Equilibrium, place: Array) -> tuple[Array, Array, Array]:
-    """Unit tangents (m, s, 3) at shares of the length (s,), the length over what holds it across, and over EA."""
+    """Unit tangents (m, s, 3) at shares of the length (s,), and flexibilities across and along them."""
     # The flexibility of a cable is L (1/N + 1/EA) across its tangent and L/EA along it [m/N]
     cables, robot = state.cables, state.one_robot
     length = cables.unstrained_length[:, None]

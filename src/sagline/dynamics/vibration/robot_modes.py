@@ -78,9 +78,10 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
 
 def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
     """Eigenproblem of one state for its modes below a frequency [Hz]."""
-    # The cables' modes a little above it are its unknowns; what those beyond answer to slow motions of the platform is
-    # kept in a few motions of all together, which match the first moments (Krylov). With amplitudes counted from the
-    # frame the mass is that of the platform, with what these leave of the cables' mass at rest, and one for each.
+    # Unknowns are the cables' modes up to slightly above this frequency. The response of the higher modes to slow
+    # platform motions is represented by a few joint motions that match the first moments (Krylov). Amplitudes are
+    # relative to the frame; the mass matrix is the platform mass with the remaining quasi-static mass of the cables,
+    # and 1 for each mode.
     components = component_modes(model.strings, row, KEPT * up_to)
     freedom, ends = model.freedom, model.ends[row]
     drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
