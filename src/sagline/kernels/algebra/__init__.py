@@ -1,1 +1,1 @@
-"""Small dense algebra: no word of cables in it."""
+"""Small dense algebra, independent of cables."""

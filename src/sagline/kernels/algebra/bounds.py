@@ -1,7 +1,7 @@
-"""Limits as bounds: the points x (d,) of which START + x . rows stays between LOW and HIGH, bound by bound.
+"""Limits as bounds: the points x (d,) for which START + x . rows is between LOW and HIGH in every bound.
 
-rows is (d, k), a column a bound; bounds is (3, k), and HIGH may be infinite. One side of a bound is named by a label:
-2i the lower side of bound i, 2i + 1 the upper one. As a half-plane its normal points inward.
+rows is (d, k), one column per bound; bounds is (3, k), and HIGH may be infinite. A label names one side of a bound:
+2i is the lower side of bound i, 2i + 1 the upper side. The normal of a side points inward.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from sagline.kernels.jit import formula, kernel
 START, LOW, HIGH = 0, 1, 2
 STRIP_ROWS = 3
 
-TOLERANCE = 1e-12  # of the largest number at hand: a side missed by less counts as kept
+TOLERANCE = 1e-12  # relative to the largest bound: a side violated by less than this counts as satisfied
 
 
 @formula
 def largest_bound(bounds: Array) -> float:
-    """The largest finite number at hand, by which tolerances are measured."""
-    start = low = high = 0.0  # three, so that none waits for the others
+    """Largest finite bound, to which tolerances are relative."""
+    start = low = high = 0.0  # three independent sums, which the processor computes in parallel
     for i in range(bounds.shape[1]):
         start = max(start, abs(bounds[START, i]))
         low = max(low, abs(bounds[LOW, i]) if abs(bounds[LOW, i]) < math.inf else 0.0)
@@ -30,7 +30,7 @@ def largest_bound(bounds: Array) -> float:
 
 @kernel
 def box_radius(largest: float, bounds: Array) -> float:
-    """Radius that holds all that the bounds have in common where they have two sides, else the near part of it."""
+    """Radius of a box around the common points of two-sided bounds; with one-sided bounds, around the near part."""
     for i in range(bounds.shape[1]):
         if bounds[HIGH, i] == math.inf:
             return 1e4 * largest
@@ -39,20 +39,20 @@ def box_radius(largest: float, bounds: Array) -> float:
 
 @formula
 def inward(label: int) -> float:
-    """Sign by which a bound's column becomes the inward normal of one of its sides."""
+    """Sign that turns the column of a bound into the inward normal of the given side."""
     return 1.0 if label % 2 == 0 else -1.0
 
 
 @formula
 def side_of(bounds: Array, label: int) -> float:
-    """The number that normal . x must reach."""
+    """Lower limit of normal . x on a side."""
     i = label // 2
     return bounds[LOW, i] - bounds[START, i] if label % 2 == 0 else bounds[START, i] - bounds[HIGH, i]
 
 
 @formula
 def most_violated_bound(rows: Array, bounds: Array, point: Array, slack: float, first: bool) -> int:
-    """Label of the side that a point misses most, by more than a slack (or the first one missed); -1 for none."""
+    """Label of the side that a point violates most by more than a slack (or the first violated one); -1 if none."""
     d, k = rows.shape
     worst = slack
     label = -1

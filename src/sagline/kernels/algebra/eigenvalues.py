@@ -1,4 +1,4 @@
-"""The smallest eigenvalue of a small symmetric matrix, and how large the others are."""
+"""Smallest eigenvalue of a small symmetric matrix, and a bound of the largest."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from sagline.core.arrays import Array
 from sagline.kernels.jit import formula, kernel
 
 STEPS = 100
-STILL = 1e-16  # of the largest eigenvalue: a step that rounding hides
+STILL = 1e-16  # relative to the largest eigenvalue: a shorter step is below rounding
 
 
 @formula
 def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
     """Householder: fill diagonal (n,) and beside (n,), last entry 0, of a similar matrix; matrix is destroyed."""
     n = matrix.shape[0]
-    product = diagonal  # which is filled at the end
+    product = diagonal  # work array here; the diagonal is filled at the end
     for k in range(n - 2):
         square = 0.0
         for i in range(k + 1, n):
@@ -92,10 +92,10 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
-    """Smallest and largest eigenvalue of a symmetric matrix (n, n), which is destroyed; the other arrays are room.
+    """Smallest and largest eigenvalue of a symmetric matrix (n, n), which is overwritten; other arrays are work arrays.
 
-    The largest only where the smallest is within a share flat of it: else a bound above it, at most three times as
-    large, which takes less time.
+    The largest is computed only if the smallest is below flat times it; else an upper bound, at most three times as
+    large, is returned, which takes less time.
     """
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)

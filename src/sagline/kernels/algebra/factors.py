@@ -1,8 +1,8 @@
 """Small dense systems: Cholesky factor, Gauss elimination, orthonormal frames, and Householder factors.
 
 For a matrix (n, m), n <= m, matrix.T = Q R: the first n columns of the orthogonal Q give the minimum-norm solutions,
-the others span the null space. Sums that do not depend on each other run side by side: the loops are small and would
-otherwise wait for themselves.
+the other columns span the null space. Independent sums run in parallel, because the loops are small and would
+otherwise wait for the previous sum.
 """
 
 from __future__ import annotations
@@ -12,14 +12,14 @@ import math
 from sagline.core.arrays import Array
 from sagline.kernels.jit import formula, kernel
 
-LEAST_PIVOT = 1e-15  # of the diagonal element it is left of: smaller ones are rounding
+LEAST_PIVOT = 1e-15  # relative to the original diagonal element: a smaller pivot is rounding
 
 
 @kernel
 def factor_positive(matrix: Array, shift: float, factor: Array) -> bool:
-    """Fill the lower triangle of the factor L of matrix + shift 1, (n, n); False if that is not positive definite.
+    """Fill the lower triangle of the factor L of matrix + shift 1, (n, n); False if the sum is not positive definite.
 
-    Of the matrix only the lower triangle counts; factor may be the matrix itself.
+    Only the lower triangle of the matrix is used; factor may be the matrix itself.
     """
     n = matrix.shape[0]
     for j in range(n):
@@ -89,9 +89,9 @@ def solve_general(matrix: Array, right: Array) -> bool:
 
 @formula
 def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
-    """Take the first rows of an orthonormal frame (.., d), count of them, out of the row that follows them.
+    """Subtract from row count of a frame (.., d) its components along the orthonormal rows before it.
 
-    Fills column count of the triangle above its diagonal with the shares taken out; returns the square of what is left.
+    Fills column count of the triangle above its diagonal with these components; returns the square of the remainder.
     """
     d = frame.shape[1]
     for b in range(count):
@@ -112,7 +112,7 @@ def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
 
 @formula
 def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> None:
-    """Make what `orthogonalize_row` left in row count, of a given square, a row of the frame."""
+    """Scale row count, left by `orthogonalize_row` with a given square, to a unit row of the frame."""
     length = math.sqrt(square)
     triangle[count, count] = length
     for k in range(frame.shape[1]):
@@ -121,15 +121,15 @@ def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> N
 
 HEADS, FACTORS = 0, 1
 
-RANK = 1e-9  # a diagonal entry of R below this share of its row says that rank is lost
+RANK = 1e-9  # relative to its row: a smaller diagonal entry of R means that rank is lost
 
 
 @formula
 def factorize(reduced: Array, diagonals: Array) -> bool:
     """QR in place; returns whether the matrix (n, m) has full rank.
 
-    Row k of reduced then holds column k of R before its diagonal and the k-th reflection's vector from there
-    on; row HEADS of diagonals (2, n) is the diagonal of R, row FACTORS the reflections' 2/|v|^2.
+    Row k of reduced then contains column k of R before its diagonal and the k-th reflection's vector from there
+    on; row HEADS of diagonals (2, n) is the diagonal of R, row FACTORS contains 2/|v|^2 of the reflections.
     """
     n, m = reduced.shape
     for k in range(n):
@@ -160,7 +160,7 @@ def factorize(reduced: Array, diagonals: Array) -> bool:
 
 @formula
 def orthogonal_factor(reduced: Array, diagonals: Array, q: Array) -> None:
-    """Fill Q (m, m) from its reflections; a row m of q is working space."""
+    """Fill Q (m, m) from its reflections; row m of q is a work row."""
     n, m = reduced.shape
     for i in range(m):
         for j in range(m):
@@ -195,7 +195,7 @@ def pseudo_inverse(reduced: Array, diagonals: Array, q: Array, inverse: Array) -
 
 @formula
 def minimum_norm(inverse: Array, right: Array, solution: Array) -> None:
-    """Fill the shortest solution (m,) of matrix solution = right (n,)."""
+    """Fill the solution (m,) of least norm of matrix . solution = right (n,)."""
     n, m = inverse.shape
     for i in range(m):
         solution[i] = 0.0

@@ -1,7 +1,7 @@
 """Hyperbolic functions without cancellation.
 
 For h^2 <= 4 they are Taylor polynomials in h^2, cut off below 1e-18, which the compiler can vectorize.
-Each is summed in four interleaved chains, because one chain of twelve products waits for itself.
+Each is summed in four interleaved chains, because each product of a single chain waits for the previous one.
 """
 
 from __future__ import annotations

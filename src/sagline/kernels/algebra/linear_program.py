@@ -1,8 +1,8 @@
 """Linear programs in few unknowns, over bounds: the dual simplex method.
 
 It visits points that are optimal for their active sides until one satisfies all bounds, or a side
-contradicts the active ones: the proof of infeasibility. Where the same rows and cost are met again with other
-limits, the sides of the last answer are still optimal, and it starts from there.
+contradicts the active ones, which proves infeasibility. If the same rows and cost occur again with other
+limits, the sides of the last solution are still optimal, and the search starts from them.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from sagline.kernels.memory import Memory, block, counters, vector
 LP_SOLVED, LP_EMPTY, LP_UNBOUNDED, LP_GAVE_UP = 0, 1, 2, 3
 PIVOTS = 2000
 CAREFUL = 60  # pivots after which ties are broken by label (Bland), which cannot cycle
-ROUNDING = 4e-16  # of a point's largest coordinate
-PIVOT = 1e-11  # smallest pivot, of the row's largest
+ROUNDING = 4e-16  # relative to the largest coordinate of a point
+PIVOT = 1e-11  # smallest pivot, relative to the largest entry of the row
 
 
 class Basis(NamedTuple):
     """The active sides of an optimal point; good for the next program with the same rows and cost.
 
-    A limit that was finite must then still be so: a side at infinity cannot be active.
+    A limit that was finite must still be finite then: a side at infinity cannot be active.
     """
 
     # of the sides, and of the one that contradicts them if the bounds have nothing in common, (d + 1,); labels[0] is -1
     # for no basis. From 2k on they are the sides of a box that replaces infinity.
     labels: Indices
-    weights: Array  # multipliers of the proof, (d + 1,), >= 0
-    inverse: Array  # inverse of their normals, (d, d)
+    weights: Array  # multipliers of the infeasibility proof, (d + 1,), >= 0
+    inverse: Array  # inverse of the matrix of the sides' normals, (d, d)
 
 
 @glue
 def new_basis(memory: Memory, d: int) -> tuple[Basis, Memory]:
-    """Work arrays for d unknowns, and the memory that is left."""
+    """Work arrays for d unknowns, and the remaining memory."""
     weights, memory = vector(memory, d + 1)
     inverse, memory = block(memory, d, d)
     labels, memory = counters(memory, d + 1)
@@ -55,7 +55,7 @@ def _growth_along_edge(rows: Array, label: int, inverse: Array, j: int) -> float
 
 @formula
 def _violation(rows: Array, bounds: Array, label: int, radius: float, cost: Array, point: Array) -> float:
-    """By how much a point misses a side, or, from 2k on, a side of the box."""
+    """Violation of a side by a point; labels from 2k on are sides of the box."""
     box = label - 2 * rows.shape[1]
     if box >= 0:
         return -radius - (point[box] if cost[box] >= 0.0 else -point[box])
@@ -82,7 +82,7 @@ def _start_at_box_corner(rows: Array, cost: Array, radius: float, basis: Basis, 
 
 @glue
 def _exchange_sides(rows: Array, entering: int, leaving: int, miss: float, basis: Basis, point: Array) -> None:
-    """Let a side that the point misses enter the basis in place of another, and move to the new point."""
+    """Replace a side of the basis by a side that the point violates, and move to the new point."""
     labels, weights, inverse = basis
     d = point.size
     pivot = _growth_along_edge(rows, entering, inverse, leaving)
@@ -114,9 +114,9 @@ def _move_to_vertex(rows: Array, bounds: Array, cost: Array, radius: float, basi
 
 @kernel
 def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: Basis, point: Array) -> int:
-    """Fill the point (d,) of least cost . x that keeps all bounds up to a slack; returns the outcome.
+    """Fill the point (d,) of least cost . x that satisfies all bounds up to a slack; returns the outcome.
 
-    A slack of 0 means the usual tolerance. A solution as far out as the box is infinitely far.
+    A slack of 0 means the usual tolerance. A solution on the box counts as infinitely far.
     """
     labels, weights, inverse = basis
     d = cost.size
@@ -138,7 +138,7 @@ def lowest_point(rows: Array, bounds: Array, cost: Array, slack: float, basis: B
         seen = max(slack, ROUNDING * d * far)  # far out, rounding hides more than the slack
         entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
-            _move_to_vertex(rows, bounds, cost, radius, basis, point)  # the rounding of many pivots is gone
+            _move_to_vertex(rows, bounds, cost, radius, basis, point)  # removes the rounding of many pivots
             entering = most_violated_bound(rows, bounds, point, seen, careful)
         if entering < 0:
             outcome = LP_SOLVED

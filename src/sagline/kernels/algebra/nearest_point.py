@@ -1,8 +1,8 @@
-"""The point nearest to a target that keeps all bounds, for any number of unknowns: a dual active-set method.
+"""Point nearest to a target that satisfies all bounds, for any number of unknowns: a dual active-set method.
 
-Starting from the target itself, sides that are missed are added one by one, and sides that push the wrong way are
-dropped, until all are kept; docs/model.md, section 5. It starts from the sides that a similar problem was left with,
-which most often are the answer.
+Starting from the target, violated sides are added one by one, and sides with a negative multiplier are
+dropped, until all are satisfied; docs/model.md, section 5. The search starts with the active sides of a similar
+problem, which usually are the solution.
 
 Source:
     Goldfarb & Idnani 1983, "A numerically stable dual method for solving strictly convex quadratic programs", with
@@ -21,7 +21,7 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 EXCHANGES = 2000
-DEPENDENT = 1e-10  # a side that leaves less than this of itself outside the span of others depends on them
+DEPENDENT = 1e-10  # a side with a smaller part than this outside the span of others depends on them
 
 # rows of the pushes
 PUSH, SHARE = 0, 1  # multipliers of the active sides; components of the entering side
@@ -31,7 +31,7 @@ class ActiveSet(NamedTuple):
     """The active sides of a nearest point, and work arrays."""
 
     labels: Indices  # number of sides, then their labels, (d + 2,)
-    frame: Array  # their orthonormal frame, and a row for the one that enters, (d + 1, d)
+    frame: Array  # orthonormal frame of the active sides, and a row for the entering side, (d + 1, d)
     triangle: Array  # triangular factor, (d + 1, d + 1)
     pushes: Array  # rows PUSH and SHARE, (2, d + 1)
 
@@ -48,7 +48,7 @@ def new_active_set(memory: Memory, d: int) -> tuple[ActiveSet, Memory]:
 
 @glue
 def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: Array, point: Array) -> bool:
-    """Fill the point of the held sides' common edge that is nearest to the target; False if that is not optimal."""
+    """Fill the point nearest to the target on all active sides; False if this point is not optimal."""
     labels, frame, triangle, pushes = held
     count, d = labels[0], point.size
     for k in range(d):
@@ -82,7 +82,7 @@ def _point_on_active_sides(rows: Array, bounds: Array, held: ActiveSet, target: 
 
 @glue
 def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
-    """Release the active side at an index, and compute the frame of the others again."""
+    """Release the active side at an index, and update the frame of the remaining sides."""
     labels, frame, triangle, pushes = held
     count = labels[0] - 1
     labels[0] = count
@@ -97,9 +97,9 @@ def _drop_side(rows: Array, held: ActiveSet, leaving: int) -> None:
 
 @kernel
 def nearest_point(rows: Array, bounds: Array, target: Array, slack: float, held: ActiveSet, point: Array) -> bool:
-    """Fill the point (d,) nearest to the target (d,) that keeps all bounds up to a slack; False where there is none.
+    """Fill the point (d,) nearest to the target (d,) that satisfies all bounds up to a slack; False if none exists.
 
-    held: what a similar problem left, or labels[0] = 0; filled with the active sides of this point.
+    held: active sides of a similar problem, or labels[0] = 0; filled with the active sides of this point.
     """
     labels, frame, triangle, pushes = held
     d = target.size

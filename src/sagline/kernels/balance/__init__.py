@@ -1,1 +1,1 @@
-"""The platform on its cables: geometry, structure matrix, needed wrench."""
+"""Force balance of the platform: geometry, structure matrix, needed wrench."""

@@ -1,7 +1,7 @@
 """Data of one pose: cables in place, their limits, and the factored force balance.
 
-This is the one place that sets a pose up. The tension method uses t, which is scale times the chord tension plus
-offset: chord, horizontal or frame-end tensions, and weighted ones. Limits and minimum norm are those of t - offset.
+Only this module prepares a pose. The tension method uses t, which is scale times the chord tension plus
+offset: chord, horizontal or frame-end tensions, also weighted. Limits and minimum norm refer to t - offset.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ SHORTEST_CHORD = 1e-9  # [m]
 class Platform(NamedTuple):
     """Platform and loads at one pose."""
 
-    freedom: Array  # rows that pick the platform's free motions, translations first, (n, 6)
+    freedom: Array  # rows that select the platform's free motions, translations first, (n, 6)
     body: Array  # row of the body_table, (BODY_COLUMNS,)
     robot: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
     pose: Array  # row of the poses, (POSE_COLUMNS,)
@@ -40,7 +40,7 @@ class Platform(NamedTuple):
 class TensionLimits(NamedTuple):
     """Limits of the tensions."""
 
-    quantity: int  # which tension the robot's limits name
+    quantity: int  # code of the tension to which the robot's limits apply
     validity: float  # the article's T_adj of (54) [N], T_x > w D/(2 |tan phi|) + T_adj; NaN leaves the bound out
 
 
@@ -50,23 +50,23 @@ class Balance(NamedTuple):
     rotation: Array  # platform -> world, (3, 3)
     geometry: Array  # rows of `cable_geometry`, (GEOMETRY_ROWS, m)
     full: Array  # structure matrix, (6, m)
-    matrix: Array  # along the free motions, (n, m)
-    reduced: Array  # in the distribution's variable, then its reflections, (n, m)
-    diagonals: Array  # of its factors, (2, n)
-    q: Array  # orthogonal factor, and a row to work in, (m + 1, m)
+    matrix: Array  # structure matrix along the free motions, (n, m)
+    reduced: Array  # structure matrix in the distribution's variable, later its Householder reflections, (n, m)
+    diagonals: Array  # diagonals of the QR factors, (2, n)
+    q: Array  # orthogonal factor and one work row, (m + 1, m)
     inverse: Array  # transposed pseudo-inverse in the distribution's variable, (n, m)
-    null: Array  # orthonormal null-space basis in the distribution's variable, one vector a row, (r, m)
+    null: Array  # orthonormal null-space basis in the distribution's variable, one vector per row, (r, m)
     needed: Array  # wrench that the chord tensions must supply, (6,)
-    right: Array  # its components along the free motions, (n,)
-    scale: Array  # of the distribution's variable, (m,)
-    offset: Array  # of the distribution's variable [N], (m,)
-    bounds: Array  # the minimum norm as START, and the limits, in the distribution's variable, (3, m)
-    tension: Array  # shared tensions, in the distribution's variable less its offset [N], (m,)
+    right: Array  # components of `needed` along the free motions, (n,)
+    scale: Array  # scale of the distribution's variable, (m,)
+    offset: Array  # offset of the distribution's variable [N], (m,)
+    bounds: Array  # minimum-norm tensions (row START) and limits, in the distribution's variable, (3, m)
+    tension: Array  # distributed tensions, in the distribution's variable less its offset [N], (m,)
 
 
 @glue
 def new_balance(memory: Memory, m: int, n: int) -> tuple[Balance, Memory]:
-    """Work arrays for m cables and n free motions, and the memory that is left."""
+    """Work arrays for m cables and n free motions, and the remaining memory."""
     rotation, memory = block(memory, 3, 3)
     geometry, memory = block(memory, g.GEOMETRY_ROWS, m)
     full, memory = block(memory, 6, m)
@@ -98,7 +98,7 @@ def set_pose(
     cables: Cables,
     balance: Balance,
 ) -> int:
-    """Fill cables, with first-order sag forces, and balance of one pose; returns POSE_SOLVED or the reason for none.
+    """Fill the cables (first-order sag forces) and balance of one pose; returns POSE_SOLVED or the status of failure.
 
     weight: root weights of the cables in the distribution's variable, (m,).
     """
@@ -146,9 +146,9 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
 
 @glue
 def _choose_variable(variable: int, weight: Array, cables: Cables, balance: Balance) -> None:
-    """Fill scale, offset and limits of the variable in which the load is shared.
+    """Fill scale, offset and limits of the variable of the tension distribution.
 
-    The frame-end tension starts as tau - wD/2 sin phi, its first order.
+    The initial frame-end tension is its first-order value tau - wD/2 sin phi.
     """
     for i in range(weight.size):
         scale = weight[i]

@@ -1,6 +1,6 @@
-"""Structure matrix, needed wrench, and both along the free motions of a platform; docs/model.md, section 4.
+"""Structure matrix and needed wrench, also along the free motions of a platform; docs/model.md, section 4.
 
-The rows `free` (n, 6) are the platform's freedom, each times the unit of its motion; of six each has one entry.
+The rows `free` (n, 6) select the free motions, each times the unit of its motion; each row has one nonzero entry.
 """
 
 from __future__ import annotations

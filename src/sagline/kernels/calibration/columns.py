@@ -1,4 +1,4 @@
-"""Derivatives of the readings of one pose by every unknown: through the platform's motion, and directly."""
+"""Derivatives of the readings of one pose with respect to every unknown: direct, and through the platform's motion."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ from sagline.kernels.jit import formula, glue, kernel
 
 @formula
 def cross(a: Triple, b: Triple) -> Triple:
-    """A x b."""
+    """Cross product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @formula
 def unit_vector(axis: int) -> Triple:
-    """Of an axis."""
+    """Unit vector of an axis."""
     return 1.0 if axis == 0 else 0.0, 1.0 if axis == 1 else 0.0, 1.0 if axis == 2 else 0.0
 
 
 @formula
 def column_of(matrix: Array, k: int) -> Triple:
-    """Column of a (3, 3)."""
+    """Column k of a matrix (3, 3)."""
     return matrix[0, k], matrix[1, k], matrix[2, k]
 
 
 @formula
 def in_axes(axes: Array, vector: Triple) -> Triple:
-    """A world vector in the axes that are the columns of a (3, 3)."""
+    """Components of a world vector in axes given as columns of a matrix (3, 3)."""
     return (
         axes[0, 0] * vector[0] + axes[1, 0] * vector[1] + axes[2, 0] * vector[2],
         axes[0, 1] * vector[0] + axes[1, 1] * vector[1] + axes[2, 1] * vector[2],
@@ -48,13 +48,13 @@ def in_axes(axes: Array, vector: Triple) -> Triple:
 
 @formula
 def opposite(vector: Triple) -> Triple:
-    """The vector the other way."""
+    """Negative of a vector."""
     return -vector[0], -vector[1], -vector[2]
 
 
 @formula
 def plus(a: Triple, b: Triple) -> Triple:
-    """A + b."""
+    """Sum of two vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
@@ -66,7 +66,7 @@ def scaled(factor: float, vector: Triple) -> Triple:
 
 @glue
 def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, motion: Array) -> None:
-    """Fill the motion of the platform that a wrench on it causes; needs the factor."""
+    """Fill the motion of the platform due to a wrench on it; the stiffness must be factored."""
     components_along(free, wrench, space.part)
     solve_lower(space.factor, space.part)
     solve_upper(space.factor, space.part)
@@ -75,7 +75,7 @@ def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, 
 
 @formula
 def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple, direct: float) -> None:
-    """Fill what the length of cable i changes: the wrench on the platform, and all readings."""
+    """Fill the derivatives of the wrench on the platform and of all readings with respect to the length of cable i."""
     for k in range(3):
         space.by_wrench[i, k], space.by_wrench[i, 3 + k] = force[k], moment[k]
     for j in range(space.moved.shape[0]):
@@ -88,7 +88,7 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 @glue
 def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
-    """Add to the columns what the changes of the wrench do to the readings, by the platform's motion."""
+    """Add to the columns the effect of wrench changes on the readings through the platform's motion."""
     for j in range(slopes.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]
@@ -98,7 +98,7 @@ def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
 
 @glue
 def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: Array) -> None:
-    """Fill how the platform moves by each length, and in the last row by the first of the columns."""
+    """Fill the motion of the platform per length, and in the last row per unit of the first column's unknown."""
     m = space.by_wrench.shape[0]
     for k in range(6):
         space.six[k] = slopes.wrench[k, 0]
@@ -110,20 +110,20 @@ def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: A
 
 @formula
 def _lever_of(rows: Array, i: int) -> Triple:
-    """From the center of mass to a platform end."""
+    """Lever from the center of mass to a platform end."""
     return rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]
 
 
 @formula
 def _force_at(rows: Array, i: int) -> Triple:
-    """T of a cable, on its platform end, world axes."""
+    """Force T on a cable at its platform end, world axes."""
     x = rows[g.HORIZONTAL, i]
     return x * rows[g.AZIMUTH_X, i], x * rows[g.AZIMUTH_Y, i], rows[g.VERTICAL, i]
 
 
 @formula
 def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
-    """Change of a cable's force by a motion of its platform end."""
+    """Change of a cable's force due to a motion of its platform end."""
     return (
         ends[i, 0] * vector[0] + ends[i, 1] * vector[1] + ends[i, 2] * vector[2],
         ends[i, 3] * vector[0] + ends[i, 4] * vector[1] + ends[i, 5] * vector[2],
@@ -133,7 +133,7 @@ def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
 
 @formula
 def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
-    """Change of a frame end's tension by a motion of the platform end, except for its height: K^T times the shares."""
+    """Change of the frame-end tension due to a motion of the platform end at fixed height: K^T times the shares."""
     x, y, z = shares[i, 0], shares[i, 1], shares[i, 2]
     return (
         ends[i, 0] * x + ends[i, 3] * y + ends[i, 6] * z,
@@ -144,7 +144,7 @@ def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
 
 @formula
 def _tension_by_force(shares: Array, i: int, force: Triple) -> float:
-    """Change of a frame end's tension by a change of the force on the platform end."""
+    """Change of the frame-end tension due to a change of the force on the platform end."""
     return shares[i, 0] * force[0] + shares[i, 1] * force[1] + shares[i, 2] * force[2]
 
 
@@ -156,7 +156,7 @@ def _in_world_axes(rows: Array, i: int, pair: PlaneVector) -> Triple:
 
 @formula
 def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, moment: Triple) -> None:
-    """Add to a column a change of the wrench on the platform."""
+    """Add a change of the wrench on the platform to a column."""
     for k in range(3):
         slopes.wrench[k, at] += scale * force[k]
         slopes.wrench[3 + k, at] += scale * moment[k]
@@ -166,7 +166,7 @@ def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, mom
 def _add_force_change(
     slopes: Slopes, space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float
 ) -> None:
-    """Add to a column what a change of one cable's force does, which also changes its own reading directly."""
+    """Add the effect of a change of one cable's force to a column; the cable's own reading also changes directly."""
     _add_wrench_change(slopes, at, scale, force, cross(_lever_of(space.rows, i), force))
     slopes.work[i, at] += scale * direct
 
@@ -182,7 +182,7 @@ def _add_parameter_change(
     space: CalibrationArrays,
     slopes: Slopes,
 ) -> None:
-    """Add to a column what a datum of cable i does: to the force on its platform end, and to its tension alone."""
+    """Add to a column the effect of a parameter of cable i on its platform-end force and directly on its tension."""
     at = sought.where[row, i]
     if at >= 0:
         change = _in_world_axes(space.rows, i, pair)
@@ -192,7 +192,7 @@ def _add_parameter_change(
 
 @glue
 def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
-    """Fill the stiffness of the platform ends, and how the frame ends' tensions share in the forces there."""
+    """Fill the platform-end stiffness of all cables and the derivatives of the frame-end tensions."""
     for i in range(cables.shape[0]):
         across = end_stiffness(space.rows, i)
         for k in range(3):
@@ -205,7 +205,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 @glue
 def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
-    """Fill what a wrench on the platform changes of every reading, by the motion it causes; needs the factor."""
+    """Fill the change of every reading per wrench on the platform, through its motion; needs the factored stiffness."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
@@ -227,7 +227,7 @@ def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple
 def fill_cable(
     model: Model, cables: Array, gain: float, sought: Unknowns, p: int, i: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
-    """Add to the columns what is unknown of cable i, and fill what its length changes."""
+    """Add the unknowns of cable i to the columns, and fill the derivatives with respect to its length."""
     where, scale, rows, ends, shares = sought.where, sought.scale, space.rows, space.ends, space.shares
     lever, force = _lever_of(rows, i), _force_at(rows, i)
     for axis in range(3):
@@ -273,7 +273,7 @@ def fill_cable(
 
 @formula
 def _free_displacement(free: Array, vector: Triple) -> Triple:
-    """The part of a displacement that the platform's freedom has."""
+    """Part of a displacement along the platform's free motions."""
     x, y, z = 0.0, 0.0, 0.0
     for k in range(free.shape[0]):
         if not is_rotation(free, k):
@@ -286,9 +286,9 @@ def _free_displacement(free: Array, vector: Triple) -> Triple:
 def _fill_center(
     cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
-    """Add to the columns what a center of mass does that is elsewhere in the platform: the platform moves about it.
+    """Add to the columns the effect of a shift of the center of mass in the platform, about which the platform moves.
 
-    It moves where it can: a planar platform stays in its plane.
+    Only free motions count: a planar platform stays in its plane.
     """
     m = cables.shape[0]
     at, scale = sought.where[kinds.CENTER + axis, 0], sought.scale[kinds.CENTER + axis, 0]
@@ -317,7 +317,7 @@ def fill_platform(
     space: CalibrationArrays,
     slopes: Slopes,
 ) -> None:
-    """Add to the columns what is unknown of the platform and of the measuring system."""
+    """Add the unknowns of the platform and of the measuring system to the columns."""
     m = cables.shape[0]
     where, scale = sought.where, sought.scale
     if where[kinds.MASS, 0] >= 0:

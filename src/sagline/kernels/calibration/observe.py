@@ -1,7 +1,7 @@
 """Whitened residuals and derivatives of readings at equilibria; docs/model.md, section 14.
 
-The true lengths at every pose are unknowns too. They are eliminated pose by pose: the residual counts what the lengths
-that were read do to it as noise, of covariance diag(sigma^2) + sigma_L^2 A A^T.
+The true lengths at every pose are unknowns too. They are eliminated pose by pose: the residual treats the effect of
+errors of the measured lengths as noise, of covariance diag(sigma^2) + sigma_L^2 A A^T.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from sagline.kernels.memory import Memory
 
 @glue
 def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Array) -> None:
-    """Leave out what was not read, and fill W with W^T W the inverse of the covariance: the inverse of its factor."""
+    """Omit missing readings, and fill W, the inverse of the covariance's factor: W^T W inverts the covariance."""
     readings, m = work.shape[0], residual.size - BESIDE
     for j in range(residual.size):
         if not (abs(residual[j]) < math.inf and space.deviation[j] < math.inf):
@@ -69,7 +69,7 @@ def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Ar
             space.whole[j, k] = total
             space.whole[k, j] = total
     factor_positive(space.whole, 0.0, space.own)
-    for k in range(readings):  # W into whole, column by column
+    for k in range(readings):  # store W in whole, column by column
         for j in range(readings):
             space.whole[j, k] = 0.0
         space.whole[k, k] = 1.0 / space.own[k, k]
@@ -84,7 +84,7 @@ def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Ar
 def store_linearization(
     sensing: Sensing, answer: Linearization, p: int, reading_arrays: Array, lengths: Array, space: CalibrationArrays
 ) -> None:
-    """Write what one pose says."""
+    """Store the linearization of one pose."""
     residual, matrix, whole = answer.residual[p], answer.matrix[p], space.whole
     readings, m = matrix.shape[0], lengths.size
     for j in range(readings):
@@ -112,14 +112,14 @@ def store_linearization(
 
 @formula
 def _rotation_between(reading_arrays: Array, pose: Array, frame: Array) -> Triple:
-    """Rotation vector, in the measuring system's axes, from the platform's predicted rotation to that read."""
-    # predicted reading of the system: conj(frame) * pose
+    """Rotation vector from the predicted to the measured rotation of the platform, in the measuring system's axes."""
+    # predicted rotation reading: conj(frame) * pose
     fx, fy, fz, fw = -frame[3], -frame[4], -frame[5], frame[6]
     ax = fw * pose[3] + fx * pose[6] + fy * pose[5] - fz * pose[4]
     ay = fw * pose[4] + fy * pose[6] + fz * pose[3] - fx * pose[5]
     az = fw * pose[5] + fz * pose[6] + fx * pose[4] - fy * pose[3]
     aw = fw * pose[6] - fx * pose[3] - fy * pose[4] - fz * pose[5]
-    # read * conj(that)
+    # measured rotation * conj(predicted)
     rx, ry, rz, rw = reading_arrays[0], reading_arrays[1], reading_arrays[2], reading_arrays[3]
     x = -rw * ax + rx * aw - ry * az + rz * ay
     y = -rw * ay + ry * aw - rz * ax + rx * az
@@ -142,7 +142,7 @@ def _fill_residual(
     space: CalibrationArrays,
     residual: Array,
 ) -> None:
-    """Fill readings less predictions, and the deviations: infinite where nothing was read."""
+    """Fill readings less predictions, and the standard deviations, infinite for missing readings."""
     m = residual.size - BESIDE
     for i in range(m):
         residual[i] = readings.cells[p, i] - (sensing.gain[i] * space.shares[i, 4] + sensing.bias[i])
@@ -166,7 +166,7 @@ def observe(
     memory: tuple[Array, Indices],
     found: LinearizationArrays,
 ) -> None:
-    """Residuals and derivatives at N equilibria; NaN where the platform has no stable one.
+    """Residuals and derivatives at N equilibria; NaN where the equilibrium is not stable.
 
     Args:
         model: Cable model, the exact or the weightless one, as of `forward_poses`.
@@ -193,7 +193,7 @@ def observe(
         placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         for i in range(m):
             space.rows[g.LENGTH, i] = batch.lengths[p, i]
-            space.rows[g.PARAMETER, i] = math.nan  # an answer must not depend on the sample before
+            space.rows[g.PARAMETER, i] = math.nan  # a result must not depend on the previous sample
         unbalance(placed, cables, body, row_of(batch.wrenches, p), pose, space.rotation, space.rows, space.six)
         platform_stiffness(placed, cables, space.rows, space.stiffness)
         symmetric_part(free, space.stiffness, space.matrix)

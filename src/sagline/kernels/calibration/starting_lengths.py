@@ -1,4 +1,4 @@
-"""Lengths to begin with: of cables held at a pose with the tensions that were read, made to balance the platform."""
+"""Initial lengths from a pose and measured tensions, which are corrected to balance the platform."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, vector
 
-ITERATIONS = 3  # of balancing: what the cables' weight sag forces changes little with the tensions
-LEAST = 0.2  # of a tension that was read: largest decrease by balancing
+ITERATIONS = 3  # of balancing: the sag forces depend weakly on the tensions
+LEAST = 0.2  # smallest ratio of a balanced tension to the measured one
 
 
 @entry
@@ -31,19 +31,19 @@ def starting_lengths(
     memory: tuple[Array, Indices],
     length_out: Array,
 ) -> None:
-    """Unstrained lengths off the drums [m] of cables that hold the platform with nearly the tensions given.
+    """Fill the unstrained lengths off the drums [m] of cables that balance the platform near the given tensions.
 
-    The chord tensions change by the least that balances the platform.
+    The change of the chord tensions is the smallest one that balances the platform.
 
     Args:
-        terms: Of the cable model.
-        freedom: Rows that pick the free motions, (n, 6).
+        terms: Terms of the cable model.
+        freedom: Rows that select the free motions, (n, 6).
         cables: Row of the cable_table, (m, CABLE_COLUMNS).
         body: Row of the body_table.
         poses: Pose rows (N, POSE_COLUMNS).
-        tension: At the frame ends [N], (N, m).
+        tension: Tensions at the frame ends [N], (N, m).
         memory: `memory_for` as many cables.
-        length_out: (N, m).
+        length_out: Filled, (N, m).
     """
     model = model_of(terms)
     count, m = tension.shape

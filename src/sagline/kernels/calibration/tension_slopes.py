@@ -1,4 +1,4 @@
-"""Derivatives of the tension at a cable's frame end by the force on its platform end and by its own data."""
+"""Derivatives of a cable's frame-end tension with respect to the force on its platform end and its parameters."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from sagline.kernels.jit import formula
 
 
 class _FrameEndSlopes(NamedTuple):
-    """The tension at the frame end, and its derivatives while the force on the platform end stays, unless named."""
+    """Frame-end tension and its derivatives; the force on the platform end is constant except in `along` and `up`."""
 
     tension: float  # T_A [N]
-    along: float  # by the horizontal part of the force on the platform end, in the cable's plane
-    up: float  # by its vertical part
-    by_height: float  # by the height of the platform end over the frame anchor [N/m]
-    by_length: float  # by the length [N/m]
-    by_density: float  # [N m/kg]
-    by_stiffness: float  # by EA
-    by_radius: float  # by that of the pulley [N/m]
-    by_dead: float  # by the dead length [N/m]
+    along: float  # derivative with respect to the horizontal part of the platform-end force, in the cable's plane
+    up: float  # derivative with respect to the vertical part of this force
+    by_height: float  # derivative with respect to the height of the platform end above the frame anchor [N/m]
+    by_length: float  # derivative with respect to the length [N/m]
+    by_density: float  # derivative with respect to the density [N m/kg]
+    by_stiffness: float  # derivative with respect to EA
+    by_radius: float  # derivative with respect to the pulley radius [N/m]
+    by_dead: float  # derivative with respect to the dead length [N/m]
 
 
 @formula
 def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _FrameEndSlopes:
-    """Those of cable i, after its forces; zero without a force there."""
+    """Slopes of cable i, whose forces must be known; zero if there is no force at the frame end."""
     material = material_at(cables, i)
     gravity = model.gravity if model.code == codes.CATENARY else 0.0
     weight = material.density * gravity
@@ -42,7 +42,7 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
         share = 1.0 / tension if tension > 0.0 else 0.0
         along, up = x * share, at_frame * share
         return _FrameEndSlopes(tension, along, up, 0.0, -up * weight, -up * gravity * length, 0.0, 0.0, 0.0)
-    # T + T^2/(2 EA) - w z is one number from the platform end to the pulley's exit P, which moves on the pulley
+    # T + T^2/(2 EA) - w z is constant from the platform end to the pulley's exit P, which moves on the pulley
     stiffness, pulley = material.stiffness, pulley_at(cables, i)
     leaving, free = rows[g.LEAVING, i], rows[g.FREE_LENGTH, i]
     end = math.sqrt(x * x + z * z)
@@ -52,8 +52,8 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
     strained = 1.0 + leaving / stiffness
     share = 1.0 / strained
     grown = (1.0 + end / stiffness) / end * share
-    lifted = weight * pulley.radius * entry * cosine * share  # by the wrap angle
-    turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # the wrap angle by the force at P
+    lifted = weight * pulley.radius * entry * cosine * share  # derivative with respect to the wrap angle
+    turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # of the wrap angle with respect to the force at P
     rise = rows[g.FREE_RISE, i]
     return _FrameEndSlopes(
         leaving,
@@ -70,5 +70,5 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
 
 @formula
 def in_world_axes(rows: Array, i: int, along: float, up: float) -> tuple[float, float, float]:
-    """Derivatives by the force on the platform end in world axes."""
+    """Derivatives with respect to the force on the platform end in world axes."""
     return along * rows[g.AZIMUTH_X, i], along * rows[g.AZIMUTH_Y, i], up

@@ -9,7 +9,7 @@ from sagline.kernels.cable.geometry import CABLE_ROWS
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
 
-BESIDE = 6  # readings of a pose beside its load cells: position and rotation in the measuring system's axes
+BESIDE = 6  # readings of a pose in addition to its load cells: position and rotation in the measuring system's axes
 
 SensingArrays = tuple[Array, Array, Array, Array, Array, Array, Array, Array]
 ReadingArrays = tuple[Array, Array, Array, Array]
@@ -20,54 +20,54 @@ LinearizationArrays = tuple[Array, Array, Array, Array, Array, Array]
 class Sensing(NamedTuple):
     """The sensors."""
 
-    gain: Array  # of the load cells, (m,)
-    bias: Array  # [N], (m,)
-    tension_deviation: Array  # [N], (m,); infinite for no cell
+    gain: Array  # gain of the load cells, (m,)
+    bias: Array  # bias of the load cells [N], (m,)
+    tension_deviation: Array  # [N], (m,); infinite without a load cell
     length_deviation: Array  # [m], (m,)
-    position_deviation: Array  # [m], (3,); infinite for none
-    rotation_deviation: Array  # [rad], (3,); infinite for none
+    position_deviation: Array  # [m], (3,); infinite if not measured
+    rotation_deviation: Array  # [rad], (3,); infinite if not measured
     frame: Array  # pose row of the measuring system in the world
-    target: Array  # platform frame [m], (3,)
+    target: Array  # measured point, platform frame [m], (3,)
 
 
 class PoseReadings(NamedTuple):
-    """Readings at N poses; without readings a residual is zero; NaN where a sensor gave none."""
+    """Readings at N poses; NaN for a missing reading, whose residual is zero."""
 
-    lengths: Array  # that the winches say [m], (N, m)
-    cells: Array  # of the load cells [N], (N, m)
+    lengths: Array  # measured by the winches [m], (N, m)
+    cells: Array  # readings of the load cells [N], (N, m)
     positions: Array  # [m], (N, 3)
     rotations: Array  # unit quaternions, scalar last, (N, 4)
 
 
 class Unknowns(NamedTuple):
-    """The P numbers that are looked for."""
+    """The P unknowns."""
 
-    where: Indices  # parameter of each row of `kinds`, (KIND_ROWS, m), -1 for none
-    scale: Array  # derivative of that row by it, (KIND_ROWS, m)
-    paid: Array  # slopes of the lengths that the winches say, by zero, drum radius and EA, (3, N, m)
+    where: Indices  # index of the unknown for each row of `kinds`, (KIND_ROWS, m), -1 if known
+    scale: Array  # derivative of that row with respect to the unknown, (KIND_ROWS, m)
+    paid: Array  # derivatives of the measured lengths with respect to zero, drum radius and EA, (3, N, m)
 
 
 class Linearization(NamedTuple):
-    """Output arrays; rows of a pose are its load cells, three of its position and three of its rotation.
+    """Output arrays; the rows of a pose are its load cells, then three of its position and three of its rotation.
 
     R is m + 6, or m where no system measures positions or rotations.
     """
 
     matrix: Array  # whitened slopes, (N, R, P); rows without a reading are zero
     misfit: Array  # whitened residuals, (N, R)
-    residual: Array  # as they are, readings less predictions at the lengths given [N, m, rad], (N, m + 6); NaN for none
-    back: Array  # change of the true lengths by a whitened residual [m], (N, m, R)
-    # of the platform about its center of mass [m, rad], world axes: by each cable's length, and in the last row by the
-    # first of the P, (N, m + 1, 6); (0, m + 1, 6) where it is not wanted
+    residual: Array  # readings less predictions at the given lengths [N, m, rad], (N, m + 6); NaN if missing
+    back: Array  # change of the true lengths per whitened residual [m], (N, m, R)
+    # motion of the platform about its center of mass [m, rad], world axes: per cable length, and in the last row per
+    # unit of the first unknown, (N, m + 1, 6); (0, m + 1, 6) if not requested
     motion: Array
-    work: Array  # to work in, slopes of the readings and of the wrench on the platform, (R + 6, P)
+    work: Array  # work array: slopes of the readings and of the wrench on the platform, (R + 6, P)
 
 
 class Slopes(NamedTuple):
-    """Derivatives by the P numbers at one pose."""
+    """Derivatives with respect to the P unknowns at one pose."""
 
-    work: Array  # of the readings, first with the platform held, (R, P)
-    wrench: Array  # of the wrench on the held platform about its center of mass, (6, P)
+    work: Array  # slopes of the readings, at first with the platform fixed, (R, P)
+    wrench: Array  # slopes of the wrench on the fixed platform about its center of mass, (6, P)
 
 
 class CalibrationArrays(NamedTuple):
@@ -75,17 +75,17 @@ class CalibrationArrays(NamedTuple):
 
     rows: Array  # (CABLE_ROWS, m)
     rotation: Array  # (3, 3)
-    axes: Array  # of the measuring system, columns, (3, 3)
+    axes: Array  # axes of the measuring system as columns, (3, 3)
     stiffness: Array  # (6, 6)
     factor: Array  # (n, n)
     matrix: Array  # (n, n)
     part: Array  # (n,)
     six: Array  # (6,)
-    moved: Array  # change of the readings by a wrench on the platform, (R, 6)
+    moved: Array  # change of the readings per wrench on the platform, (R, 6)
     ends: Array  # stiffness of the platform ends, (m, 9)
-    shares: Array  # of the frame ends' tensions: by the forces on the platform ends, by height; and they, (m, 5)
-    by_wrench: Array  # change of the wrench on the platform by the lengths, (m, 6)
-    by_length: Array  # change of the readings by the lengths, A, (m, R)
+    shares: Array  # derivatives of frame-end tensions per platform-end force and height; then the tensions, (m, 5)
+    by_wrench: Array  # change of the wrench on the platform per length, (m, 6)
+    by_length: Array  # change of the readings per length, A, (m, R)
     whole: Array  # covariance, then the inverse of its factor, (R, R)
     own: Array  # (R, R)
     deviation: Array  # (m + 6,)
@@ -93,7 +93,7 @@ class CalibrationArrays(NamedTuple):
 
 @glue
 def new_calibration_arrays(memory: Memory, m: int, n: int, readings: int) -> CalibrationArrays:
-    """Working memory for m cables, n free motions and so many readings."""
+    """Work arrays for m cables, n free motions and the given number of readings."""
     rows, memory = block(memory, CABLE_ROWS, m)
     rotation, memory = block(memory, 3, 3)
     axes, memory = block(memory, 3, 3)

@@ -1,4 +1,4 @@
-"""Feasibility of poses: proof or shortfall of open ones, the polygon of feasible tensions, and capacity margins."""
+"""Feasibility of poses: proofs and shortfalls, the polygon of feasible tensions, and capacity margins."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
 
-SUPPORT = 1e-9  # of the largest component along the proof: cables that count less do not oppose the wrench
-AT_LIMIT = 1e-9  # of a limit: nearer values are at it
+SUPPORT = 1e-9  # relative to the largest component along the proof; a cable with less does not oppose the wrench
+AT_LIMIT = 1e-9  # relative to a limit: a value closer to the limit than this counts as at the limit
 PROVED, ENOUGH = 0, 1  # columns of the brackets
 
 
@@ -60,9 +60,9 @@ def decide_poses(
     answers: Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
-    """Decide those of N poses that the distribution iterations called infeasible, in chord tensions.
+    """Check in chord tensions the poses that the distribution iterations called infeasible.
 
-    Those that are feasible after all get the tensions that were found.
+    A pose that proves feasible gets the tensions found.
 
     Args:
         model_terms: As in `inverse_poses`.
@@ -71,12 +71,12 @@ def decide_poses(
         poses: Rows (N, POSE_COLUMNS).
         wrenches: External plus inertial, about the center of mass, (1 or N, 6).
         which: Indices of the poses, (K,).
-        covers: True if the method finds every feasible distribution; where it does not: POSE_NOT_COVERED.
+        covers: True if the method finds every feasible distribution; if False, a feasible pose gets POSE_NOT_COVERED.
         memory: `memory_for` as many cables.
         answers: As in `inverse_poses`; overwritten for these poses.
-        verdicts: Filled for these poses: what is proved and what suffices of the smallest change of the force [N],
-            (N, 2); that change, along the free motions, (N, n), and Farkas vectors, (N, n), NaN where there is none;
-            whether a limit of a cable opposes the needed wrench, (N, m).
+        verdicts: Filled for these poses: lower and upper bound of the smallest sufficient change of the force [N],
+            (N, 2); this change along the free motions, (N, n), and Farkas vectors, (N, n), both NaN if not found;
+            True for each cable whose limit opposes the needed wrench, (N, m).
     """
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
@@ -141,7 +141,7 @@ def decide_poses(
 
 @glue
 def _pose_status(statuses: Codes) -> int:
-    """Status of a pose whose tensions balance, from those of its cables (m,)."""
+    """Status of a pose whose tensions balance, from the statuses of its cables (m,)."""
     gravest = codes.CABLE_SOLVED
     for i in range(statuses.size):
         gravest = max(gravest, statuses[i])
@@ -152,7 +152,7 @@ def _pose_status(statuses: Codes) -> int:
 
 @glue
 def _demand_of(platform: Platform, cables: Cables, balance: Balance, demand: Demand) -> tuple[Demand, float]:
-    """Fill what is asked of the cables of a pose, and the lever arm [m] its moments are divided by."""
+    """Fill the demand on the cables of a pose; returns it and the lever arm [m] by which moments are divided."""
     n, m = balance.matrix.shape
     lever = 0.0
     for i in range(m):
@@ -186,7 +186,7 @@ def _demand_of(platform: Platform, cables: Cables, balance: Balance, demand: Dem
 
 @glue
 def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Array) -> None:
-    """Fill the direction of the proof, its force part of length 1, or its moment part where it has no force."""
+    """Fill the direction of the proof; its force part has length 1, or its moment part if the force part is zero."""
     n = farkas.size
     for k in range(n):
         farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
@@ -220,7 +220,7 @@ def polygon_of_pose(
     memory: tuple[Array, Indices],
     polygon: tuple[Array, Array, Array, Array, Array, Indices],
 ) -> int:
-    """The feasible set of one pose with the sag forces that its cables have at given chord tensions; number of corners.
+    """Fill the feasible set of one pose at fixed sag forces; returns the number of corners.
 
     Args:
         model_terms: As in `inverse_poses`.
@@ -229,7 +229,7 @@ def polygon_of_pose(
         robot_terms: As in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
         wrench: External plus inertial, about the center of mass, (6,).
-        carried: Chord tensions and sag forces of the cables, (m,) each; NaN for sag forces of first order.
+        carried: Chord tensions and sag forces of the cables, (m,) each; NaN selects sag forces of first order.
         memory: `memory_for` as many cables.
         polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space
             (r, m); for r = 2 corners and labels as `feasible_polygon`; for r = 1 corners[0, 0] and corners[1, 0] are
@@ -280,7 +280,7 @@ def margins_of_poses(
     memory: tuple[Array, Indices],
     margins: Array,
 ) -> None:
-    """Fill the capacity margins [N] (N,) of poses at given sag forces (N, m); NaN where there are none."""
+    """Fill the capacity margins [N] (N,) of poses at given sag forces (N, m); NaN where the sag forces are NaN."""
     limits = TensionLimits(*limit_terms)
     freedom, _bodies, robots = robot_terms
     count, m = sag_forces.shape

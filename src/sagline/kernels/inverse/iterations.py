@@ -25,13 +25,13 @@ from sagline.kernels.tension.nearest import Distribution, ReferencePoint, is_nea
 from sagline.kernels.tension.other_methods import distribute_by_other_method
 from sagline.kernels.tension.polygon import WorkArrays, reset_work_arrays
 
-TENSION_CONVERGED = 1e-9  # relative change of tension at which a distribution in frame-end tensions stands still
+TENSION_CONVERGED = 1e-9  # relative change of tension below which a distribution in frame-end tensions has converged
 SLOPE_STEP = 1e-4  # relative step of the central difference of the frame-end tension
 
 
 @kernel
 def linearize_ends(model: Model, distribution: Distribution, cables: Cables, balance: Balance) -> bool:
-    """Set the balance up again, in frame-end tensions as they run near the present chord tensions; False: rank lost."""
+    """Linearize the frame-end tensions at the present chord tensions and factor the balance; False if rank is lost."""
     for i in range(cables.tau.size):
         tau = cables.tau[i]
         chord, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
@@ -45,7 +45,7 @@ def linearize_ends(model: Model, distribution: Distribution, cables: Cables, bal
 
 
 ITERATIONS = 30
-FREE_ITERATIONS = 8  # then a choice that jumps with the last digits of the sag forces is held where it is
+FREE_ITERATIONS = 8  # afterwards the reference is fixed, so that rounding of the sag forces cannot move a tie
 CONVERGED = 1e-10  # [N]; sag forces that change by less, or by 1e-15 of the largest tension, have converged
 
 
@@ -108,7 +108,7 @@ def distribute_and_solve_cables(
 
 @glue
 def limits_admit_tensions(cables: Cables) -> bool:
-    """True if every cable has a tension within its limits; by the article's (54) a level one has none."""
+    """True if every cable has a tension within its limits; by (54) of the article, a level cable has none."""
     for i in range(cables.low.size):
         if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
             return False
@@ -117,7 +117,7 @@ def limits_admit_tensions(cables: Cables) -> bool:
 
 @glue
 def fix_reference(balance: Balance, near: ReferencePoint) -> None:
-    """Let the tensions to be near to be those just shared; the bound of a tie, which may be held, is gone."""
+    """Make the present tensions the reference, and release the bound of a tie if it is active."""
     near.held.labels[0] = 0
     for k in range(balance.null.shape[0]):
         near.reference[k] = 0.0
@@ -127,7 +127,7 @@ def fix_reference(balance: Balance, near: ReferencePoint) -> None:
 
 @glue
 def take_tensions(cables: Cables, balance: Balance) -> tuple[float, float]:
-    """Give the cables the tensions just shared; returns the largest relative change and the largest tension [N]."""
+    """Copy the distributed tensions to the cables; returns the largest relative change and largest tension [N]."""
     largest = 0.0
     moved = 0.0
     for i in range(cables.tau.size):
@@ -152,7 +152,7 @@ def sag_force_change(cables: Cables) -> float:
 def store_tensions(
     model: Model, distribution: Distribution, cables: Cables, work: WorkArrays | None, near: ReferencePoint
 ) -> None:
-    """Keep the tensions, in the variable they were shared in, for the pose that follows."""
+    """Store the tensions, in the variable of the distribution, for the next pose."""
     for i in range(cables.tau.size):
         near.previous[i] = cables.tau[i]
         if distribution.variable == codes.HORIZONTAL_TENSION:

@@ -35,7 +35,7 @@ Answers = tuple[Array, Codes, Array, Array, Codes]  # results, statuses, residua
 
 @glue
 def platform_at(robots: Robots, poses: Array, wrenches: Array, p: int) -> Platform:
-    """The platform of pose p; robots and wrenches are one for all poses or one a pose."""
+    """Platform at pose p; robots and wrenches have one row for all poses or one row per pose."""
     freedom, bodies, cables = robots
     body, cable_rows = bodies[min(p, bodies.shape[0] - 1)], cables[min(p, cables.shape[0] - 1)]
     return Platform(freedom, body, cable_rows, poses[p], wrenches[min(p, wrenches.shape[0] - 1)])
@@ -62,7 +62,7 @@ def inverse_poses(
     first: int,
     last: int,
 ) -> None:
-    """Solve part of a batch, pose by pose; with CLOSEST each feasible pose's tensions are the reference of the next.
+    """Solve part of a batch, pose by pose; with CLOSEST, the tensions of a feasible pose are the next reference.
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
@@ -75,12 +75,12 @@ def inverse_poses(
         previous: Tensions in the distribution's variable (m,) to stay close to, NaN for the minimum norm; with
             CLOSEST the last feasible ones on return.
         memory: `memory_for` as many cables.
-        otherwise: None for the methods that project onto a reference, in chord or horizontal tensions: all others are
+        otherwise: None for methods that project onto a reference, in chord or horizontal tensions: all others are
             then left out of the machine code. True for any.
-        answers: Filled: span and rise of the free spans, length of all cable off the drum, T_x, T_z, tau, and where
-            anything is behind a cable the rows of what is, (RESULT_ROWS, N, m); status of each cable, (N, m);
-            norms of the unbalanced force [N] and moment [N m] along the free motions, (N, 2); the wrench that J tau
-            had to supply, along them, (N, n); status of each pose, (N,).
+        answers: Filled: span and rise of the free spans, length of all cable off the drum, T_x, T_z, tau, and for
+            robots with pulleys or dead length their rows, (RESULT_ROWS, N, m); status of each cable, (N, m);
+            norms of the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau
+            must supply along the free motions, (N, n); status of each pose, (N,).
         first: Pose to begin with.
         last: Pose to end before.
     """
@@ -138,7 +138,7 @@ def measure_balance(platform: Platform, cables: Cables, balance: Balance, residu
 
 @glue
 def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance, results: Array, p: int) -> None:
-    """Write one pose's answer; no plausible numbers where there is none: span and rise stay, the rest is NaN."""
+    """Write the results of one pose; without a solution, all rows except span and rise become NaN."""
     for i in range(cables.tau.size):
         tension = cables.tau[i] if solved else math.nan
         results[tables.SPAN, p, i] = balance.geometry[g.SPAN, i]
@@ -153,7 +153,7 @@ def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance,
 
 @glue
 def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
-    """Write the free spans, and add to their lengths what is on the pulleys and behind them."""
+    """Write the free spans, and add the cable on and behind the pulleys to their lengths."""
     m = cables.tau.size
     for i in range(m):
         if not solved:
