@@ -1,4 +1,4 @@
-"""Integer codes by which kernels name cable models and say how a calculation ended."""
+"""Integer codes for cable models, methods and results of kernels."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CABLE_BELOW_VALIDITY = 3  # the empirical model's lowest point lies inside the s
 CABLE_TOO_SLACK = 4  # half its weight exceeds RANGE chord tensions: no practical answer
 CABLE_NOT_CONVERGED = 5
 
-# Ways of distribution the load among redundant cables.
+# Tension distribution methods.
 MINIMUM_NORM = 0
 CLOSEST = 1
 QUADRATIC_PROGRAM = 2  # up to here: the feasible point nearest to a target
@@ -31,12 +31,12 @@ IMPROVED_CLOSED_FORM = 9
 PUNCTURE = 10
 POLYGON_WALK = 11
 
-# The variable in which the load is shared.
+# The variable of the tension distribution.
 CHORD_TENSION = 0
 HORIZONTAL_TENSION = 1
 FRAME_END_TENSION = 2
 
-# The quantity that a robot's tension limits name.
+# The tension to which a robot's limits apply.
 LIMITS_OF_CHORD = 0
 LIMITS_OF_FRAME_END = 1
 
@@ -61,7 +61,7 @@ FORWARD_NOT_CONVERGED = 5
 FORWARD_NO_LENGTHS = 6  # all lengths NaN: a pose without a plan
 FORWARD_FITTED = 7  # straight cables: the pose whose lengths fit best
 
-# What the bracket of a pose's margin says.
+# Result of the bracket of a pose's margin.
 MARGIN_FEASIBLE = 0
 MARGIN_INFEASIBLE = 1
 MARGIN_OPEN = 2

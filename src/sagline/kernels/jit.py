@@ -1,4 +1,4 @@
-"""Compilation of kernels, and the place of their machine code.
+"""Compilation of kernels, and the folder of their machine code.
 
 numba does not notice that a function called from another file was edited and would go on running stale machine code.
 What a file's kernels become is therefore kept in a folder named by a hash of that file and of all that it imports.
@@ -37,7 +37,7 @@ FOLDER = base_folder()
 
 
 def sources_of(module: str, sources: Path) -> frozenset[Path]:
-    """The files that a kernel's machine code is made of, below the folder of the kernels."""
+    """Source files on which a kernel's machine code depends, below the folder of the kernels."""
     waiting, found = {module}, set[Path]()
     while waiting:
         name = waiting.pop()
@@ -70,7 +70,7 @@ def cache_folder(module: str, sources: Path = SOURCES) -> Path:
 
 @cache
 def folder_of(function_module: str) -> Path:
-    """The same for a function's module, which stays what it is while the program runs."""
+    """`cache_folder` of a function's module, which does not change while the program runs."""
     return cache_folder(function_module.removeprefix(f"{KERNELS}."))
 
 
@@ -90,7 +90,7 @@ def formula(function: F) -> F:
 
 
 def glue(function: F) -> F:
-    """A kernel that becomes part of its callers before they are compiled: what it passes on costs nothing."""
+    """A kernel that is inlined into its callers before compilation, so that passing arguments costs no time."""
     return _compiled(function, inline="always")
 
 

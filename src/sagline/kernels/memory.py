@@ -15,7 +15,7 @@ from sagline.kernels.jit import glue
 
 
 class Memory(NamedTuple):
-    """Memory of a kernel, or what is left of it."""
+    """Memory of a kernel, or its unused part."""
 
     numbers: Array  # flat
     counters: Indices  # flat
@@ -28,18 +28,18 @@ def memory_for(cables: int) -> tuple[Array, Indices]:
 
 @glue
 def block(memory: Memory, rows: int, columns: int) -> tuple[Array, Memory]:
-    """A block (rows, columns), and the memory that is left."""
+    """A block (rows, columns), and the remaining memory."""
     size = rows * columns
     return memory.numbers[:size].reshape((rows, columns)), Memory(memory.numbers[size:], memory.counters)
 
 
 @glue
 def vector(memory: Memory, size: int) -> tuple[Array, Memory]:
-    """A vector (size,), and the memory that is left."""
+    """A vector (size,), and the remaining memory."""
     return memory.numbers[:size].reshape((size,)), Memory(memory.numbers[size:], memory.counters)
 
 
 @glue
 def counters(memory: Memory, count: int) -> tuple[Indices, Memory]:
-    """So many counters, and the memory that is left; reshape fails where there are too few."""
+    """Counters (count,), and the remaining memory; reshape fails if too few remain."""
     return memory.counters[:count].reshape((count,)), Memory(memory.numbers, memory.counters[count:])

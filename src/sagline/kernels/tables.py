@@ -1,6 +1,6 @@
 """Columns of the arrays in which a robot enters the kernels.
 
-A robot is two arrays with a leading axis of 1 (the same robot at every pose) or N (one a pose):
+A robot is two arrays with a leading axis of 1 (the same robot at every pose) or N (one robot per pose):
 `cable_table` (1 or N, m, 14) and `body_table` (1 or N, 5). A pose is a row of seven.
 """
 

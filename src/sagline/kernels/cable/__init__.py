@@ -1,1 +1,1 @@
-"""One cable, and all cables of one pose each by itself."""
+"""Single cables, and all cables of one pose, solved independently."""

@@ -1,4 +1,4 @@
-"""Loops over many cables: states, shapes, sags, closure errors, and creep. An operand of length 1 holds for all."""
+"""Loops over many cables: states, shapes, sags, closure errors, and creep. An operand of length 1 applies to all."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def batch_from_tension(
 ) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
-    Ordinary catenaries are solved for a whole chunk in loops without branches; what is not ordinary
-    is solved again, one by one. One result a loop: with more, the compiler gives up on vectorizing.
-    buffer is room, (BUFFERS, CHUNK).
+    Ordinary catenaries are solved for a whole chunk in loops without branches; other cables
+    are solved again, one by one. Each loop has one result, because the compiler does not vectorize more.
+    buffer is a work array, (BUFFERS, CHUNK).
     """
     model = model_of(terms)
     count = length_out.shape[0]
@@ -237,7 +237,7 @@ def closures(
     tension: Array,
     residual_out: Array,
 ) -> None:
-    """By how much each cable misses its model's own equations [m].
+    """Error of each cable in the equations of its model [m].
 
     Catenary: distance of its computed end from the platform end. Others: the error in length.
     """
@@ -249,7 +249,7 @@ def closures(
         elif model.code == codes.CATENARY and density[i] * model.gravity > 0.0:
             x, z = catenary_end(horizontal[i], vertical[i], length[i], density[i] * model.gravity, stiffness[i])
             residual_out[i] = math.hypot(x - span[i], z - rise[i])
-        elif tension[i] == 0.0:  # slack: any length beyond the chord will do
+        elif tension[i] == 0.0:  # slack: any length above the chord is a solution
             residual_out[i] = max(chord - length[i], 0.0)
         else:
             sine = rise[i] / chord
@@ -270,10 +270,10 @@ def creep_strains(
     Samples whose tension is NaN are left out: the tension changes evenly over the gap.
 
     Args:
-        time: Of the samples [s], rising, (N,).
-        tension: [N], (N, m).
-        stiffness: Of each element [N], (k,).
-        delay: Its time [s], (k,).
+        time: Times of the samples [s], increasing, (N,).
+        tension: Tensions [N], (N, m).
+        stiffness: Stiffness of each element [N], (k,).
+        delay: Delay time of each element [s], (k,).
         settled: Whether the first tension has long acted, (1,); else the strain begins at zero.
         strain_out: (N, m).
     """

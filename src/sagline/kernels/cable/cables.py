@@ -1,4 +1,4 @@
-"""All cables of one pose: what they are, how they lie, and what they carry."""
+"""All cables of one pose: material, geometry, limits and tensions."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from sagline.kernels.memory import Memory, block
 
 
 class Cables(NamedTuple):
-    """Words for the cables of one pose, each of m values.
+    """Data of the cables of one pose, m values per field.
 
     The free span of a cable runs from where it leaves its pulley to its platform end. Where nothing is behind any
     cable the free spans are the cables themselves, and the words for them name the same memory.
     """
 
-    machine: bool  # whether anything is behind a cable, for all of them
+    machine: bool  # True if any cable has a pulley or dead length
     density: Array  # [kg/m]
     stiffness: Array  # EA [N]
     half_weight: Array  # wD/2 [N]
-    chord: Array  # D [m]; over a pulley that of the tangent from the platform end
+    chord: Array  # D [m]; for a cable over a pulley, length of the tangent from the platform end
     sine: Array  # sin phi
     cosine: Array  # cos phi
     low: Array  # lower limit of the chord tension [N]
@@ -30,7 +30,7 @@ class Cables(NamedTuple):
     tau: Array  # chord tension [N]
     ratio: Array  # L/D of the free span
     sag_force: Array  # T_z - tau sin phi [N]
-    last_sag_force: Array  # the same in the iteration before [N]
+    last_sag_force: Array  # sag force in the previous iteration [N]
     slackness: Array  # X = wD/(2 tau) of the free span
     strain: Array  # e = tau/EA of the free span
     free_half_weight: Array  # wD/2 of the free span [N]
@@ -41,9 +41,9 @@ class Cables(NamedTuple):
     free_sag_force: Array  # T_z - tau sin phi of the free span [N]
     wrap_sine: Array  # sine of the wrap angle psi
     wrap_cosine: Array  # cosine of psi
-    radius: Array  # of the pulley [m]
+    radius: Array  # pulley radius [m]
     entry: Array  # +1 where a cable enters its pulley from below, -1 from above
-    dead: Array  # length of dead length [m]
+    dead: Array  # dead length [m]
     rise: Array  # height of the frame anchor above the drum [m]
 
 

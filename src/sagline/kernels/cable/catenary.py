@@ -102,7 +102,7 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """One Newton step more, from a ratio close by: that of a tension nearby, or of two steps."""
+    """One Newton step from an approximate ratio: that of a similar tension, or the result of two steps."""
     return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
@@ -151,7 +151,7 @@ def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) 
 
 @kernel
 def sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
-    """(T_z/tau - sin phi): what the weight adds to the vertical force on the platform end, in chord tensions."""
+    """Contribution of the weight to the vertical platform-end force, in chord tensions: T_z/tau - sin phi."""
     taut = 1.0 - strain * ratio
     h = half_weight * taut
     s = taut * sinhc(h)
@@ -161,7 +161,7 @@ def sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float
 
 @formula
 def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
-    """The same for an ordinary cable, free of branches."""
+    """`sag_force_ratio` of an ordinary cable, free of branches."""
     taut = 1.0 - strain * ratio
     y = half_weight * half_weight * taut * taut
     s = taut * sinhc_polynomial(y)

@@ -94,7 +94,7 @@ def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geo
 def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array, geometries: Array) -> None:
     """Fill the geometry rows of N poses, (N, GEOMETRY_ROWS, m); tables and poses as in `sagline.kernels.tables`.
 
-    rotation: room, (3, 3).
+    rotation: Work array, (3, 3).
     """
     for p in range(poses.shape[0]):
         robot = robots[min(p, robots.shape[0] - 1)]

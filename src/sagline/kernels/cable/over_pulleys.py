@@ -31,7 +31,7 @@ from sagline.kernels.cable.terms import Chord, Material, Model, PlaneStiffness
 from sagline.kernels.jit import formula, glue
 
 LEAST_FREE = 1e-3  # of a cable's length: what is asked for is never shorter
-TINY = 1e-300  # N: divides no force at all
+TINY = 1e-300  # [N]; avoids a division by zero force
 ORDINARY_END = math.sqrt(EXCESS_LIMIT)  # of u = wL/(T_A + T_B): up to here the series of P1 is a polynomial
 
 
@@ -158,7 +158,7 @@ def _fill_free_span_ends(model: Model, cables: Array, rows: Array) -> None:
 
 @formula
 def _larger(one: float, other: float) -> float:
-    """The larger of two, NaN if either is."""
+    """Maximum of two numbers, NaN if one of them is NaN."""
     return other if not other <= one and not math.isnan(one) else one
 
 

@@ -53,7 +53,7 @@ class Change(NamedTuple):
 
 
 class EndMotion(NamedTuple):
-    """Of the platform end in the cable's plane, at a fixed force on it."""
+    """Motion of the platform end in the cable's plane at a fixed force on it."""
 
     x: float
     z: float
@@ -81,7 +81,7 @@ def _robot_has_machine(cables: Array) -> bool:
 
 @kernel
 def robots_have_machine(robots: Array) -> bool:
-    """True if a cable of several robots has one, (1 or N, m, CABLE_COLUMNS)."""
+    """True if a cable of any robot (1 or N, m, CABLE_COLUMNS) has a pulley or dead length."""
     for p in range(robots.shape[0]):
         if _robot_has_machine(robots[p]):
             return True

@@ -1,4 +1,4 @@
-"""The cables of one pose as curves: how their sag forces T_z - tau sin phi run with their chord tensions.
+"""Sag forces T_z - tau sin phi of the cables of one pose as curves over their chord tensions.
 
 Weight makes the sag force of a cable below its frame end rise and fall with the tension: it falls while the
 sag is deep, rises while the sag grows shallow, and falls again by stretch. On a range of tensions it is therefore
@@ -33,7 +33,7 @@ TURN_ROWS = 4
 
 
 class Curves(NamedTuple):
-    """The cables of one pose, whose sag forces run with their chord tensions."""
+    """The cables of one pose as curves of sag force over chord tension."""
 
     model: Model  # cable model
     cables: Cables  # the cables; what they carry is working space
@@ -59,7 +59,7 @@ def new_curves(model: Model, cables: Cables, statuses: Codes, memory: Memory) ->
 
 @kernel
 def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
-    """Fill the sag forces (m,) at chord tensions (m,), and let the cables carry them."""
+    """Fill the sag forces (m,) at chord tensions (m,), and store both in the cables."""
     for i in range(tau.size):
         curves.cables.tau[i] = tau[i]
     for k in range(EXITS if curves.cables.machine else 1):
@@ -165,7 +165,7 @@ START_OF_LEAST, START_OF_MOST = 1.25, 0.9
 # the true peak it changes by less, in all random cables of the tests. Nearer to zero golden sections look for the peak.
 FALLS_FOR_SURE = 0.3
 
-# Rows to work in.
+# Rows of the work array.
 A, B, AT_A, AT_B, TENSION, GROWTH, RISEN, LAST = 0, 1, 2, 3, 4, 5, 6, 7
 ROWS = 8
 
@@ -186,7 +186,7 @@ def _growths(curves: Curves, tau: Array, growth: Array) -> None:
 
 @formula
 def _growth_of(curves: Curves, i: int, tau: float) -> float:
-    """The same of one cable."""
+    """Growth of the sag force of cable i with the logarithm of its chord tension [N]."""
     above, below = sag_force_at(curves, i, tau * (1.0 + SLOPE_STEP)), sag_force_at(curves, i, tau * (1.0 - SLOPE_STEP))
     return (above - below) / (2.0 * SLOPE_STEP)
 

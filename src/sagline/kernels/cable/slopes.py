@@ -96,7 +96,7 @@ def force_by_length(
 def _shallow_force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> _ForceSlopes:
-    """The three of a shallow cable."""
+    """Force slopes (by L, rho and EA) of a shallow cable."""
     slopes = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.hypot(span, rise)
     cosine = span / chord
@@ -113,7 +113,7 @@ def _shallow_force_slopes(
 def force_slopes(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
 ) -> _ForceSlopes:
-    """The three of a cable of any model but the straight one."""
+    """Force slopes (by L, rho and EA) of a cable of any model except the straight one."""
     horizontal, vertical, tension = force
     stiffness = material.stiffness
     weight = material.density * model.gravity

@@ -31,7 +31,7 @@ SAME_SAG_FORCE = 4e-16  # of the tension: smaller changes of a sag force count a
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative: more than what the passes for a slack cable's pulley leave
-SECANT = 1e-6  # relative step below which a slope between two steps is rounding
+SECANT = 1e-6  # relative step below which a secant slope is dominated by rounding
 TAUT = 1.25  # of wD/2: a chord tension above that of the least tension at the frame end
 
 
@@ -194,7 +194,7 @@ def taut_at_frame_end(
 
 
 class _CableAtTension(NamedTuple):
-    """A cable that is held at a pose: all of it off the drum [m], its sag force [N], and at its frame end [N]."""
+    """Cable fixed at a pose: length off the drum [m], sag force [N], tension at the frame end [N]."""
 
     length: float
     sag_force: float
@@ -233,11 +233,11 @@ def lengths_at_frame_ends(
     """Unstrained lengths off the drums [m] of cables that are held at a pose, each by itself.
 
     Args:
-        terms: Of the cable model.
+        terms: Terms of the cable model.
         cables: Row of the cable_table, (m, CABLE_COLUMNS).
         body: Row of the body_table.
         pose: Pose row.
-        tension: At the frame ends [N], (m,).
+        tension: Tensions at the frame ends [N], (m,).
         tension_out: Tensions at these lengths; they differ where no cable has so little [N], (m,).
         length_out: (m,).
         rotation: Work array, (3, 3).

@@ -1,4 +1,4 @@
-"""The words of one cable, as scalars: what kernels of a single cable take and give.
+"""Scalar data of one cable: inputs and outputs of kernels for a single cable.
 
 They cost nothing in compiled code, where a NamedTuple of numbers is its numbers.
 """
@@ -13,7 +13,7 @@ Terms = tuple[int, float, float, float]  # a Model as it comes from Python: numb
 
 
 class Model(NamedTuple):
-    """A cable model where it stands."""
+    """Cable model with the local gravity."""
 
     code: int  # code of the equations
     k_h: float  # the empirical model's constant of the sag force
@@ -26,7 +26,7 @@ class Model(NamedTuple):
 
 @glue
 def model_of(terms: Terms) -> Model:
-    """A cable model as it comes from Python."""
+    """`Model` from the plain tuple that Python passes."""
     return Model(terms[0], terms[1], terms[2], terms[3], None)
 
 

@@ -38,7 +38,7 @@ GRAVITY = 12  # [m/s^2]
 REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and the rate at which cable is let out [m/s]
 CHAIN_COLUMNS = 15
 
-LEAST, MOST = 0.4, 1.6  # of an element: the one at the frame is merged with its neighbor, or gives birth to a node
+LEAST, MOST = 0.4, 1.6  # limits of the element at the frame, in elements, for merging and splitting
 TINY = 1e-300
 
 
@@ -66,7 +66,7 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
 
 @formula
 def _strain_at_exit(row: Array, distance: float) -> float:
-    """Strain of the element at the frame, which has that of the cable behind it: that slides."""
+    """Strain of the element at the frame; it equals the strain of the cable behind it, which slides."""
     return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
 
 
@@ -81,7 +81,7 @@ def _element_distance(place: Array, j: int) -> float:
 
 @kernel
 def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
-    """Add what resists the stretching of every taut element, which never pushes; returns the power lost [W]."""
+    """Add the damping force of every taut element, which never pushes; returns the power lost [W]."""
     viscous = row[STIFFNESS] * row[LOSS_TIME]
     power = 0.0
     for j in range(count + 1):
@@ -106,14 +106,14 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
 
 @formula
 def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Fill the velocity of the frame's node: that of the cable which enters there, L' (1 + strain) along it."""
+    """Fill the velocity of the frame's node, which is that of the entering cable: L' (1 + strain) along the cable."""
     for c in range(3):
         speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
 
 
 @formula
 def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array, h: float) -> None:
-    """Change the nodes' velocities by what pulls at them during h [s], and by the momentum that enters."""
+    """Update the nodes' velocities from element forces, gravity and entering momentum during h [s]."""
     share = h / (row[DENSITY] * row[ELEMENT])
     last = h / (0.5 * row[DENSITY] * (row[ELEMENT] + row[REST]))
     for c in range(3):
@@ -179,7 +179,7 @@ def kinetic_at_exit(speed: Array, count: int, row: Array) -> float:
 
 @kernel
 def potential(place: Array, count: int, row: Array) -> tuple[float, float]:
-    """Strain energy [J], and that of the height of the free nodes above the exit [J]."""
+    """Strain energy [J], and potential energy of the free nodes above the exit [J]."""
     element, stiffness = row[ELEMENT], row[STIFFNESS]
     stretch = 0.0
     height = 0.0
@@ -219,7 +219,7 @@ def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array
 
 @kernel
 def tension_at_exit(place: Array, count: int, row: Array, pulls: Array) -> float:
-    """Tension where the chain leaves the frame [N]: of its element there and half of that one's weight."""
+    """Tension where the chain leaves the frame [N]: force of its last element plus half the element's weight."""
     x = pulls[count] * (place[0, count + 1] - place[0, count])
     y = pulls[count] * (place[1, count + 1] - place[1, count])
     z = pulls[count] * (place[2, count + 1] - place[2, count]) + 0.5 * row[DENSITY] * row[GRAVITY] * row[REST]
@@ -228,7 +228,7 @@ def tension_at_exit(place: Array, count: int, row: Array, pulls: Array) -> float
 
 @formula
 def mean_tension(pulls: Array, count: int, row: Array) -> float:
-    """Mean tension of the elements [N], by which a slack cable is known: waves alone leave it."""
+    """Mean tension of the elements [N], which detects a slack cable; waves do not change it."""
     total = 0.0
     for j in range(count + 1):
         total += pulls[j]
@@ -274,7 +274,7 @@ def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
 
 @formula
 def wind_on_element(place: Array, j: int, k: int, drag: float, wind: Array) -> tuple[float, float, float]:
-    """Force of a wind across the line from node j to node k, of drag by the square of its speed [N]."""
+    """Force of a wind across the line from node j to node k [N]; drag: force per square of the speed [N s^2/m^2]."""
     x, y, z = place[0, k] - place[0, j], place[1, k] - place[1, j], place[2, k] - place[2, j]
     along = (wind[0] * x + wind[1] * y + wind[2] * z) / (x * x + y * y + z * z + TINY)
     return wind_across(wind, along, x, y, z, drag)
@@ -282,7 +282,7 @@ def wind_on_element(place: Array, j: int, k: int, drag: float, wind: Array) -> t
 
 @kernel
 def add_wind_on_nodes(place: Array, speed: Array, count: int, row: Array, wind: Array, h: float) -> float:
-    """Change the nodes' velocities by a wind of h [s] across the cable; returns its work [J]."""
+    """Update the nodes' velocities from the wind across the cable during h [s]; returns its work [J]."""
     work = 0.0
     for j in range(1, count + 1):
         length = row[ELEMENT] if j < count else 0.5 * (row[ELEMENT] + row[REST])

@@ -30,13 +30,13 @@ Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, l
 
 
 class _Chains(NamedTuple):
-    """The chains of m cables, with room for P nodes each."""
+    """The chains of m cables, with memory for P nodes each."""
 
-    table: Array  # their parameters, (m, CHAIN_COLUMNS)
-    place: Array  # of the nodes [m], (m, 3, P)
-    speed: Array  # of the nodes [m/s], (m, 3, P)
-    pulls: Array  # forces by length of the elements [N/m], (m, P)
-    counts: Indices  # free nodes, (m,)
+    table: Array  # parameters of the chains, (m, CHAIN_COLUMNS)
+    place: Array  # positions of the nodes [m], (m, 3, P)
+    speed: Array  # velocities of the nodes [m/s], (m, 3, P)
+    pulls: Array  # element forces divided by element lengths [N/m], (m, P)
+    counts: Indices  # numbers of free nodes, (m,)
 
 
 class ChainRun(NamedTuple):
@@ -92,7 +92,7 @@ def chain_run_of(
 
 @glue
 def _fill_last_elements(run: ChainRun) -> None:
-    """Fill what is left of every length for the element at the frame, and the rates."""
+    """Fill the remaining length of the element at the frame, and its rate, for every cable."""
     for i in range(run.chains.counts.shape[0]):
         row = run.chains.table[i]
         row[c.REST] = run.rows[g.LENGTH, i] - row[c.BEHIND] - run.chains.counts[i] * row[c.ELEMENT]
@@ -101,7 +101,7 @@ def _fill_last_elements(run: ChainRun) -> None:
 
 @kernel
 def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
-    """Fill what is asked of the winches at a time, and what is given of wrench and wind."""
+    """Fill the set points of the winches and the given wrench and wind at a time."""
     at = run.at
     at[progress.LENGTH_AT] = progress.interpolate_table(
         run.lengths, at[progress.LENGTH_AT], now, shift, run.targets, run.target_rates
@@ -116,7 +116,7 @@ def follow_time_tables(run: ChainRun, now: float, shift: float) -> None:
 
 @kernel
 def fill_platform_force(run: ChainRun) -> float:
-    """Fill what moves the platform and what the winches feel; returns the power that elements and air take [W]."""
+    """Fill the force on the platform and the tensions at the winches; returns the power lost [W]."""
     chains, drives, state, rows = run.chains, run.drives, run.state, run.rows
     ends = run.cables[:, tables.PLATFORM_X : tables.PLATFORM_Z + 1]
     lost = 0.0

@@ -52,13 +52,13 @@ ENDED = (
     progress.COUNTERS
 )  # one counter more than a run without cable mass has: how it ended, FAILED being the cable to blame
 DONE, LONG, SHORT, GROWN = range(4)
-FEWEST = 2  # free nodes of a chain
-GROWTH = 0.5  # of what could have become motion: more than phases that err can invent
+FEWEST = 2  # smallest number of free nodes of a chain
+GROWTH = 0.5  # relative to the energy convertible into motion; phase errors alone create less
 
 
 @glue
 def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
-    """Energy of a chain with that of its half element at the exit, and the latter alone [J]."""
+    """Energy of a chain including its half element at the exit, and energy of this half element [J]."""
     chains, n, row = run.chains, run.chains.counts[i], run.chains.table[i]
     strain, raised = c.potential(chains.place[i], n, row)
     entering = c.kinetic_at_exit(chains.speed[i], n, row)
@@ -67,7 +67,7 @@ def _energy_of(run: ChainRun, i: int) -> tuple[float, float]:
 
 @kernel
 def change_node_count(run: ChainRun, i: int) -> None:
-    """Give a chain one node more or less at the frame, and account for the energy that this takes."""
+    """Add or remove one node of a chain at the frame, and add the energy change to the audit."""
     chains, audit = run.chains, run.drives.audit
     row, place, speed, n = chains.table[i], chains.place[i], chains.speed[i], chains.counts[i]
     more = 1 if row[c.REST] > row[c.ELEMENT] else -1
@@ -83,7 +83,7 @@ def change_node_count(run: ChainRun, i: int) -> None:
     row[c.REST] -= more * row[c.ELEMENT]
     after, entering = _energy_of(run, i)
     audit[d.LOST] += before - after
-    audit[d.SUPPLIED] -= entering - entering_before  # that of the half element at the exit is the winch's
+    audit[d.SUPPLIED] -= entering - entering_before  # the winch supplies the half element at the exit
     c.fill_element_forces(place, speed, n + more, row, chains.pulls[i])
     run.drives.now[d.WHOLE, i] = c.whole_force(place, speed, n + more, row, chains.pulls[i])
 
@@ -104,7 +104,7 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
 
 @kernel
 def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
-    """Write down a step, and look whether energy has grown by itself."""
+    """Record a step, and check that energy has not grown without supply."""
     states, tensions, lengths, energies, _notes, points = records
     state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
     audit = drives.audit
@@ -147,7 +147,7 @@ def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
 
 @glue
 def _split_step(run: ChainRun, now: float) -> None:
-    """One step from a time on; forces at hand before and after are those of the state."""
+    """One step from a time on; the stored forces match the state before and after the step."""
     h, half, drives, rows, chains = run.step, 0.5 * run.step, run.drives, run.rows, run.chains
     drives.audit[d.SUPPLIED] += half * power_of_given_wrench(run)
     kick_body(run.state, run.inertia, run.force, half)
@@ -172,7 +172,7 @@ def _split_step(run: ChainRun, now: float) -> None:
 
 @glue
 def _change_node_counts(run: ChainRun) -> None:
-    """Give chains one node more or less whose element at the frame has become too long or too short."""
+    """Add or remove a node of each chain whose element at the frame is too long or too short."""
     for i in range(run.chains.counts.shape[0]):
         rest, element = run.chains.table[i, c.REST], run.chains.table[i, c.ELEMENT]
         if not c.LEAST * element < rest < c.MOST * element:
@@ -193,7 +193,7 @@ def run_chains(
     steps: int,
     every: int,
 ) -> None:
-    """Go on for some steps; a prepared run continues at the end of the last call, identical to the last bit.
+    """Integrate some steps; a prepared run continues at the end of the last call, identical to the last bit.
 
     Args:
         rules: See `Rules`; the loops of drums are closed every so many steps.

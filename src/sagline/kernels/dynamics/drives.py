@@ -1,4 +1,4 @@
-"""Drives: a winch that keeps its set points, one that lags, or motor, loops and friction; cable on its drum.
+"""Drives: ideal winch, second-order winch, or drum with motor, control loops and friction; cable on the drum.
 
 Lengths s count along the path of winding, outward; docs/model.md, sections 10 and 11.
 """
@@ -18,7 +18,7 @@ BIN = 0.005  # m of cable on the drum that lie at one tension
 
 @kernel
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
-    """Put cable of a strain on a drum; returns the energy [J] that is lost where it is shared with what lies there.
+    """Wind cable of a given strain onto a drum; returns the energy [J] lost by mixing strains within a bin.
 
     What lies in a bin has one strain, that with which it is as long as it was, strained and unstrained.
 
@@ -43,7 +43,7 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
 
 @kernel
 def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
-    """Strain of the cable that a drum lets out, as one, and the energy [J] that is lost by this.
+    """Mean strain of the cable that a drum lets out, and the energy [J] lost by averaging.
 
     layer: strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's; place:
     what is let out before [m]; step: how much more [m], > 0; stiffness: EA [N].
@@ -63,7 +63,7 @@ def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[
 
 @formula
 def _bin_of(layer: Array, place: float) -> int:
-    """The bin of a place [m] along the cable."""
+    """Index of the bin at a position [m] along the cable."""
     return min(max(int(place / BIN), 0), layer.shape[0] - 1)
 
 
@@ -87,12 +87,12 @@ PULL = 18  # tension at the frame end without what damping adds [N]; of cables w
 DRIVE_ROWS = 19
 
 # rows of what they are, (DATA_ROWS, m)
-INERTIA = 0  # of motor, gear and drum at the cable [kg]
+INERTIA = 0  # inertia of motor, gear and drum at the cable [kg]
 FORCE_LIMIT, SPEED_LIMIT = 1, 2  # [N], [m/s]
 FRICTION = 3  # [N]
 POSITION_GAIN, SPEED_GAIN, INTEGRAL_GAIN = 4, 5, 6  # [1/s], [N s/m], [N/m]
-BANDWIDTH, RATIO = 7, 8  # of one that lags: omega [rad/s], damping ratio
-WINDING_STRAIN = 9  # of the cable on the drum
+BANDWIDTH, RATIO = 7, 8  # second-order winch: omega [rad/s], damping ratio
+WINDING_STRAIN = 9  # strain of the cable on the drum
 BEHIND_RISE = 10  # height of the frame end above the drum [m]
 DRAG = 11  # force of the wind on a length, by the square of its speed [N s^2/m^3]
 DATA_ROWS = 12
@@ -100,7 +100,7 @@ DATA_ROWS = 12
 # sums over a run [J]
 SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
 START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start, of which potential [J]; the time of step 0 [s]
-MOVED = 8  # the most that has been in motion
+MOVED = 8  # largest sum so far: kinetic, changed potential, supplied and lost energy
 AUDIT_SIZE = 9
 
 LOOP_PERIOD = 1e-3  # s
@@ -110,7 +110,7 @@ class Drives(NamedTuple):
     """The drives of m cables."""
 
     kind: int  # IDEAL, SECOND_ORDER or DRUMS
-    remembered: bool  # whether the drum remembers at which tension it was wound
+    remembered: bool  # True if the drum stores the winding tension
     data: Array  # their parameters, (DATA_ROWS, m)
     now: Array  # their state, (DRIVE_ROWS, m)
     layers: Array  # strain of the cable on the drums, bin by bin, (m, B)
@@ -119,7 +119,7 @@ class Drives(NamedTuple):
 
 @formula
 def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Change the rates of winches that lag: explicitly where a step begins, its adjoint where it ends."""
+    """Update the rates of second-order winches: explicit at the start of a step, adjoint at its end."""
     for i in range(rows.shape[1]):
         omega, ratio = drives.data[BANDWIDTH, i], drives.data[RATIO, i]
         push = omega * omega * (targets[i] - rows[g.LENGTH, i])
@@ -133,7 +133,7 @@ def _kick_lagging(drives: Drives, rows: Array, targets: Array, time: float, begi
 
 @formula
 def _kick_drums(drives: Drives, time: float) -> None:
-    """Change the speeds of the drums by motor, cable and friction, which holds what it can."""
+    """Update the speeds of the drums from motor, cable and friction, which can hold a drum at rest."""
     for i in range(drives.now.shape[1]):
         inertia, before = drives.data[INERTIA, i], drives.now[SPEED, i]
         if drives.now[HELD, i] > 0.0:
@@ -169,7 +169,7 @@ def _fill_stored_strain(drives: Drives, cables: Array, time: float) -> None:
 
 @formula
 def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Let out or take in cable for a time, and account for what lies on the drums."""
+    """Let out or take in cable for a time, and update the energy of the cable on the drums."""
     _fill_stored_strain(drives, cables, time)
     for i in range(cables.shape[0]):
         step, strain = time * drives.now[SPEED, i], drives.now[STORED, i]
@@ -195,7 +195,7 @@ def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
 
 @formula
 def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> None:
-    """Fill the motors' forces from lengths and speeds; P-PI, its integral not driven further into a limit.
+    """Fill the motor forces from lengths and speeds: P-PI control with anti-windup.
 
     targets: s to keep (m,), then the tensions that are expected at the drums (m,).
     """
@@ -216,7 +216,7 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
 
 @formula
 def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
-    """Tension at the drum [N] from H there, that at the frame end less the weight of the cable between them."""
+    """Tension at the drum [N] from H there: H at the frame end less the weight of the cable in between."""
     fallen = whole - lifted
     return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
 
@@ -273,6 +273,6 @@ def add_winch_energy(drives: Drives, cables: Array, rows: Array, time: float) ->
 
 @glue
 def filter_tensions(drives: Drives, share: float) -> None:
-    """Let the filtered tensions follow, by the share of a new reading."""
+    """Update the filtered tensions with the share of a new reading."""
     for i in range(drives.now.shape[1]):
         drives.now[FILTERED, i] += share * (drives.now[AT_FRAME, i] - drives.now[FILTERED, i])

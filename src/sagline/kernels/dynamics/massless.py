@@ -128,7 +128,7 @@ def _add_at_end(rows: Array, i: int, x: float, y: float, z: float, wrench: Array
 
 @glue
 def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
-    """Take from a wrench what the platform's guides carry."""
+    """Remove from a wrench the part that the platform's guides support."""
     if freedom.shape[0] < 6:
         components_along(freedom, wrench, part)
         fill_motion_of_components(freedom, part, wrench)
@@ -164,7 +164,7 @@ def damp_cables(
     wrench: Array,
     behind: bool | None,
 ) -> float:
-    """Fill the wrench (6,) of what damps the cables; returns the power that is lost.
+    """Fill the damping wrench (6,) of the cables; returns the power lost.
 
     All of a cable stretches alike, what lies behind the free span with it, and what is let out lengthens the span by
     what it is strained: EA/L times the chord's rate less that. Of this the stretch has the share of its compliance, 1
@@ -212,7 +212,7 @@ def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
 
 @kernel
 def fill_forces(run: MasslessRun, now: float) -> None:
-    """Fill the force on the platform, -gradient, what is given of it, and the cables' tensions, at a time."""
+    """Fill the force on the platform (-gradient), the given wrench, and the cable tensions at a time."""
     at, drives, rows, state = run.at, run.drives, run.rows, run.state
     fill_set_points(run, now, -progress.MOMENT * run.step)
     if run.work & LOADED:
@@ -237,7 +237,7 @@ def fill_forces(run: MasslessRun, now: float) -> None:
 
 @kernel
 def fill_damping(run: MasslessRun) -> None:
-    """Fill what damping does at the present velocities, and the powers that damping takes and given forces bring."""
+    """Fill the damping wrench at the present velocities, and the powers of damping and given forces."""
     if run.work:
         spinning = spin(run.state, run.inertia)
         drives, motion = run.drives, run.spare
@@ -253,7 +253,7 @@ def fill_damping(run: MasslessRun) -> None:
 
 @glue
 def add_powers(drives: Drives, time: float) -> None:
-    """Add what the powers do in a time to the audit; winches that keep their lengths feel the damping of cables."""
+    """Add the work of the powers during a time to the audit; the damping of cables acts on ideal winches."""
     power = drives.audit[d.GIVEN_POWER]
     if drives.kind != d.DRUMS:
         for i in range(drives.now.shape[1]):

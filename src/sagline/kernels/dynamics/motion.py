@@ -53,12 +53,12 @@ from sagline.kernels.dynamics.rigid_body import (
 from sagline.kernels.forward.platform import platform_energy
 from sagline.kernels.jit import entry, glue, kernel
 
-GROWTH = 0.1  # of all energy that moves: an integrator that invents or loses more has too long a step
+GROWTH = 0.1  # relative to MOVED, the exchanged energy: a larger energy error means that the step is too long
 
 
 @kernel
 def record_step(run: MasslessRun, records: Records) -> None:
-    """Write down a step, and look whether energy has grown by itself."""
+    """Record a step, and check that energy has not grown without supply."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at
     audit, row = drives.audit, at[progress.RECORDS]
@@ -95,7 +95,7 @@ def record_step(run: MasslessRun, records: Records) -> None:
 
 @glue
 def runge_kutta_step(run: MasslessRun, now: float) -> None:
-    """One step of the classical Runge-Kutta method; forces at hand before and after are those of the state."""
+    """One step of the classical Runge-Kutta method; the stored forces match the state before and after."""
     h, drives, rows, state = run.step, run.drives, run.rows, run.state
     m, lagging = rows.shape[1], drives.kind == d.SECOND_ORDER
     supplied, lost = 0.0, 0.0
@@ -145,7 +145,7 @@ def runge_kutta_step(run: MasslessRun, now: float) -> None:
 
 @glue
 def splitting_step(run: MasslessRun, now: float) -> None:
-    """One step of the splitting from a time on; forces at hand before and after are those of the state."""
+    """One step of the splitting from a time on; the stored forces match the state before and after."""
     h, half, drives, rows = run.step, 0.5 * run.step, run.drives, run.rows
     fill_damping(run)
     add_powers(drives, half)
@@ -204,7 +204,7 @@ def run_massless(
     steps: int,
     every: int,
 ) -> None:
-    """Go on for some steps; a prepared run continues at the end of the last call, identical to the last bit.
+    """Integrate some steps; a prepared run continues at the end of the last call, identical to the last bit.
 
     Args:
         model: See `ModelTerms`.

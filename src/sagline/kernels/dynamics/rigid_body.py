@@ -25,7 +25,7 @@ Six = tuple[float, float, float, float, float, float]
 
 @formula
 def kick_body(state: Array, inertia: Array, wrench: Array, time: float) -> None:
-    """Change velocity and angular momentum by what a wrench (6,) does in a time [s]."""
+    """Update velocity and angular momentum from a wrench (6,) that acts for a time [s]."""
     for k in range(3):
         state[VELOCITY + k] += time * wrench[k] / inertia[MASS]
         state[MOMENTUM + k] += time * wrench[3 + k]
@@ -40,7 +40,7 @@ def drift_body(state: Array, time: float) -> None:
 
 @formula
 def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
-    """A vector of the world in the body's axes."""
+    """Components of a world vector in the body's axes."""
     qx, qy, qz, qw = -state[TURN], -state[TURN + 1], -state[TURN + 2], state[TURN + 3]
     tx, ty, tz = 2.0 * (qy * z - qz * y), 2.0 * (qz * x - qx * z), 2.0 * (qx * y - qy * x)
     return x + qw * tx + qy * tz - qz * ty, y + qw * ty + qz * tx - qx * tz, z + qw * tz + qx * ty - qy * tx
@@ -77,7 +77,7 @@ def free_turn(state: Array, inertia: Array, time: float) -> None:
     z, x, y, w, px, py = _turn_about(z, x, y, w, pz, px, py, time / inertia[MOMENTS + 2])
     y, z, x, w, pz, px = _turn_about(y, z, x, w, py, pz, px, by_y)
     x, y, z, w, py, pz = _turn_about(x, y, z, w, px, py, pz, by_x)
-    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # rounding alone
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # removes rounding only
     state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3] = x * scale, y * scale, z * scale, w * scale
 
 
@@ -90,7 +90,7 @@ def spin(state: Array, inertia: Array) -> Triple:
 
 @formula
 def kinetic_energy(state: Array, inertia: Array) -> float:
-    """Of motion and rotation [J]."""
+    """Kinetic energy of translation and rotation [J]."""
     x, y, z = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
     speed2 = 0.0
     for k in range(3):

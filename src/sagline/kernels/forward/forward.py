@@ -43,7 +43,7 @@ from sagline.kernels.forward.problem import (
 from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
 
-FLAT = 1e-9  # of the largest stiffness: smaller ones are none
+FLAT = 1e-9  # relative to the largest stiffness: smaller ones count as zero
 OVERSTRETCHED = 0.1  # strain that no cable survives
 PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # ways to the equilibrium, the later where the earlier is in doubt
 
@@ -209,7 +209,7 @@ def forward_poses(
         if math.isnan(batch.lengths[p, 0]):
             clear_solution(answer, p, codes.FORWARD_NO_LENGTHS, 0)
             continue
-        if not chained:  # an answer must not depend on the sample before
+        if not chained:  # a result must not depend on the previous sample
             copy_pose(row_of(batch.starts, p), start)
             kept.last[0] = math.nan
             for i in range(m):

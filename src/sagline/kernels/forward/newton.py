@@ -76,14 +76,14 @@ NEAR_STEPS = 6
 NEAR = 3e-3  # a full Newton step shorter than this leaves the rest to Newton's method
 PREDICTED = 0.03  # the longest first-order step that is tried
 SHRINKING = 0.3  # of the step before: longer ones are in doubt
-FRESH = 1e-4  # so far a factor of the stiffness serves
-BALANCED = 1e-9  # of the sum of tensions and weight: an unbalance that counts as none
+FRESH = 1e-4  # distance up to which a factored stiffness is used again
+BALANCED = 1e-9  # relative to the sum of tensions and weight: a smaller unbalance counts as zero
 LAST_DIGIT = 1e-15  # a step that rounding hides
 
 
 @glue
 def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array, wrench: Array) -> None:
-    """Add to a wrench (6,) what new lengths (m,) do to the cables' forces, to first order."""
+    """Add to a wrench (6,) the first-order change of the cable forces due to new lengths (m,)."""
     for i in range(cables.shape[0]):
         span, rise, length = rows[g.SPAN, i], rows[g.RISE, i], rows[g.LENGTH, i]
         if model.behind is not None:
@@ -98,7 +98,7 @@ def _add_length_change(model: Model, cables: Array, lengths: Array, rows: Array,
 
 @kernel
 def solve_step(factor: Array, part: Array, step: Array) -> float:
-    """Fill the step (n,) that takes away an unbalance (n,), by the factor of the stiffness; returns its length."""
+    """Fill the step (n,) that removes an unbalance (n,), from the factored stiffness; returns its length."""
     for j in range(part.shape[0]):
         step[j] = -part[j]
     solve_lower(factor, step)
@@ -237,7 +237,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
 DESCENT_STEPS = 150
 FIRST_RADIUS = 0.5  # of the trust region, in these units
 LARGEST_RADIUS = 1.0
-NOISE = 4e-15  # of the sum of an energy's parts: what rounding leaves of it
+NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 
 @glue

@@ -1,4 +1,4 @@
-"""The platform on cables of given lengths: what it feels at a pose, and how that changes when it moves.
+"""The platform on cables of given lengths: wrench at a pose, and its derivatives with respect to motions.
 
 A motion is (displacement of the center of mass, rotation vector), world axes: the rotation acts from the left.
 The unbalance is minus the whole wrench on the platform, the gradient of the energy.
@@ -46,7 +46,7 @@ def unbalance(
 
 @formula
 def add_force(rows: Array, i: int, horizontal: float, vertical: float, wrench: Array) -> None:
-    """Add to a wrench (6,) what a force in the plane of cable i does at its platform end."""
+    """Add to a wrench (6,) a force in the plane of cable i at its platform end."""
     x = horizontal * rows[g.AZIMUTH_X, i]
     y = horizontal * rows[g.AZIMUTH_Y, i]
     rx, ry, rz = rows[g.LEVER_X, i], rows[g.LEVER_Y, i], rows[g.LEVER_Z, i]

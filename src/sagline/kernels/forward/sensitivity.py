@@ -93,7 +93,7 @@ def describe_states(
         placed = Model(code, k_h, k_p, body[tables.GRAVITY], behind)
         for i in range(m):
             rows[g.LENGTH, i] = batch.lengths[p, i]
-            rows[g.PARAMETER, i] = math.nan  # an answer must not depend on the sample before
+            rows[g.PARAMETER, i] = math.nan  # a result must not depend on the previous sample
         unbalance(placed, cables, body, row_of(batch.wrenches, p), batch.starts[p], rotation, rows, gradient)
         platform_stiffness(placed, cables, rows, matrices[p])
         for i in range(m):

@@ -38,7 +38,7 @@ END = 8
 PARTS = 9
 PIECE_COLUMNS = 10
 
-PIECES = 8192  # of all cables of a pose
+PIECES = 8192  # largest number of pieces of all cables of a pose
 COUNTER = PIECES - 1  # the row that is none: its last column says how many there are, the others take an edge
 WAITING = 4096  # pairs of pieces
 PAIRS = 100_000  # of pieces that are looked at for one distance: then the lower bound is what it is
@@ -47,7 +47,7 @@ FAR = 1e300
 
 
 def work_arrays_for_pieces() -> tuple[Array, Array]:
-    """Work arrays for pieces and for the pairs that wait."""
+    """Work arrays for pieces and for waiting pairs."""
     return np.empty((PIECES, PIECE_COLUMNS)), np.empty((WAITING, 3))
 
 
@@ -63,7 +63,7 @@ def _set_piece(piece: Array, row: Array, first: float, last: float) -> None:
 
 @kernel
 def _whole_piece(piece: Array, row: Array) -> None:
-    """The piece that is all of a cable that counts."""
+    """Set the first piece to the whole measured part of a cable."""
     piece[0], piece[1], piece[2] = point(row, row[FIRST])
     piece[3], piece[4], piece[5] = point(row, row[LAST])
     _set_piece(piece, row, row[FIRST], row[LAST])
@@ -93,7 +93,7 @@ def _split_piece(pieces: Array, index: int, row: Array) -> None:
 
 @kernel
 def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -> tuple[float, float, float, float]:
-    """Distance of two pieces' chords [m], a lower bound of the pieces' own, and the nearest shares of the cables."""
+    """Distance of two pieces' chords [m], a lower bound for the pieces, and the nearest shares of the cables."""
     one = pieces[i]
     if to_a_box:
         square, low, s = to_box(one, box)
@@ -176,7 +176,7 @@ def _least_of_pair(
             else:
                 waiting[height, 0], waiting[height, 1], waiting[height, 2] = new_a, new_b, low
                 height += 1
-        if height >= 2 and waiting[height - 1, 2] > waiting[height - 2, 2]:  # the nearer one first
+        if height >= 2 and waiting[height - 1, 2] > waiting[height - 2, 2]:  # the closer pair is examined first
             for k in range(3):
                 waiting[height - 1, k], waiting[height - 2, k] = waiting[height - 2, k], waiting[height - 1, k]
     return best, max(min(proved, best) - size, 0.0), best_s, best_t
@@ -226,7 +226,7 @@ def _least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> fl
 
 @kernel
 def _set_nearest(one: Array, other: Array, s: float, t: float, nearest: Array) -> None:
-    """The nearest points of a pair, from their shares."""
+    """Set the nearest points of a pair from their shares."""
     x, y, z = point(one, s)
     nearest[0, 0], nearest[0, 1], nearest[0, 2] = x, y, z
     if other[KIND] == BOX:
@@ -256,8 +256,8 @@ def least_distances(
         pairs: Which, numbered through both, a box behind what is none, shape (P, 2).
         precision: Largest difference of the lower bound from the distance [m].
         together: Whether the least of all distances of a pose is enough: of the others then only so much is known.
-        pieces: Memory, of `work_arrays_for_pieces`.
-        waiting: Memory.
+        pieces: Work array from `work_arrays_for_pieces`.
+        waiting: Work array from `work_arrays_for_pieces`.
         distance_out: [m], shape (N, P).
         low_out: Proved lower bounds [m], shape (N, P).
         nearest_out: Nearest points on the center lines or boxes [m], shape (N, P, 2, 3).

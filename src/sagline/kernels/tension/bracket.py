@@ -30,11 +30,11 @@ from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
 
 PLENTY = 1e6  # of the largest force at hand: more than any cable carries that has no limit
-FEASIBLE = 1e-9  # of the largest force at hand: what is left of the balance is taken for none
-CERTAIN = 1e-14  # of the numbers at hand: limits that contradict by less may do so by rounding
-NODES = 300  # ranges looked at before the answer is that there is none
-DEPTH = 40  # ranges that wait at once
-STANDSTILL = 0.7  # sag forces that stay this uncertain do not grow more certain by looking again
+FEASIBLE = 1e-9  # relative to the largest force: a smaller residual of the balance counts as zero
+CERTAIN = 1e-14  # relative to the terms of the sum: a smaller contradiction of limits may be rounding
+NODES = 300  # number of examined ranges after which the search stops without a result
+DEPTH = 40  # largest number of waiting ranges
+STANDSTILL = 0.7  # if narrowing leaves more than this share of the uncertainty, the range is split
 
 # Rows of a range (RANGE_ROWS, m): least and largest tensions, and the sag forces at them.
 LEAST, LARGEST, AT_LEAST, AT_LARGEST = 0, 1, 2, 3

@@ -29,9 +29,9 @@ from sagline.kernels.memory import Memory, block, vector
 NEWTON_STEPS = 40
 HALVINGS = 12
 STEADINESS = 1e-8  # weight of the squared change of a tension relative to that of the wrench
-DECREASE = 1e-4  # share of a full step's promise that a step must keep
+DECREASE = 1e-4  # share of the predicted decrease that a step must reach
 STIFFEST = 1e3  # largest weight of a bend, which the normal matrix still bears beside that
-STANDS = 1e-13  # of the largest force at hand: a step that promises less is none
+STANDS = 1e-13  # relative to the largest force: the search ends if the predicted decrease is smaller
 STEADY = 1e-6  # of what is left: tensions that move by less no longer turn its direction
 
 
@@ -102,7 +102,7 @@ def _new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[_Tangents,
 
 @glue
 def _fill_residual(curves: Curves, demand: Demand, tau: Array, sag_force: Array, residual: Array) -> None:
-    """Fill the sag forces (m,) of tensions (m,) and what they leave of the demand (n,)."""
+    """Fill the sag forces (m,) at tensions (m,), and the residual of the demand (n,)."""
     sag_forces_at(curves, tau, sag_force)
     for k in range(residual.size):
         residual[k] = demand.right[k]
@@ -237,7 +237,7 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Go as far along a step as keeps its promise, halving it; False where there is nothing to gain.
+    """Halve a step until it reaches the required decrease; False if no step does.
 
     What hard rows leave counts by more than their multipliers, so that a step that pays for it elsewhere is none.
     """

@@ -19,7 +19,7 @@ from sagline.kernels.algebra.factors import normalize_row, orthogonalize_row
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
-MOST_FACES = 1 << 40  # more than there can be
+MOST_FACES = 1 << 40  # upper bound of the loop; never reached
 ALONG = 1e-13  # of a unit normal and a column: a column in the face itself
 DEPENDENT = 1e-20  # share of a column's square outside the span of others below which it depends on them
 
@@ -104,7 +104,7 @@ def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
         low: Least tensions (m,).
         high: Largest tensions (m,), may be infinite.
         translations: Number of rows that are forces.
-        memory: To work in.
+        memory: Work memory.
     """
     n, m = matrix.shape
     frame, memory = block(memory, n, n)

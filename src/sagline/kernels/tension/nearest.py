@@ -21,8 +21,8 @@ class Distribution(NamedTuple):
     """Tension distribution of one pose."""
 
     method: int  # code of the method
-    parameter: float  # its exponent, or which optimum of the polygon walk
-    variable: int  # in which variable
+    parameter: float  # exponent of the p-norm, or code of the optimum of the polygon walk
+    variable: int  # code of the variable of the distribution
     weight: Array  # root weights of the cables, (m,)
     goal: Array  # tensions of a quadratic program to be near to [N], (m,)
 

@@ -231,7 +231,7 @@ def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tupl
 
 
 class WorkArrays(NamedTuple):
-    """Memory with a meaning."""
+    """Work arrays whose content is kept between iterations."""
 
     corners: Array  # of the feasible polygon, (2m + SPARE_CORNERS, 2)
     labels: Indices  # of its sides, (2m + SPARE_CORNERS,)
@@ -253,6 +253,6 @@ def new_work_arrays(method: int, memory: Memory, m: int, r: int) -> WorkArrays:
 
 @glue
 def reset_work_arrays(work: WorkArrays) -> None:
-    """A new pose: nothing is known from the one before."""
+    """Discard the results of the previous pose."""
     work.known[0] = 0
     work.basis.labels[0] = -1

@@ -20,7 +20,7 @@ from sagline.kernels.memory import Memory, block, counters
 
 RANK = 1e-9  # of the largest entry, as in `kernels.algebra.householder`: a pivot below it says that rank is lost
 DEPENDENT = 1e-10  # a normal by minors no larger than this is one to columns that depend on each other
-LIMIT = 1 << 40  # of steps: more than there can be
+LIMIT = 1 << 40  # largest number of steps; never reached
 MOST_FREE = 6  # motions
 
 # Subsets of up to six rows, as bits: those of size k of n rows are ORDER[n, START[n, k] : START[n, k + 1]].
@@ -115,16 +115,16 @@ def _scale_row(row: Array, factor: float) -> None:
 
 @formula
 def _subtract_row(row: Array, factor: float, other: Array) -> None:
-    """Take a multiple of another row from a row."""
+    """Subtract a multiple of another row from a row."""
     for j in range(row.size):
         row[j] -= factor * other[j]
 
 
 @glue
 def next_subset(facets: Facets, n: int, depth: int) -> int:
-    """Go on to the next subset of the others, with the minors of its columns; returns its size, -1 after the last.
+    """Advance to the next subset of the other columns, with their minors; returns its size, -1 after the last.
 
-    depth: size of the present one; the first is the empty one.
+    depth: size of the present subset; the first subset is empty.
     """
     chosen, others, minors = facets.chosen, facets.others, facets.minors
     r = others.shape[0]

@@ -108,7 +108,7 @@ def range_between_ends(cables: Cables, i: int, bands: Array) -> tuple[float, flo
     return least, most
 
 
-SMALL = 1e-3  # X below which series do
+SMALL = 1e-3  # X below which series are used
 
 
 @formula
@@ -161,7 +161,7 @@ def largest_sag_force(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def fall_rate(curves: Curves, i: int, tension: float) -> float:
-    """Most by which a sag force falls for a newton of chord tension more, above a tension."""
+    """Largest decrease of a sag force per newton of chord tension, above a given tension."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -174,7 +174,7 @@ def fall_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def rise_rate(curves: Curves, i: int, tension: float) -> float:
-    """Most by which a sag force rises for a newton of chord tension more, above a tension."""
+    """Largest increase of a sag force per newton of chord tension, above a given tension."""
     if not has_sag(curves, i):
         return 0.0
     x = curves.cables.half_weight[i] / tension
@@ -183,7 +183,7 @@ def rise_rate(curves: Curves, i: int, tension: float) -> float:
 
 @kernel
 def fall(curves: Curves, i: int, low: float, high: float) -> float:
-    """Most by which a sag force falls from one chord tension to a higher one [N]."""
+    """Largest decrease of a sag force from one chord tension to a higher one [N]."""
     if not has_sag(curves, i):
         return 0.0
     cables = curves.cables
@@ -195,7 +195,7 @@ def fall(curves: Curves, i: int, low: float, high: float) -> float:
 
 @kernel
 def rise(curves: Curves, i: int, low: float, high: float) -> float:
-    """Most by which a sag force rises from one chord tension to a higher one [N]."""
+    """Largest increase of a sag force from one chord tension to a higher one [N]."""
     if not has_sag(curves, i):
         return 0.0
     half = curves.cables.half_weight[i]

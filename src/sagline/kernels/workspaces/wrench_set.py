@@ -160,7 +160,7 @@ def reach_of_set(
 
 @kernel
 def _add_segments(segments: Array, normals: Array, count: int, work: Array, total: Array) -> None:
-    """Add how far segments (S, 6) reach to either side; those of no length cost nothing."""
+    """Add the extent of segments (S, 6) to both sides; segments of zero length are skipped."""
     for s in range(segments.shape[0]):
         if _multiply(segments[s], normals, count, work):
             for b in range(count):
@@ -169,7 +169,7 @@ def _add_segments(segments: Array, normals: Array, count: int, work: Array, tota
 
 @kernel
 def _add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, total: Array) -> None:
-    """Add how far ellipsoids (E, 6, 6) reach to either side."""
+    """Add the extent of ellipsoids (E, 6, 6) to both sides."""
     for e in range(ellipsoids.shape[0]):
         for b in range(count):
             work[1, b] = 0.0
@@ -185,7 +185,7 @@ def _add_ellipsoids(ellipsoids: Array, normals: Array, count: int, work: Array, 
 def _add_polytopes(
     corners: Array, sizes: Indices, sign: float, normals: Array, count: int, work: Array, total: Array
 ) -> None:
-    """Add how far polytopes reach along the normals, or against them."""
+    """Add the extent of polytopes along the normals, or against them."""
     first = 0
     for p in range(sizes.size):
         for b in range(count):
