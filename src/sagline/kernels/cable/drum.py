@@ -1,4 +1,4 @@
-"""Cable on a drum: how many turns of it lie there at a length off the drum, and what they remember of their tension.
+"""Cable on a drum: number of turns as a function of the length off the drum, and memory of the winding tension.
 
 Turns count from the drum's first groove, where the cable is fastened: the more cable is on the drum, the more turns.
 Layer k lies in the grooves between the turns of the layer below it, and goes back where that one came from.
@@ -45,7 +45,7 @@ def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]
 
 @formula
 def _wound_length(drum: Array, layer: int, turns: float) -> float:
-    """By how much the first turns of a layer shorten the length off the drum [m]; convex in the turns, and rising."""
+    """Length wound by the first turns of a layer [m]; convex and increasing in the turns."""
     first, _ = _exit_position(drum, layer, 0.0)
     place, _ = _exit_position(drum, layer, turns)
     distance = drum[DISTANCE]
@@ -61,7 +61,7 @@ def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Arra
     Args:
         drums: Table, (m, DRUM_COLUMNS).
         starts: Length off the drum where each layer begins, (m, layers + 1): falling.
-        length: At the winding tension [m], (N, m).
+        length: Lengths at the winding tension [m], (N, m).
         turns_out: (N, m).
         travel_out: [m], (N, m).
     """
@@ -92,7 +92,7 @@ def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Arra
 
 @entry
 def lengths_of_turns(drums: Array, starts: Array, turns: Array, length_out: Array) -> None:
-    """Lengths off the drum at so many turns on it, as above."""
+    """Lengths off the drum for given numbers of turns; arguments as in `turns_of_lengths`."""
     for p in range(turns.shape[0]):
         for i in range(turns.shape[1]):
             drum = drums[i]
@@ -114,8 +114,8 @@ def follow_memory(
 
     Args:
         given: Lengths off the drum [m], (N, m): unstrained ones, or those along the path of winding.
-        strain: Of the cable at the drum, at each sample, (N, m).
-        rest_strain: Of the cable that lies on the drum at first, (m,).
+        strain: Strain of the cable at the drum, at each sample, (N, m).
+        rest_strain: Initial strain of the cable on the drum, (m,).
         unstrained: True if the given lengths are unstrained.
         found_out: The others [m], (N, m).
         memory: Work array, (MEMORY_ROWS, N).

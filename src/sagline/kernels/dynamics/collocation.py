@@ -1,4 +1,4 @@
-"""The dynamic stiffness of one cable, exactly, and how many of its natural frequencies lie below one.
+"""Exact dynamic stiffness of one cable, and the number of its natural frequencies below a given frequency.
 
 Elements are joined from the frame end on; docs/model.md, section 11. The transfer matrix of an element is exact:
 u' = C f, f' = -mu u about rest, by collocation at eight Gauss points. Out of the cable's plane it is one equation, in
@@ -152,7 +152,7 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
 # columns of a wave: angular frequency; its square; i omega c; factors of C across and along the cable
 OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
-ROOM = (5 * STAGES, 20)  # of the numbers to work in
+ROOM = (5 * STAGES, 20)  # shape of the work array
 MESHES = 8  # tried in turn if a joint of elements is near a node of the cable up to that joint
 SHORTER = 0.0618034  # by which share each has shorter elements: no ratio of small numbers, which would meet nodes again
 ROUNDING = 2.0**-52  # by which mu grows with them, should the frequency be a held one to the last bit
@@ -298,8 +298,8 @@ def dynamic_stiffnesses(
     Args:
         strings: (N, m, STRING_COLUMNS).
         waves: (1 or N, F, WAVE_COLUMNS), of the type of room and found.
-        phase: Of a transverse wave in an element [rad], < pi.
-        room: Of shape ROOM.
+        phase: Phase of a transverse wave in an element [rad], < pi.
+        room: Work array of shape ROOM.
         found: Filled: K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN without horizontal and vertical force.
         counts: Filled: held frequencies below omega in the plane and normal to it, (N, F, m, 2); negative where
             the cable has too many elements.

@@ -27,13 +27,13 @@ def begin_period(
         given: Unstrained lengths (m,); of drums tensions that are expected (m,), else none; wrench (6,).
         least: Lower bounds of the lengths, (m,).
         stretch: From unstrained lengths to those that the course is of, (m,).
-        lengths: Unstrained lengths where the last period ended, and where this one does, (2, m).
+        lengths: Unstrained lengths at the end of the last period and of this one, (2, m).
         course: See `tables_in_time.Course`, of two instants.
         load: Wrench on the platform, (6,).
         at: Counters of the run.
-        with_tension: Whether tensions are given; else they stay.
-        with_wrench: Whether a wrench is given; else it stays.
-        end: Of the period [s].
+        with_tension: True if tensions are given; otherwise they do not change.
+        with_wrench: True if a wrench is given; otherwise it does not change.
+        end: End of the period [s].
     """
     time, value, begins, ends = course
     asked, expected, wrench = given
@@ -70,12 +70,12 @@ def begin_period(
 
 @entry
 def read_cells(tension: Array, cells: Array, noise: Array, reading: Array) -> None:
-    """Fill what load cells read, (m,): gain, bias and noise, within their range.
+    """Fill the readings of load cells, (m,): gain, bias and noise, within their range.
 
     Args:
-        tension: Behind the filter [N], (m,).
+        tension: Filtered tensions [N], (m,).
         cells: Gain, bias, standard deviation and range, (4, m).
-        noise: Of standard deviation 1, (m,).
+        noise: Noise of standard deviation 1, (m,).
         reading: Filled.
     """
     for i in range(tension.shape[0]):
@@ -93,7 +93,7 @@ def read_encoders(
         wound: Lengths off the drums [m], (m,).
         stretch: From these to those along the path of winding, (m,).
         zero: Counts at no turns, (m,).
-        rate: Counts for a turn let out, (m,).
+        rate: Counts per turn let out, (m,).
         room: (3, 1, m).
         counts: Filled.
     """

@@ -11,7 +11,7 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics.drives import Drives
 from sagline.kernels.jit import formula, glue, kernel
 
-MOMENT = 1e-6  # of a step: instants that are nearer are the same
+MOMENT = 1e-6  # relative to a step: two instants closer than this count as equal
 
 CubicTableArrays = tuple[Array, Array, Array, Array]  # a Course as it comes from Python
 
@@ -20,9 +20,9 @@ class CubicTable(NamedTuple):
     """n numbers in time: a cubic on every interval, by its values and rates at both ends; held before and after."""
 
     time: Array  # instants [s], (K,), increasing
-    value: Array  # there, (K, n)
-    begin: Array  # rates where each interval begins, (K - 1, n)
-    end: Array  # rates where each ends, (K - 1, n)
+    value: Array  # values at these instants, (K, n)
+    begin: Array  # rates at the start of each interval, (K - 1, n)
+    end: Array  # rates at the end of each interval, (K - 1, n)
 
 
 @formula

@@ -25,8 +25,8 @@ from sagline.kernels.jit import entry, formula, kernel
 
 LARGEST_DEGREE = 48
 LEAST_DEGREE = 6
-HALF_WAVE = 1.5  # degrees that a half wave needs
-ALWAYS = 7.0  # and those beside them
+HALF_WAVE = 1.5  # polynomial degrees per half wave
+ALWAYS = 7.0  # degrees added to those of the waves
 MOST_PHASE = math.pi * (LARGEST_DEGREE - ALWAYS) / HALF_WAVE
 
 Rule = tuple[Array, Array, Array, Array]
@@ -123,7 +123,7 @@ def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) ->
 
 @kernel
 def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) -> None:
-    """Add that of one element."""
+    """Add the stretch part of one element's stiffness."""
     n = part.degree + 1
     half = 0.5 * part.size
     for q in range(n):
@@ -159,7 +159,7 @@ def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None
 
 @entry
 def node_counts(strings: Array, omega: float, counts: Indices) -> None:
-    """Fill how many nodes each cable (m, STRING_COLUMNS) takes for waves to an angular frequency, (m,)."""
+    """Fill the number of nodes (m,) that each cable (m, STRING_COLUMNS) needs up to an angular frequency."""
     for i in range(strings.shape[0]):
         string = string_at(strings, i)
         start, nodes = 0.0, 0
@@ -195,7 +195,7 @@ def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -
 
 @formula
 def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
-    """Hold an unknown: it is left by itself, stiff."""
+    """Fix an unknown: decouple it and give it a stiffness of its own."""
     for j in range(matrix.shape[0]):
         matrix[unknown, j] = matrix[j, unknown] = 0.0
     matrix[unknown, unknown] = stiffness
@@ -203,7 +203,7 @@ def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
 
 @formula
 def _scale_by_masses(matrix: Array, points: Array, used: int, each: int) -> None:
-    """Divide a stiffness by the roots of the masses of its unknowns, so many a node."""
+    """Divide a stiffness by the square roots of the masses of its unknowns; each: unknowns per node."""
     for i in range(used):
         first = 1.0 / math.sqrt(points[i // each, 1])
         for j in range(used):
@@ -235,7 +235,7 @@ def spectral_matrices(
 
     Args:
         strings: (m, STRING_COLUMNS).
-        omega: Angular frequency for whose waves the elements are chosen [rad/s].
+        omega: Largest angular frequency whose waves the elements resolve [rad/s].
         rule: `Lobatto`.
         points: Filled: s, mass and integrals of C of every node, (m, nodes, 6); s is NaN of nodes that are not used.
         plane: Filled: scaled stiffness in the plane, (m, 2 nodes, 2 nodes), a node after the other [1/s^2].

@@ -1,4 +1,4 @@
-"""One cable as a string that vibrates about its catenary, and the compliance of its frame end over a pulley."""
+"""One cable as a string vibrating about its catenary, and the compliance of its frame end over a pulley."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagline.kernels.jit import entry, formula
 # columns of the table of strings
 HORIZONTAL, VERTICAL = 0, 1  # T_x, T_z on the platform end [N]
 LENGTH = 2  # unstrained length of the free span [m]
-WEIGHT = 3  # per length [N/m]
+WEIGHT = 3  # weight per length [N/m]
 STIFFNESS = 4  # EA [N]
 DENSITY = 5  # [kg/m]
 # compliance of what is behind the frame end: (x, z) times its transpose in the plane, and normal to it [m/N]
@@ -115,7 +115,7 @@ def fill_routing_compliance(
         wraps: Wrap angles [rad], (N, m).
         leaving: Tensions where the cables leave their pulleys [N], (N, m).
         rows: Work array, (CABLE_ROWS, m).
-        strings: Its other columns are known.
+        strings: Table of strings; its other columns must be filled.
     """
     bare = model_of(terms)
     model = Model(bare.code, bare.k_h, bare.k_p, bare.gravity, True)

@@ -42,9 +42,9 @@ from sagline.kernels.jit import entry, formula, glue, kernel
 from sagline.kernels.memory import Memory
 
 FIT_STEPS = 200
-FIRST_DAMPING = 1e-3  # of the largest diagonal element
+FIRST_DAMPING = 1e-3  # relative to the largest diagonal element
 SMALL_STEP = 1e-14  # in the problem's units
-NOTHING = 1e-13  # share of the cost whose gain ends a fit
+NOTHING = 1e-13  # relative decrease of the cost below which a fit ends
 
 
 @formula

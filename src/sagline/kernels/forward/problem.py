@@ -52,13 +52,13 @@ class Solutions(NamedTuple):
 class LastEquilibrium(NamedTuple):
     """Last equilibrium of a sequence of samples, kept from one call to the next; NaN: none."""
 
-    rows: Array  # of the cables, (CABLE_ROWS, m)
+    rows: Array  # rows of the cables, (CABLE_ROWS, m)
     factor: Array  # Cholesky factor of the stiffness, scaled, (n, n)
     last: Array  # pose and wrench, (LAST_COLUMNS,)
 
 
 class PoseProblem(NamedTuple):
-    """One pose to find: the cable model, what the robot is, and what is given."""
+    """Data for finding one pose: cable model, robot and wrench."""
 
     model: Model  # cable model
     free: Array  # rows that pick the free motions, each times its unit: what counts as equally far, (n, 6)

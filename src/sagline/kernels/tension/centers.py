@@ -15,7 +15,7 @@ from sagline.kernels.tension.norms import program_status
 from sagline.kernels.tension.on_polygon import centroid, feasible_corners
 from sagline.kernels.tension.polygon import WorkArrays
 
-THIN = 1e-9  # of the largest tension: thinner sets have no center
+THIN = 1e-9  # relative to the largest tension: a thinner set has no center
 NEWTON_STEPS = 200
 CENTERED = 1e-18  # square of the Newton decrement at which the center is found
 

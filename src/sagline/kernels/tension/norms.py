@@ -125,8 +125,8 @@ def share_lowest_maximum(
 
 STEPS = 200
 HALVINGS = 40
-CLOSE = 1e-2  # of the largest tension: a step shorter than this lets the exponent grow
-STILL = 1e-12  # of the largest tension: a step shorter than this ends the search
+CLOSE = 1e-2  # relative to the largest tension: after a shorter step, the exponent is increased
+STILL = 1e-12  # relative to the largest tension: a shorter step ends the search
 
 
 @kernel

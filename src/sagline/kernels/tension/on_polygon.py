@@ -125,7 +125,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     return -1
 
 
-TIED = 1e-10  # of the largest tension: sums that differ by less are the same
+TIED = 1e-10  # relative to the largest tension: sums that differ by less count as equal
 WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon walk
 
 

@@ -17,7 +17,7 @@ from sagline.kernels.tension.norms import share_by_norm, share_lowest_maximum, s
 from sagline.kernels.tension.on_polygon import distribute_on_polygon
 from sagline.kernels.tension.polygon import WorkArrays
 
-DEPENDENT = 1e-10  # square of what is left of a cable's row once the cables before it are held
+DEPENDENT = 1e-10  # square of the remaining row of a cable, below which it depends on the cables already fixed
 
 
 @kernel
@@ -91,9 +91,9 @@ def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, ten
 
 @glue
 def _puncture(bounds: Array, tension: Array) -> None:
-    """Move the tensions back towards the minimum norm, START, as far as the limits let them."""
+    """Move the tensions toward the minimum norm, START, as far as the limits allow."""
     m = tension.size
-    share = 0.0  # 0 at the minimum norm, 1 where we are
+    share = 0.0  # 0 at the minimum norm, 1 at the given tensions
     for i in range(m):
         start = bounds[START, i]
         way = tension[i] - start

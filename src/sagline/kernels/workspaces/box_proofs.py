@@ -15,9 +15,9 @@ from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange,
 from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, rise, rise_rate, sag_force_slope
 from sagline.kernels.workspaces.wrench_set import Loads, dot6, reach_of_loads
 
-POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which nothing is proved: the place is all but singular
+POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which nothing is proved: the pose is almost singular
 HEADROOM = 1.2  # a box of tensions is tried that much larger than a first estimate
-ITERATIONS = 3  # of that estimate
+ITERATIONS = 3  # iterations of this estimate
 
 
 class Precision(NamedTuple):
@@ -301,7 +301,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
                 vz += direction[3] * rx + direction[4] * ry
             slope = place.slopes[motion]
             change = vx * place.full[0, i] + vy * place.full[1, i] + vz * place.full[2, i]
-            # of the unit vector alone
+            # derivative of the unit vector only
             change += x * slope[i] + y * slope[m + i] + z * slope[2 * m + i]
             if motion < 3:
                 half = box.half[motion]

@@ -22,20 +22,20 @@ from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange
 from sagline.kernels.workspaces.sag_force_bounds import has_sag, largest_sag_force, sag_force_slope
 
 STEPS = 40
-REDUCTION = 0.1  # of the smoothing, at most, with each step
+REDUCTION = 0.1  # smallest factor of the smoothing per step
 TO_LIMIT = 0.95  # share of the way to a limit that a step may go
 CENTERED = 0.2  # relative error of slack times push of the center; it affects only the chance of success
 FARTHEST = 50.0  # of all forces at hand: where there is no limit, tensions are sought up to so much
 
 
 class Centered(NamedTuple):
-    """The search, for m cables and n rows."""
+    """State of the search, for m cables and n rows."""
 
     low: Array  # limits of the tensions [N], (m,)
     high: Array  # (m,), finite
     tau: Array  # tensions, strictly inside, (m,)
     below: Array  # barrier forces of the lower limits [N], (m,), > 0
-    above: Array  # those of the upper limits, (m,), > 0
+    above: Array  # barrier forces of the upper limits [N], (m,), > 0
     give: Array  # inverse of how stiffly the limits hold each tension, (m,)
     right: Array  # demand on the chord tensions [N], (n,)
     left: Array  # its residual, (n,)
@@ -45,7 +45,7 @@ class Centered(NamedTuple):
 
 @glue
 def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
-    """Work arrays for m cables and n rows, and the memory that is left; the tensions are not known yet."""
+    """Work arrays for m cables and n rows, without tensions, and the remaining memory."""
     wide, memory = block(memory, 6, m)
     thin, memory = block(memory, 3 + n, n)
     centered = Centered(wide[0], wide[1], wide[2], wide[3], wide[4], wide[5], thin[0], thin[1], thin[3:], thin[2])
@@ -55,7 +55,7 @@ def new_centered(memory: Memory, m: int, n: int) -> tuple[Centered, Memory]:
 
 @kernel
 def fill_imbalance(matrix: Array, centered: Centered) -> float:
-    """Fill what the tensions leave of the right side; returns the square of its length [N^2]."""
+    """Fill the residual of the demand at the present tensions; returns the square of its length [N^2]."""
     n, m = matrix.shape
     square = 0.0
     for k in range(n):
@@ -99,7 +99,7 @@ def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> boo
 
 @kernel
 def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
-    """Let the tensions come to the smoothed center; returns the square of what they leave [N^2].
+    """Move the tensions to the smoothed center; returns the square of the remaining residual [N^2].
 
     matrix: structure matrix, all rows in newtons, (n, m); smoothing: [N^2], > 0; centered: limits and right side; the
     rest is filled.
@@ -277,7 +277,7 @@ def in_wrench_space(rows: Array, vector: Array, full: Array) -> None:
 def _fill_demand(
     curves: Curves, place: CablesInBox, center: Array, load: Array, centered: Centered, ranges: Ranges
 ) -> None:
-    """Fill what the chord tensions have to supply, with the sag forces at the present ones.
+    """Fill the demand on the chord tensions, with the sag forces at the present tensions.
 
     load: wrench, (6,); centered: tensions; filled; ranges: its sag forces are filled.
     """

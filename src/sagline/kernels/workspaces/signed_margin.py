@@ -92,7 +92,7 @@ class _FacetWeights(NamedTuple):
     # wrench of the cables at the middle of their limits, and of their sag forces' ranges, less the demand, (2, 6)
     points: Array
     high: Array  # upper limits [N], (m,)
-    endless: bool  # whether a cable has none
+    endless: bool  # True if a cable has no upper limit
     arm: float  # lever arm of the norm [m]
     lever: float  # mean lever arm [m], by which moments are divided while normals are looked for; 1 without any
 
@@ -189,7 +189,7 @@ def _fill_facet_table(freedom: Array, full: Array, lever: float, table: Array) -
 
 @glue
 def _fill_weights(body: Array, center: Array, geometry: Array, bands: Array, rows: Array, points: Array) -> bool:
-    """Fill what counts at every facet; returns whether a cable has no upper limit."""
+    """Fill the weights of the cables for all facets; returns True if a cable has no upper limit."""
     endless = False
     for a in range(6):
         points[ENDS, a] = points[RANGES, a] = center[a]
@@ -314,7 +314,7 @@ def _measure_facets(
 
 @glue
 def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
-    """Fill what the cables give to either side of the points along the normals held."""
+    """Fill the wrenches of the cables on both sides of the points along the stored normals."""
     rows = counts.rows
     for b in range(held):
         measured[BY_ENDS + b] = measured[BY_TENSIONS + b] = measured[BY_SAG_FORCES + b] = 0.0
@@ -349,7 +349,7 @@ def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
 
 @glue
 def _measure_lengths(counts: _FacetWeights, held: int, measured: Array) -> None:
-    """Fill the inverse lengths of the normals held."""
+    """Fill the inverse lengths of the stored normals."""
     arm, lever = counts.arm * counts.arm, counts.lever * counts.lever
     for b in range(held):
         x, y, z = measured[b], measured[TOGETHER + b], measured[2 * TOGETHER + b]
@@ -361,7 +361,7 @@ def _measure_lengths(counts: _FacetWeights, held: int, measured: Array) -> None:
 
 @glue
 def _measure_sides(points: Array, held: int, measured: Array) -> None:
-    """Fill the margins to the nearer sides of the facets held."""
+    """Fill the margins to the nearer sides of the stored facets."""
     e0, e1, e2 = points[ENDS, 0], points[ENDS, 1], points[ENDS, 2]
     e3, e4, e5 = points[ENDS, 3], points[ENDS, 4], points[ENDS, 5]
     r0, r1, r2 = points[RANGES, 0], points[RANGES, 1], points[RANGES, 2]
@@ -396,7 +396,7 @@ def _write_normal(counts: _FacetWeights, measured: Array, normals: Array, b: int
 
 @glue
 def _limiting_cable(counts: _FacetWeights, direction: Array) -> int:
-    """The cable that counts most along a direction."""
+    """Index of the cable with the largest contribution along a direction."""
     cable = -1
     most = 0.0
     for i in range(counts.rows.shape[1]):
