@@ -1,7 +1,7 @@
 """Cable on a drum: number of turns as a function of the length off the drum, and memory of the winding tension.
 
-Turns count from the drum's first groove, where the cable is fastened: the more cable is on the drum, the more turns.
-Layer k lies in the grooves between the turns of the layer below it, and goes back where that one came from.
+Turns count from the drum's first groove, where the cable is fastened, and increase with the cable on the drum.
+Layer k lies in the grooves between the turns of the layer below it, and advances in the opposite direction.
 docs/model.md, section 10.
 """
 
@@ -56,7 +56,7 @@ def _wound_length(drum: Array, layer: int, turns: float) -> float:
 def turns_of_lengths(drums: Array, starts: Array, length: Array, turns_out: Array, travel_out: Array) -> None:
     """Turns on each drum, and its travel in a turn [m], at lengths off the drum.
 
-    Beyond the empty drum turns are negative, beyond its last layer more than that holds.
+    Turns are negative beyond the empty drum, and exceed the drum's capacity beyond its last layer.
 
     Args:
         drums: Table, (m, DRUM_COLUMNS).
@@ -117,7 +117,7 @@ def follow_memory(
         strain: Strain of the cable at the drum, at each sample, (N, m).
         rest_strain: Initial strain of the cable on the drum, (m,).
         unstrained: True if the given lengths are unstrained.
-        found_out: The others [m], (N, m).
+        found_out: Lengths of the other kind [m], (N, m).
         memory: Work array, (MEMORY_ROWS, N).
     """
     for i in range(given.shape[1]):

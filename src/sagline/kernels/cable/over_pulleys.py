@@ -55,7 +55,7 @@ def _wrap_at(rows: Array, i: int) -> Wrap:
 
 @glue
 def start_passes(cables: Array, rows: Array) -> None:
-    """Fill what is behind the chords, and forget what was missed where the pose before left no parameter."""
+    """Fill the cable behind the chords, and reset the errors where the previous pose left no parameter."""
     for i in range(rows.shape[1]):
         rows[g.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
     for i in range(rows.shape[1]):
@@ -65,7 +65,7 @@ def start_passes(cables: Array, rows: Array) -> None:
 
 @glue
 def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
-    """Fill the cables that are solved in the stead of those over pulleys."""
+    """Fill the equivalent cables, which are solved in place of those over pulleys."""
     m = rows.shape[1]
     for i in range(m):
         length = rows[g.LENGTH, i]
@@ -164,7 +164,7 @@ def _larger(one: float, other: float) -> float:
 
 @glue
 def _end_errors(rows: Array) -> float:
-    """Add by how much the platform ends are missed to what is asked for; returns the most, of a cable's length."""
+    """Correct the equivalent cables by the platform-end errors; returns the largest error relative to the length."""
     largest = 0.0
     for i in range(rows.shape[1]):
         x, z = rows[g.FREE_SPAN, i] - rows[g.END_X, i], rows[g.FREE_RISE, i] - rows[g.END_Z, i]
@@ -176,7 +176,7 @@ def _end_errors(rows: Array) -> float:
 
 @glue
 def _length_errors(model: Model, cables: Array, rows: Array) -> float:
-    """The same of cables that leave along their chord: shallow ones, and weightless ones, which miss nothing."""
+    """`_end_errors` for cables that leave along their chord: shallow cables, and weightless ones without error."""
     largest = 0.0
     for i in range(rows.shape[1]):
         material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
@@ -200,7 +200,7 @@ def _length_errors(model: Model, cables: Array, rows: Array) -> float:
 
 @formula
 def _weight_per_length(model: Model, material: Material) -> float:
-    """Weight per length that the part behind P has [N/m]: the exact cable's alone."""
+    """Weight per length of the part behind P [N/m]; nonzero for the exact cable only."""
     return material.density * model.gravity if model.code == codes.CATENARY else 0.0
 
 

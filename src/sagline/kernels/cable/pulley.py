@@ -43,7 +43,7 @@ class Behind(NamedTuple):
 
 
 class Change(NamedTuple):
-    """Changes of the data of one cable: L [m], w [N/m], EA [N], R [m], dead length [m]."""
+    """Changes of the parameters of one cable: L [m], w [N/m], EA [N], R [m], dead length [m]."""
 
     length: float
     weight: float
@@ -137,7 +137,7 @@ def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap
 
 @formula
 def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
-    """The same of a cable of any model; only the exact one weighs there, and the straight one does not stretch."""
+    """`behind` for any model; only the exact cable has weight there, and the straight one does not stretch."""
     if model.code == codes.STRAIGHT:
         return Behind(pulley.radius * wrap.angle, pulley.dead)
     weight = material.density * model.gravity if model.code == codes.CATENARY else 0.0

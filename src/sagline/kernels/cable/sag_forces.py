@@ -23,7 +23,7 @@ LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its ch
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
 EXITS = 4  # passes over pulleys: for X up to 1 the sag force is then known to 1e-9 of the tension
 SHRINKINGS = 30
-TURN_ERROR = 1e-10  # of half the cable's weight: the sag force at a turn is better known
+TURN_ERROR = 1e-10  # relative to half the cable's weight: bound of the error of the sag force at a turn
 SHRINKS = 0.9  # of the section before: what shrinks less does not shrink
 SMALLEST_GAIN = 1e-15  # of the numbers at hand
 
@@ -36,8 +36,8 @@ class Curves(NamedTuple):
     """The cables of one pose as curves of sag force over chord tension."""
 
     model: Model  # cable model
-    cables: Cables  # the cables; what they carry is working space
-    turns: Array  # of their sag forces, (TURN_ROWS, m)
+    cables: Cables  # the cables; their tensions and sag forces are overwritten
+    turns: Array  # extrema of the sag forces, (TURN_ROWS, m)
     statuses: Codes  # status of each cable, (m,)
 
 
@@ -124,7 +124,7 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along tau - weight sag_force(tau) on a section [N]; exact where the better end is the answer.
+    """Upper bound of along tau - hanging sag_force(tau) on a section [N]; exact if an end of the section is optimal.
 
     That end, and the range of the sag force, say how far from it anything better can be; so the section shrinks.
 
@@ -253,7 +253,7 @@ def _find_rises(curves: Curves, work: Array) -> None:
 
 @glue
 def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, sag_forces: Array) -> None:
-    """Fill where and how far the sag forces turn between A and B, of the cables whose tension is not NaN.
+    """Fill tension and sag force at the extremum between A and B, for the cables whose tension is not NaN.
 
     Newton steps from TENSION on, with the slope of first order, then with that of the last two points, within what is
     left of A to B.

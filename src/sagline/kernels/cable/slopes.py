@@ -39,7 +39,7 @@ class _MachineSlopes(NamedTuple):
 
 @formula
 def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
-    """Change of force where the free end would move so and is held: minus stiffness times motion."""
+    """Change of force if the motion of the free end is prevented: minus stiffness times motion."""
     return PlaneVector(-(plane.xx * end.x + plane.xz * end.z), -(plane.zx * end.x + plane.zz * end.z))
 
 
@@ -137,7 +137,7 @@ def force_slopes(
 def slopes_over(
     model: Model, material: Material, pulley: Pulley, free: float, force: Force, plane: PlaneStiffness
 ) -> tuple[_ForceSlopes, _MachineSlopes]:
-    """The five of a cable that may have something behind it; of the shallow models as of the exact one.
+    """Force slopes by L, rho, EA, R and dead length of a cable with or without a pulley, shallow or exact.
 
     free: unstrained length of the free span [m].
     """

@@ -45,7 +45,7 @@ from sagline.kernels.memory import Memory
 
 FLAT = 1e-9  # relative to the largest stiffness: smaller ones count as zero
 OVERSTRETCHED = 0.1  # strain that no cable survives
-PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # ways to the equilibrium, the later where the earlier is in doubt
+PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for the equilibrium, in order of use
 
 
 @glue
@@ -58,7 +58,7 @@ def _stability(low: float, high: float) -> int:
 
 @glue
 def _support_status(model: Model, cables: Array, rows: Array, needed: int) -> int:
-    """Way in which the cables hold a stable platform; needed: number of taut cables required."""
+    """Support status of a stable platform; needed: number of taut cables required."""
     taut = 0
     strain = 0.0
     for i in range(cables.shape[0]):
@@ -98,7 +98,7 @@ def _find_pose(
     space: ForwardArrays,
     pose: Array,
 ) -> tuple[int, float]:
-    """Fill the equilibrium, by the first way that is beyond doubt; returns steps, and the sum of tensions there.
+    """Fill the equilibrium by the first reliable method; returns the steps, and the sum of tensions there.
 
     On return space is that of the pose: unbalance, stiffness, and its factor, of which NaN at the first place says that
     there is none. exact: the model with an energy that leads to where the problem's own takes over.

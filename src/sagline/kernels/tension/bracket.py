@@ -141,7 +141,7 @@ def _narrow_free(
 
 @glue
 def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
-    """The cable whose sag force is least certain in a range, and by how much all pulls together are [N]."""
+    """Cable with the most uncertain sag force in a range, and uncertainty of all sag forces together [N]."""
     worst = -1
     largest = 0.0
     total = 0.0
@@ -155,7 +155,7 @@ def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
 
 @glue
 def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -> None:
-    """Split the tensions of one cable in two: what holds its present one comes last and so is next."""
+    """Split the tensions of one cable in two; the half with its present tension comes last and is examined next."""
     for row in range(RANGE_ROWS):
         for j in range(waiting.shape[2]):
             waiting[top + 1, row, j] = waiting[top, row, j]
@@ -194,7 +194,7 @@ def _first_range(curves: Curves, size: float, range_: Array) -> None:
 def _approach_demand(
     curves: Curves, demand: Demand, range_: Array, trial: TensionChange, memory: Memory
 ) -> tuple[float, bool]:
-    """Let tensions in a range come as near to the demand as they can.
+    """Find the tensions in a range that come closest to the demand.
 
     Returns the force that is left [N], infinite where moments are out of reach: then the direction is one of moments
     alone; and whether the moments balance.

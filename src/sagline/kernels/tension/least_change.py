@@ -32,7 +32,7 @@ STEADINESS = 1e-8  # weight of the squared change of a tension relative to that 
 DECREASE = 1e-4  # share of the predicted decrease that a step must reach
 STIFFEST = 1e3  # largest weight of a bend, which the normal matrix still bears beside that
 STANDS = 1e-13  # relative to the largest force: the search ends if the predicted decrease is smaller
-STEADY = 1e-6  # of what is left: tensions that move by less no longer turn its direction
+STEADY = 1e-6  # relative to the residual: smaller changes of the tensions do not change its direction
 
 
 class Demand(NamedTuple):
@@ -40,7 +40,7 @@ class Demand(NamedTuple):
 
     matrix: Array  # J, what a chord tension gives, (n, m)
     hanging: Array  # G, what a sag force takes away, (n, m)
-    right: Array  # wrench to be supplied beside the sag forces, (n,)
+    right: Array  # wrench to be supplied in addition to the sag forces, (n,)
     soft: int  # number of soft rows, the first ones; the other rows are hard
     size: float  # the largest force at hand [N], by which tolerances are measured
 

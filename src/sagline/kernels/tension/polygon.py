@@ -18,7 +18,7 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 FLAT = 1e-12  # a null-space row shorter than this does not move the cable's tension
-SPARE_CORNERS = 6  # beyond two a cable: the box and the corner in the making
+SPARE_CORNERS = 6  # in addition to two per cable: corners of the box and the corner being inserted
 
 
 @glue

@@ -28,7 +28,7 @@ class PoseRange(NamedTuple):
 
 
 class CablesInBox(NamedTuple):
-    """The cables of one pose, the middle of a box, and how far from there they get in the box."""
+    """Cables at the middle of a box of poses, and bounds of their changes in the box."""
 
     rows: Array  # free motions, those that turn per lever arm, so that all components are in newtons, (n, 6)
     full: Array  # structure matrix, (6, m)

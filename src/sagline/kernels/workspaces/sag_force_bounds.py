@@ -131,7 +131,7 @@ def has_sag(curves: Curves, i: int) -> bool:
 
 @kernel
 def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float:
-    """Largest change of a sag force with the platform end's position [N/m], at a chord tension of so much or more.
+    """Largest slope of a sag force over the platform end's position [N/m], at or above a chord tension.
 
     way: how far its platform end may be from where the curves are [m]; tension: least chord tension [N].
     """
@@ -151,7 +151,7 @@ def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float
 
 @kernel
 def largest_sag_force(curves: Curves, i: int, tension: float) -> float:
-    """Upper bound of a sag force [N], at a chord tension of so much or more."""
+    """Upper bound of a sag force [N], at or above a chord tension."""
     cables = curves.cables
     if not has_sag(curves, i):
         return cables.sag_force[i]
