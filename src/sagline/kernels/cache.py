@@ -51,7 +51,7 @@ class KernelCache:
             file.unlink(missing_ok=True)
 
     def load_overload(self, signature: object, target_context: Any) -> Any:
-        """Machine code for argument types; None if there is none that can be used."""
+        """Machine code for argument types; None if no usable file exists."""
         if not self._enabled:
             return None
         target_context.refresh()
@@ -94,5 +94,5 @@ class KernelCache:
 
 @cache
 def say_once(line: str) -> None:
-    """Write a line to standard error; the same line once in a process."""
+    """Write a line to standard error, but each line only once per process."""
     print(line, file=sys.stderr, flush=True)

@@ -23,11 +23,11 @@ from sagline.kernels.algebra.functions import (
 from sagline.kernels.cable.terms import Force
 from sagline.kernels.jit import formula, kernel
 
-RANGE = 500.0  # of X = wD/(2 tau): beyond it sinh X overflows, without a practical cable
-TAUT_STRAIN = 0.01  # of e = tau/EA: up to here two Newton steps reach the last digit
-ORDINARY_STRAIN = 0.1  # and up to here three
+RANGE = 500.0  # largest X = wD/(2 tau): sinh X overflows beyond it; practical cables are far below
+TAUT_STRAIN = 0.01  # largest e = tau/EA at which two Newton steps reach the last digit
+ORDINARY_STRAIN = 0.1  # largest e at which three Newton steps do
 STEPS = 80
-# Relative steps after which no other counts: Newton's method squares the error, Halley's cubes it.
+# Relative steps after which the next one is below rounding: Newton's method squares the error, Halley's cubes it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
 

@@ -21,9 +21,9 @@ from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.jit import formula, glue
 
 CLOSE = 0.1  # relative first step within which two Halley steps are trusted
-ORDINARY = 2.0  # of h: up to here the polynomials are exact
-PASSES = 30  # over pulleys; one or two from a pose close by
-MISSED = 1e-13  # of a cable's length: tolerance of the platform end
+ORDINARY = 2.0  # largest h at which the polynomials are exact
+PASSES = 30  # largest number of passes over pulleys; one or two suffice from a close pose
+MISSED = 1e-13  # tolerance of the platform end, relative to the cable's length
 
 
 @formula

@@ -124,7 +124,7 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along tau - hanging sag_force(tau) on a section [N]; exact if an end of the section is optimal.
+    """Upper bound of along tau - weight sag_force(tau) on a section [N]; exact if an end of the section is optimal.
 
     That end, and the range of the sag force, say how far from it anything better can be; so the section shrinks.
 

@@ -27,7 +27,7 @@ from sagline.kernels.jit import entry, glue, kernel
 NEAR = 1e-3
 # passes until a cable leaves its pulley where its force says; a taut one is 1e-4, 4e-8, 1e-11, 0 off
 CONTACTS = 40
-SAME_SAG_FORCE = 4e-16  # of the tension: smaller changes of a sag force count as converged
+SAME_SAG_FORCE = 4e-16  # relative to the tension: smaller changes of a sag force count as converged
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
 LIMIT_MISS = 1e-6  # relative: more than what the passes for a slack cable's pulley leave

@@ -81,7 +81,7 @@ def fill_integral(c: Numbers, size: float, d: int, phi: Numbers) -> None:
 
 @glue
 def _fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> None:
-    """Fill the equations of u at the stages, (STAGES d, STAGES d), and right of them their sides for u, f at 0."""
+    """Fill the equations of u at the stages, (STAGES d, STAGES d), then the right sides for u and f at 0."""
     scale = size * size * mu
     n = STAGES * d
     for i in range(STAGES):
@@ -104,7 +104,7 @@ def _fill_stages(c: Numbers, mu: Any, size: float, d: int, system: Numbers) -> N
 
 @glue
 def _solve_in_place(system: Numbers, n: int, columns: int) -> None:
-    """Solve n equations for the columns that follow them, in their place."""
+    """Solve n equations in place; the right sides are the columns after the matrix."""
     for k in range(n):
         best = k
         for i in range(k + 1, n):
@@ -226,7 +226,7 @@ def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
 
 @glue
 def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
-    """The same of the pivot at a start that gives way along one direction: of 1/give + its k00."""
+    """Negative eigenvalues of the pivot 1/give + k00 at a start that is flexible along one direction."""
     if d == 1:
         return int(1.0 + (give[0, 0] * phi[0, 0] / phi[0, 1]).real < 0.0)
     determinant = phi[0, 2] * phi[1, 3] - phi[0, 3] * phi[1, 2]

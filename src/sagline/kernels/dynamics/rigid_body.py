@@ -1,4 +1,4 @@
-"""A rigid body in free motion and under forces: the parts that integrators are put together from.
+"""A rigid body in free motion and under forces: building blocks of the integrators.
 
 The body's own axes are its principal axes, with the origin at the center of mass. A state is a row: position of the
 center of mass, unit quaternion (scalar last) from these axes to the world, so that the first seven are a pose row,

@@ -14,7 +14,7 @@ from sagline.kernels.jit import kernel
 # Columns of a row.
 KIND = 0
 PLACE = 1  # three: where a cable leaves the frame, a rod's start, a box's center [m]
-RADIUS = 4  # half the diameter, which is taken off distances [m]
+RADIUS = 4  # half the diameter, which is subtracted from distances [m]
 FIRST = 5  # first and last measured point of a cable or rod, as shares of its unstrained length
 LAST = 6
 LEVEL = 7  # two: horizontal unit vector toward the platform end
@@ -33,7 +33,7 @@ HANGING = 0.0
 PARABOLA = 1.0
 BOX = 2.0
 
-FOLD = 1e-12  # of a cable's length: what is nearer to the place where it turns is there
+FOLD = 1e-12  # relative to a cable's length: a point closer to the turning point than this counts as at it
 
 
 @kernel
@@ -59,7 +59,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
     vertical = row[VERTICAL] - weight * length * (1.0 - share)
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
     give = 1.0 / row[STIFFNESS]
-    if tension == 0.0:  # the turn of a fold, where there is no direction
+    if tension == 0.0:  # turning point of a fold, where the direction is undefined
         return 0.0, 0.0, 0.0, weight * give * length * length
     inverse = 1.0 / tension
     bend = weight * horizontal * inverse * inverse * inverse * length * length
@@ -99,7 +99,7 @@ def bulge(row: Array, first: float, last: float, chord2: float) -> float:
     elif v0 < -slack and v1 > slack:
         bend = math.inf
     by_curvature = 0.125 * part * part * (bend + weight * give)
-    if by_curvature * by_curvature < 1e-4 * chord2:  # shallow: the other bound is no better
+    if by_curvature * by_curvature < 1e-4 * chord2:  # shallow: the other bound is not smaller
         return by_curvature
     arc = part * (1.0 + math.sqrt(most2) * give)
     by_length = 0.5 * math.sqrt(max(arc * arc - chord2, 0.0))

@@ -41,7 +41,7 @@ PrecisionTerms = tuple[float, float]  # Precision
 
 
 def memory_for_proofs(cables: int) -> tuple[Array, Indices]:
-    """Memory in which proofs work with so many cables."""
+    """Work memory of the proofs for a number of cables."""
     return np.empty(14 * cables * cables + 500 * cables + 800), np.empty(10 * cables + 40, dtype=np.int64)
 
 
@@ -56,14 +56,14 @@ def prove_boxes(
     memory: tuple[Array, Indices],
     answers: tuple[Codes, Codes],
 ) -> None:
-    """Try to prove of each of N boxes of poses that a robot can work at all of its poses, or at none.
+    """Try to prove for each of N boxes that a robot can work at all poses of the box, or at none.
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
         limit_terms: Limits of the tensions: `TensionLimits`.
         robot_terms: Rows of the structure matrix that count, (n, 6); body_table (1, BODY_COLUMNS); cable_table,
             (1, m, CABLE_COLUMNS), without pulleys.
-        load_terms: The wrenches to bear: `Loads`.
+        load_terms: The wrenches to balance: `Loads`.
         boxes: Rows: pose at the middle, half edges [m], largest turn from there [rad], (N, BOX_COLUMNS).
         precision_terms: `Precision`.
         memory: `proof_memory` as many cables.
