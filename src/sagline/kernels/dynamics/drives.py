@@ -184,7 +184,7 @@ def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time:
 
 @formula
 def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
-    """Account for the strain that changes where cable leaves its drum, after a step; its rate is still the step's."""
+    """Add the energy of the strain change where cable leaves its drum to the audit, after a step."""
     for i in range(cables.shape[0]):
         stiffness = cables[i, tables.STIFFNESS]
         wound = stiffness * drives.now[STORED, i]
@@ -234,7 +234,7 @@ def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -
 
 @glue
 def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begins: bool) -> None:
-    """Change the winches' speeds by forces of a time; see `_kick_lagging`."""
+    """Update the winches' speeds from forces that act for a time; see `_kick_lagging`."""
     if drives.kind == DRUMS:
         _kick_drums(drives, time)
     elif drives.kind == SECOND_ORDER:
@@ -243,7 +243,7 @@ def kick_winches(drives: Drives, rows: Array, targets: Array, time: float, begin
 
 @glue
 def store_step_start(drives: Drives, rows: Array) -> None:
-    """Store the data of a step's begin for `add_winch_energy`."""
+    """Store the data at the start of a step for `add_winch_energy`."""
     for i in range(rows.shape[1]):
         drives.now[BEFORE, i] = rows[g.LENGTH, i]
         drives.now[BEFORE_WHOLE, i] = drives.now[WHOLE, i]

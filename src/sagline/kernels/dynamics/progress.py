@@ -78,7 +78,7 @@ ROUNDING = 1e-9  # of the sum of all parts of the energy, of chains of the weigh
 def note_events(
     drives: Drives, rows: Array, cables: Array, at: Indices, now: float, weight_of: float, notes: Array
 ) -> None:
-    """Keep the largest tensions, and note what begins: a cable that no longer pulls, a drive at its limit."""
+    """Update the largest tensions, and record new events: a cable that becomes slack, a drive at its limit."""
     largest = 0.0
     for i in range(rows.shape[1]):
         tension = drives.now[d.AT_FRAME, i]
@@ -104,5 +104,5 @@ def note_events(
 
 @glue
 def has_room(at: Indices, notes: Array, cables: int) -> bool:
-    """True if all events that may begin in a step can be noted."""
+    """True if the notes have space for all events that can begin in a step."""
     return at[NOTES] + 2 * cables <= notes.shape[0]

@@ -196,7 +196,7 @@ def _newton_steps(
         share = -1.0
         for shortening in range(SHORTENINGS + 1):
             last = shortening == SHORTENINGS or (shortening > 0 and best <= good)
-            if last:  # nothing is better: back to where it was
+            if last:  # no step improves the unbalance: restore the pose
                 copy_pose(pose, trial)
             else:
                 for j in range(step.shape[0]):

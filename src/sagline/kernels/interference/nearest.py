@@ -8,8 +8,8 @@ from sagline.kernels.jit import kernel
 
 STEPS = 30
 HALVINGS = 6
-SMALL = 1e-8  # steps, as shares of a cable's length, after which no other counts: Newton's method squares the error
-FLAT = 1e-13  # of the product of curvatures, below which two cables run side by side
+SMALL = 1e-8  # last step, as a share of a cable's length: Newton's method squares the error
+FLAT = 1e-13  # relative to the product of curvatures: a smaller determinant means parallel cables
 
 
 @kernel

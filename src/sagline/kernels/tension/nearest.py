@@ -46,7 +46,7 @@ def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[Refere
 
 @glue
 def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
-    """Fill the point of the null space that the shared tensions shall be nearest to.
+    """Fill the reference point in the null space for the distributed tensions.
 
     offset: of the distribution's variable (m,).
     """

@@ -167,7 +167,7 @@ SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the sm
 SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the sag force
 LEAST_WIDTH = 0.05  # share of their range that a set of wrenches leaves to the tensions in the search for a center
 ITERATIONS = 2  # of tensions and their sag forces
-LEAST_WAY = 1e-4  # of a chord: a smaller box is smoothed as one so large
+LEAST_WAY = 1e-4  # relative to a chord: lower bound of the displacement that sets the smoothing
 
 
 class Ranges(NamedTuple):
@@ -243,7 +243,7 @@ def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, r
 
 @kernel
 def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ranges: Ranges, slopes: Array) -> None:
-    """Fill how the wrench that the centered tensions and their sag forces give goes with each motion, (MOTIONS, 6)."""
+    """Fill the derivatives of the wrench of centered tensions and sag forces by each motion, (MOTIONS, 6)."""
     m = place.way.size
     for motion in range(MOTIONS):
         for a in range(6):
