@@ -184,7 +184,7 @@ def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time:
 
 @formula
 def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
-    """Add the energy of the strain change where cable leaves its drum to the audit, after a step."""
+    """Add to the audit the strain change where cable leaves its drum; RATE must still be that of the step."""
     for i in range(cables.shape[0]):
         stiffness = cables[i, tables.STIFFNESS]
         wound = stiffness * drives.now[STORED, i]
