@@ -1,1 +1,1 @@
-"""Calibration: what a robot's anchors, zeros and cables really are, from its own readings."""
+"""Calibration: actual anchors, length zeros and cable properties of a robot, from its own readings."""

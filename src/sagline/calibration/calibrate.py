@@ -28,7 +28,7 @@ from sagline.kernels import codes
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
-MOST_FOLDS: Final = 1000  # each a calibration
+MOST_FOLDS: Final = 1000  # each part costs one calibration
 UNKNOWNS: Final = ("frame_anchors", "length_zero", "axial_stiffness", "mass", "center_of_mass")
 
 
@@ -49,18 +49,18 @@ def calibrate(
     keep the values of the robot, and are listed.
 
     Args:
-        robot: The robot before the calibration: its values are the initial ones, and priors. Their deviations are its
-            `tolerances`, those of `Unknown(name, deviation=...)`, or usual ones of the kind.
+        robot: The robot before the calibration. Its values are the initial values and the priors. Their standard
+            deviations are its `tolerances`, those of `Unknown(name, deviation=...)`, or typical values of the kind.
         log: Readings at poses at rest.
         unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
-        model: Cable model, the exact one or the weightless one.
+        model: Cable model: the exact or the weightless one.
         robust: True to give less weight to poses that do not fit the rest.
-        folds: Number of parts of the poses for the cross-validation, at most one a pose; each costs a calibration. 0
-            for none.
-        progress: Called with the number of poses that are done in a pass, and of all.
+        folds: Number of parts of the poses for the cross-validation, at most one per pose; each part costs one
+            calibration. 0 for no cross-validation.
+        progress: Called with the number of finished poses of a pass and the number of all poses.
 
     Returns:
-        Calibration; `robot` is the one to use.
+        Calibration; its `robot` is the one to use.
 
     Raises:
         InvalidValueError: If an unknown has another name, or neither readings nor a prior; if the log is not of this
@@ -91,7 +91,7 @@ def calibrate(
     callback(progress, "progress")
     if (folds := whole_number(folds, "folds", 0, MOST_FOLDS)) == 1:
         raise InvalidValueError("folds", "1", "0 for none, or >= 2", "Give 5, say.")
-    checked = checked_unknowns(unknowns)  # before any work
+    checked = checked_unknowns(unknowns)  # before any other work
     _refuse(wrong_units(robot, log))
     fit_log, rows, left_out = screen(robot, log)
     sensors = active_sensors(fit_log)
@@ -112,7 +112,7 @@ def calibrate(
 
 
 def active_sensors(log: WinchLog) -> Sensors:
-    """The sensors that read anything in a log."""
+    """Sensors with at least one reading in a log."""
     silent = {
         name: None
         for name, read in (
@@ -135,16 +135,16 @@ def _check_model(robot: Robot, model: CableModel) -> None:
 
 
 def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters: Parameters, model: CableModel) -> None:
-    """Refuse a log with a likely mistake, or measured poses where everything else fits."""
+    """Reject a log with a likely mistake, and measured poses that disagree while everything else fits."""
     if not {"measuring_frame", "target"}.isdisjoint(parameters.names):
-        log = log.replace(position=None, rotation=None)  # in axes that are not known yet
+        log = log.replace(position=None, rotation=None)  # the axes of the measuring system are not known yet
     _refuse(diagnose_log(robot, log, model))
     if fits_without_measured_poses(robot, fit_log, model):
         _refuse(frame_mismatch(fit_log, np.arange(len(fit_log)), parameters.names))
 
 
 def _refuse(sentences: Iterable[str]) -> None:
-    """Refuse a log that no similar robot can have written, with the first of the reasons."""
+    """Reject a log that no similar robot can have written; the message is the first of the reasons."""
     for sentence in sentences:
         what, _, step = sentence.partition("; " if "; " in sentence else ": ")
         step = f"{step[:1].upper()}{step[1:]}."

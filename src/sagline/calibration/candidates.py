@@ -19,23 +19,23 @@ from sagline.statics.tables import pose_rows
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import MinimumNorm, QuadraticProgram
 
-MOST_SETS: Final = 5  # of tensions at a pose
-ROUNDS: Final = 6  # of drawing poses, where much of the box is not feasible
-KEPT: Final = 0.02  # of the range between the limits: what is to be calibrated does not have the tensions it is sent
-GROUP: Final = 20  # poses whose sets of tensions are near to the same corners
-UNLIMITED: Final = 3.0  # times the largest tension of least norm: replaces an infinite upper limit
-SAME: Final = 1e-6  # of the largest tension: sets nearer than this are one
+MOST_SETS: Final = 5  # number of sets of tensions at one pose
+ROUNDS: Final = 6  # of drawing poses, in boxes of which a large part is not feasible
+KEPT: Final = 0.02  # share of the range between the limits; actual tensions differ from the commanded ones
+GROUP: Final = 20  # number of poses whose sets of tensions are near the same corners
+UNLIMITED: Final = 3.0  # times the largest tension of least norm; replaces an infinite upper limit
+SAME: Final = 1e-6  # share of the largest tension: sets closer than this count as one
 
 
 class CandidatePoses(NamedTuple):
-    """Equilibria, N of them.
+    """N equilibria.
 
     Attributes:
         poses: Pose rows, shape (N, POSE_COLUMNS).
         lengths: All cable off the drums [m], shape (N, m).
-        tensions: At the frame ends [N], shape (N, m).
-        place: Number of the pose: sets of tensions at one pose share it, shape (N,).
-        usual: Whether the pose is one drawn evenly from the box, shape (N,).
+        tensions: Tensions at the frame ends [N], shape (N, m).
+        place: Index of the pose, shape (N,); sets of tensions at one pose have one index.
+        usual: True if the pose is drawn evenly from the box, shape (N,).
     """
 
     poses: Array
@@ -45,17 +45,17 @@ class CandidatePoses(NamedTuple):
     usual: Flags
 
     def part(self, which: Flags | Indices | slice) -> CandidatePoses:
-        """Some of them."""
+        """Subset of the candidates."""
         return CandidatePoses(*(locked(np.ascontiguousarray(each[which])) for each in self))
 
 
 def candidates_of(
     robot: Robot, model: CableModel, box: PoseBox, count: int, seed: int, progress: Progress | None = None
 ) -> CandidatePoses:
-    """Feasible poses of a box, at most `count`, each with several sets of tensions near corners of the feasible ones.
+    """Feasible poses of a box, at most `count`, each with several sets of tensions near corners of the feasible set.
 
-    Every other pose is drawn evenly from the box, the rest nearer to its faces and largest tilt, where readings are
-    most informative. Refused with the reason if no pose is feasible.
+    Every second pose is drawn evenly from the box. The others are nearer to its faces and to the largest tilt, where
+    readings are most informative. Raises an error with the reason if no pose is feasible.
     """
     rng = np.random.default_rng(seed)
     sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
@@ -82,7 +82,7 @@ def _concatenated(parts: list[CandidatePoses]) -> CandidatePoses:
 
 
 def _random_poses(robot: Robot, box: PoseBox, count: int, rng: np.random.Generator) -> Pose:
-    """Poses of a box; every other one, from the second on, nearer to its borders."""
+    """Random poses of a box; from the second one on, every other pose is nearer to the borders."""
     share, part = rng.uniform(size=(count, 3)), rng.uniform(size=count)
     share[1::2] = 0.5 - 0.5 * np.cos(np.pi * share[1::2])
     part[1::2] **= 0.25
@@ -99,7 +99,7 @@ def _random_poses(robot: Robot, box: PoseBox, count: int, rng: np.random.Generat
 
 
 def _with_margins(robot: Robot, model: CableModel, poses: Pose, kept: float) -> Robot:
-    """The robot with finite limits, and a part of the range between them kept clear at both ends."""
+    """Robot with finite tension limits and a margin at both ends of the range between them."""
     low, high = robot.tension_min, robot.tension_max
     if np.isinf(high).any():
         least = np.nan_to_num(_solve(robot, model, poses[:GROUP], MinimumNorm())[2])
@@ -111,7 +111,7 @@ def _with_margins(robot: Robot, model: CableModel, poses: Pose, kept: float) -> 
 def _feasible(
     robot: Robot, model: CableModel, poses: Pose, sets: int, rng: np.random.Generator, progress: Progress | None
 ) -> tuple[CandidatePoses, Codes]:
-    """The feasible ones among poses with sets of tensions, and how each was solved."""
+    """Feasible ones among poses with sets of tensions, and the solution status of each pose."""
     found, statuses = [], []
     for part in blocks(len(poses), GROUP, progress):
         corners = np.where(rng.uniform(size=(sets, robot.cable_count)) < 0.5, robot.tension_min, robot.tension_max)
@@ -131,10 +131,10 @@ def _feasible(
 
 
 def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) -> tuple[Codes, Array, Array]:
-    """Status of each pose, its lengths and its tensions at the frame ends."""
+    """Status, lengths and frame-end tensions of each pose."""
     try:
         plan = inverse(robot, poses, model, method)
-    except CableGeometryError:  # one of them is inside an anchor, or a pulley
+    except CableGeometryError:  # a cable starts inside an anchor or a pulley
         missing = np.full((len(poses), robot.cable_count), np.nan)
         return np.full(len(poses), PoseStatus.NO_CHORD, dtype=np.int8), missing, missing
     return plan.status, plan.unstrained_length, plan.state.cables.frame_end_tension
@@ -169,14 +169,14 @@ def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
     return InvalidValueError("box", value, "a box with feasible poses", "Give box=PoseBox(low, high, tilt) of others.")
 
 
-PASSES: Final = 50  # over all pairs of legs; a tour of a hundred places takes a handful
-_ROUNDING: Final = 1e-9  # of the largest distance
+PASSES: Final = 50  # over all pairs of edges; a tour of a hundred places takes fewer than ten
+_ROUNDING: Final = 1e-9  # share of the largest distance
 
 
 def shortest_tour(places: Array) -> Indices:
     """Indices (N,) of an order in which places (N, d) are visited once on a short open tour (2-opt, Croes 1958)."""
     count = len(places)
-    apart = np.zeros((count + 1, count + 1))  # the last is nowhere: the way begins and ends there at no cost
+    apart = np.zeros((count + 1, count + 1))  # the last index is a virtual place at distance zero
     apart[:count, :count] = np.linalg.norm(places[:, None] - places[None], axis=-1)
     order = np.concatenate(([count], _nearest_neighbor_tour(apart[:count, :count]), [count]))
     for _ in range(PASSES):
@@ -191,7 +191,7 @@ def tour_length(places: Array, order: Indices) -> float:
 
 
 def _nearest_neighbor_tour(apart: Array) -> Indices:
-    """From the farthest place on, always to the nearest one."""
+    """Tour from the farthest place, always to the nearest place that is left."""
     order = np.empty(len(apart), dtype=np.int64)
     left = np.ones(len(apart), dtype=np.bool_)
     here = int(np.argmax(apart.sum(axis=1)))
@@ -203,7 +203,7 @@ def _nearest_neighbor_tour(apart: Array) -> Indices:
 
 
 def _reverse_segments(order: Indices, apart: Array, floor: float) -> bool:
-    """Turn around every stretch that makes the way shorter so, in place; whether there was one."""
+    """Reverse every segment whose reversal shortens the tour, in place; True if there was one."""
     changed = False
     for i in range(len(order) - 2):
         before, first, lasts, after = order[i], order[i + 1], order[i + 1 : -1], order[i + 2 :]

@@ -18,30 +18,30 @@ from sagline.core.arrays import Array, Flags, Indices
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
-UNIT: Final = 50.0  # times what is expected, between 1 and the 1000 of a wrong unit
-GOOD: Final = 5.0  # squares for each reading of a log that a robot fits: slips and rope make more than 1 of it
-POOR: Final = 50.0  # the same if it is a hundredth of the one before
-NEAR: Final = 0.25  # departure: a robot with anchors a quarter of a meter off may fit swapped cables by chance
-ROUGH: Final = 10.0  # times a deviation: beyond a tenth of the robot's size, a length is not informative
-FAR: Final = 0.25  # of a cable's length: a larger error of a zero is far off, more than that of any tape measure
-SHIFTS: Final = 5  # rows by which load cells may be early or late
-_FULLY: Final = 3  # most promising changes, which are tried to convergence
+UNIT: Final = 50.0  # ratio to the expected value, between 1 and the 1000 of a wrong unit
+GOOD: Final = 5.0  # sum of squares per reading of a log that a robot fits; slips and rope errors raise it above 1
+POOR: Final = 50.0  # upper limit instead of GOOD if it is also a hundredth of the previous one
+NEAR: Final = 0.25  # departure from the priors: a robot with anchors 0.25 m off may fit swapped cables by chance
+ROUGH: Final = 10.0  # ratio to a deviation: beyond a tenth of the robot's size, a length is not informative
+FAR: Final = 0.25  # share of a cable's length: a larger error of a zero exceeds that of any tape measure
+SHIFTS: Final = 5  # largest number of rows by which load cells may be early or late
+_FULLY: Final = 3  # number of most promising changes that are fitted to convergence
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
-    """Likely mistakes in a log, in sentences with the next step; none for a consistent log.
+    """Likely mistakes in a log, as sentences with the next step; empty for a consistent log.
 
-    First the sizes of readings: lengths and positions in mm, load cells in kN. Then some two dozen rows are fit by a
-    robot similar to the given one. If none fits, the readings are changed by one mistake at a time: columns of two
-    cables exchanged (encoders, load cells or both), an encoder that counts backward, zeros far off, load cells up to
-    five rows early or late. The first mistake without which a robot fits is reported. Zeros far off, and lengths that
-    go backward, are found only where poses were commanded.
+    The first check compares the sizes of readings: lengths and positions in mm, load cells in kN. Then a robot similar
+    to the given one is fitted to about 24 rows. If none fits, the readings are changed by one mistake at a time:
+    columns of two cables exchanged (encoders, load cells or both), an encoder that counts backward, zeros far off, load
+    cells up to five rows early or late. The first mistake whose correction gives a fit is reported. Zeros far off, and
+    lengths with the wrong sign, are found only with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
     instance(model, CableModel, "model")
     if found := tuple(wrong_units(robot, log)):
-        return found  # other mistakes show when the units are right
+        return found  # other mistakes can be found only after the units are right
     _, rows, _ = screen(robot, log)
     if not len(rows) or (log.load_cells is None and log.position is None):
         return ()
@@ -49,7 +49,7 @@ def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> 
 
 
 def wrong_units(robot: Robot, log: WinchLog) -> Iterator[str]:
-    """Sentences about readings of the size that another unit would give them; all rows of the log."""
+    """Sentences about readings whose size suggests another unit; checks all rows of the log."""
     size = _extent(robot)
     if log.unstrained_length is not None and log.unstrained_length.size:
         typical = float(np.nanmedian(log.unstrained_length)) if not np.isnan(log.unstrained_length).all() else 0.0
@@ -101,7 +101,7 @@ def fits_without_measured_poses(robot: Robot, log: WinchLog, model: CableModel) 
 
 
 def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> Iterator[str]:
-    """Sentence about measured poses (rows `left_out`) that disagree with the lengths while everything else fits."""
+    """Sentence about measured poses (rows `left_out`) that disagree with the lengths while all other readings fit."""
     measured = np.zeros(len(log), dtype=np.bool_)
     for read in (log.position, log.rotation):
         if read is not None:
@@ -117,14 +117,14 @@ def frame_mismatch(log: WinchLog, left_out: Indices, asked: Collection[str]) -> 
 
 
 def _extent(robot: Robot) -> float:
-    """The size of the frame and of the platform together [m]."""
+    """Size of the frame plus size of the platform [m]."""
     frame, platform = (float(np.linalg.norm(np.ptp(p, axis=0))) for p in (robot.frame_anchors, robot.platform_anchors))
     behind = 0.0 if robot.winches is None else float(robot.winches.dead_cable.max())
     return frame + platform + behind
 
 
 def _spread(position: Array) -> float:
-    """Largest difference of measured coordinates [m]; of a single position its size."""
+    """Largest difference of measured coordinates [m]; for a single position, its size."""
     there = ~np.isnan(position).all(axis=0)
     if not there.any():
         return 0.0
@@ -133,7 +133,7 @@ def _spread(position: Array) -> float:
 
 
 def _single_mistake(trial: Trial) -> Iterator[str]:
-    """Sentence about the one mistake without which a robot fits the readings."""
+    """Sentence about the single mistake whose correction gives a fit."""
     whole = trial.result(Hypothesis())
     far = _far(trial, whole.zeros)
     if whole.quality <= GOOD:
@@ -155,7 +155,7 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
 
 
 def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
-    """Possible mistakes in lengths or counts, alone or with the load cells of the same cables."""
+    """Possible mistakes in lengths or counts, alone or together with the load cells of these cables."""
     m = trial.robot.cable_count
     for two in combinations(range(m), 2):
         yield Hypothesis(lengths=two)
@@ -197,7 +197,7 @@ def _far(trial: Trial, zeros: Array) -> Flags:
 
 
 def _zero_text(zeros: Array, far: Flags) -> str:
-    """Cables whose zeros are far off."""
+    """Text of the cables whose zeros are far off."""
     cables = np.flatnonzero(far).tolist()
     listed = ", ".join(
         f"{abs(zeros[i]):.2f} m too {'short' if zeros[i] > 0.0 else 'long'} on cable {i}" for i in cables
@@ -225,5 +225,5 @@ def _change_text(change: Hypothesis, log: WinchLog) -> str:
 
 
 def _misfit_text(quality: float) -> str:
-    """A quality in standard deviations, in words."""
+    """Text of a quality in standard deviations."""
     return f"{np.sqrt(quality):.3g} standard deviations" if np.isfinite(quality) else "without bound"

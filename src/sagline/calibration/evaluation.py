@@ -24,11 +24,11 @@ from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 from sagline.robot.tolerances import UNCERTAIN, Provenance
 
-DOUBTFUL: Final = 1e-4  # chi squared that would be so far from what is to be expected that rarely is none
-ODD: Final = 0.1  # share of the poses that may fit badly, or not at all, before the whole is in doubt
-ODD_WEIGHT: Final = 0.5  # and what counts so little is one
-TOLERATED: Final = 1.1  # of chi squared to what is to be expected: no model is better than that in a large log
-LITTLE: Final = 1e-6  # of a direction: a parameter with a smaller part of it is still observable
+DOUBTFUL: Final = 1e-4  # probability that chance gives so large a chi squared; below it the result is doubtful
+ODD: Final = 0.1  # share of the poses that may fit badly before the whole result is in doubt
+ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
+TOLERATED: Final = 1.1  # ratio of chi squared to its expected value: in a large log, no model is better than that
+LITTLE: Final = 1e-6  # share of a direction: a parameter with a smaller share of it is still observable
 
 
 def calibration_of(
@@ -39,7 +39,7 @@ def calibration_of(
     source: str,
     validation: CrossValidation | None,
 ) -> Calibration:
-    """Result of a search; `rows` of the log are those of the problem (N,), `left_out` the reasons for the others."""
+    """Result of a search; `rows`: rows of the log in the problem (N,); `left_out`: omitted rows by reason."""
     fit, kept, parameters = found.fit, found.kept, problem.parameters
     numbers, machine, normal = fit.state.numbers, fit.state.machine, fit.normal
     residuals, triangle = _final_readings(problem, fit)
@@ -84,7 +84,7 @@ def calibration_of(
 
 
 def _status(found: SearchResult, chi_squared: float, freedoms: int) -> CalibrationStatus:
-    """Status of a search, by the poses of full weight."""
+    """Status of a search, from the poses of full weight."""
     kept, weights = found.kept, found.fit.normal.weights
     if not found.fit.converged:
         return CalibrationStatus.NOT_CONVERGED
@@ -97,7 +97,7 @@ def _status(found: SearchResult, chi_squared: float, freedoms: int) -> Calibrati
 
 
 def _final_readings(problem: FitProblem, fit: Fit) -> tuple[Array, Array]:
-    """Residuals (N, 2 m + 6) [m, N, m, rad], NaN for none, and triangular factor of the weighted whitened slopes."""
+    """Residuals (N, 2 m + 6) [m, N, m, rad], NaN if missing, and triangular factor of the weighted whitened slopes."""
     state, residuals = fit.state, []
     triangle = np.zeros((0, len(state.numbers)))
     for part in blocks(len(state.poses), BLOCK):
@@ -125,7 +125,7 @@ def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[
 def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bool) -> bool:
     """True if residuals contradict the deviations of the sensors.
 
-    Where poses that fit badly were taken out, the rest fits better than chance: the mean of a chi squared that is cut
+    Without the poses that fit badly, the rest fits better than chance: the mean of a chi squared distribution truncated
     at a quantile c is r F(c; r + 2)/F(c; r).
     """
     if free <= 0:

@@ -45,10 +45,10 @@ class Direction(Result):
     """A combination of unknowns that is unobservable or weakly identifiable.
 
     Attributes:
-        name: "the world shifted along x", or "pulley_radius with frame_anchors z".
-        vector: The combination, one for its standard deviation; in the units of the parameters, (P,).
-        known: Share of its prior standard deviation that is left: 1 without information.
-        step: Recommended measurement: "fix a frame anchor, or measure 3 points".
+        name: For example "the world shifted along x", or "pulley_radius with frame_anchors z".
+        vector: Change of the parameters for one standard deviation of the combination, in their units, (P,).
+        known: Remaining share of the prior standard deviation: 1 without information.
+        step: Recommended measurement, for example "fix a frame anchor, or measure 3 points".
     """
 
     name: str
@@ -59,14 +59,14 @@ class Direction(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlier(Result):
-    """A pose, or one cable of it, that does not fit the rest.
+    """A pose, or one cable of a pose, that does not fit the other readings.
 
     Attributes:
         row: Row of the log.
-        cable: Its number, or None for the whole pose.
+        cable: Index of the cable, or None for the whole pose.
         quantity: "length", "load cell", "position" or "rotation".
-        size: Its error [m, N or rad].
-        deviations: The same in standard deviations.
+        size: Error [m, N or rad].
+        deviations: Error in standard deviations.
     """
 
     row: int
@@ -82,11 +82,11 @@ class CrossValidation(Result):
 
     Attributes:
         folds: Number of parts of the poses.
-        tension: Root mean square of the readings of load cells less the predictions [N]; NaN without load cells.
-        position: Root mean square of the distances from measured positions [m]; NaN without a position measured along
-            all three axes.
-        tension_before: With the robot before the calibration [N].
-        position_before: With the robot before the calibration [m]; NaN if the measuring system was unknown.
+        tension: Root mean square of load cell readings minus predictions [N]; NaN without load cells.
+        position: Root mean square distance from measured positions [m]; NaN without a position measured along all three
+            axes.
+        tension_before: `tension` with the robot before the calibration [N].
+        position_before: `position` with the robot before the calibration [m]; NaN if the measuring system was unknown.
     """
 
     folds: int
@@ -98,7 +98,7 @@ class CrossValidation(Result):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Findings(Result):
-    """Fields of a `Calibration`, documented there."""
+    """Base of `Calibration` with the fields documented there."""
 
     robot: Robot
     before: Robot

@@ -27,11 +27,11 @@ from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-MOST_ROWS: Final = 24  # on which changes are tried: three readings of a load cell for each unknown
-STEPS: Final = 12  # of the least squares: where a robot fits, half of them are enough
-TOLERANCE: Final = 1.0  # of the sum of squares: how well a robot fits is wanted to some percent
-FEWEST_ROWS: Final = 8  # the same without commanded poses
-# Prior deviations, wider than usual: the question is whether any similar robot fits. Shares of the values where
+MOST_ROWS: Final = 24  # for the trials of changes: three readings of a load cell for each unknown
+STEPS: Final = 12  # of the least squares: if a robot fits, half of them are sufficient
+TOLERANCE: Final = 1.0  # of the sum of squares: the quality of a fit is needed to a few percent only
+FEWEST_ROWS: Final = 8  # number of rows without commanded poses
+# Prior deviations, wider than usual: the test asks if any similar robot fits. They are shares of the values if
 # logarithms are estimated.
 _WIDE: Final = {
     "frame_anchors": 0.3,
@@ -52,8 +52,8 @@ class Hypothesis(NamedTuple):
         lengths: Two cables whose lengths or counts are exchanged, or None.
         cells: Two cables whose load cells are exchanged, or None.
         flipped: A cable whose encoder counts backward, or None.
-        moved: Cables whose zeros are where the commanded poses have them.
-        late: By how many rows the load cells come after the encoders.
+        moved: Cables whose zeros are set from the commanded poses.
+        late: Number of rows by which the load cells lag behind the encoders.
     """
 
     lengths: tuple[int, int] | None = None
@@ -67,8 +67,8 @@ class _TrialResult(NamedTuple):
     """Fit of the readings after a change.
 
     Attributes:
-        quality: Median over the rows of the sum of squares for each reading: 1 where a robot fits within the deviations
-            of the sensors, infinite where none fits.
+        quality: Median over the rows of the sum of squares per reading: 1 if a robot fits within the deviations of the
+            sensors, infinite if none fits.
         departure: Mean square of the distance of the parameters from their priors, in prior deviations.
         zeros: Errors of the zeros of the lengths [m], (m,).
     """
@@ -86,8 +86,8 @@ class Trial:
         robot: The robot before the calibration.
         model: Cable model.
         log: The whole log.
-        rows: Indices of the fit rows.
-        found: Poses by forward kinematics, by change of the lengths and number of rows.
+        rows: Indices of the rows that are fitted.
+        found: Poses by forward kinematics, stored by change of the lengths and number of rows.
     """
 
     robot: Robot
@@ -97,7 +97,7 @@ class Trial:
     found: dict[tuple[Hypothesis, int], Pose] = field(default_factory=dict)
 
     def result(self, change: Hypothesis) -> _TrialResult:
-        """Fit of any robot similar to this one to the changed readings."""
+        """Fit of a similar robot to the changed readings."""
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
@@ -110,7 +110,7 @@ class Trial:
         return _TrialResult(quality, departure, moved + off[zeros])
 
     def promise(self, change: Hypothesis, steps: int) -> float:
-        """Predicted sum of squares a row, one step after some steps of the least squares; infinite without a fit."""
+        """Predicted sum of squares per row, one step beyond some least-squares steps; infinite without a fit."""
         most = FEWEST_ROWS if self.log.commanded is None else MOST_ROWS
         problem, poses, _ = self._problem(change, most)
         kept, step = np.ones(len(problem.log.cells), dtype=np.bool_), None
@@ -126,18 +126,18 @@ class Trial:
         return float(normal.squares[kept].sum() - gain) / there if 2 * there > len(kept) else np.inf
 
     def most_promising(self, changes: Iterable[Hypothesis], steps: int, most: int) -> list[Hypothesis]:
-        """Changes with a better prediction than no change, the best first, at most `most`."""
+        """Changes with a better prediction than no change, best first, at most `most`."""
         promises = {change: self.promise(change, steps) for change in changes}
         limit = self.promise(Hypothesis(), steps)
         return sorted((change for change in promises if promises[change] < limit), key=promises.__getitem__)[:most]
 
     def offsets(self) -> tuple[Array, Array]:
-        """Median offset of lengths from those of the commanded poses, and its median deviation [m], both (m,)."""
+        """Median offset of lengths from those at the commanded poses, and its median deviation [m], both (m,)."""
         problem, poses, _ = self._problem(Hypothesis(), MOST_ROWS)
         return _offsets(problem, poses)
 
     def _problem(self, change: Hypothesis, most: int) -> tuple[FitProblem, Pose | None, Array]:
-        """The least squares of some of the rows, their commanded poses, and by how much zeros were moved."""
+        """Least-squares problem for some of the rows, their commanded poses, and the shifts of the zeros."""
         log, late, m = self.log, change.late, self.robot.cable_count
         rows = self.rows[(self.rows + late >= 0) & (self.rows + late < len(log))]
         rows = rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).round().astype(np.int64))]
@@ -156,7 +156,7 @@ class Trial:
         poses = self._poses(problem, change, most) if log.commanded is None else log.commanded[rows]
         moved = np.zeros(m)
         shifted = list(change.moved)
-        if change.flipped is not None and not counted:  # the length about which it counts backward is unknown
+        if change.flipped is not None and not counted:  # the length at which a reversed encoder counts zero is unknown
             shifted.append(change.flipped)
         if shifted and poses is not None:
             moved[shifted] = -_offsets(problem, poses)[0][shifted]
@@ -164,7 +164,7 @@ class Trial:
         return problem, poses, moved
 
     def _poses(self, problem: FitProblem, change: Hypothesis, most: int) -> Pose | None:
-        """Poses by forward kinematics of the lengths; None where there is an unsolved one."""
+        """Poses by forward kinematics of the lengths; None if a pose is not solved."""
         key = change._replace(cells=None), most
         if key not in self.found:
             rows = start_of(problem, None).poses
@@ -174,13 +174,13 @@ class Trial:
         return self.found[key]
 
     def _has(self, name: str, counted: bool) -> bool:
-        """True if the robot has such a parameter."""
+        """True if the robot has the parameter `name`."""
         if name == "drum_radius":
             return counted
         return name != "linear_density" or bool((self.robot.cables.linear_density > 0.0).all())
 
     def _counts_of_length(self) -> Array:
-        """Counts for a meter let out of each cable, (m,), on the lowest layer of its drum."""
+        """Counts per meter of cable paid out, (m,), on the lowest layer of each drum."""
         drums = drums_of(self.robot)
         rate = drums.zero_and_rate()[1]
         _, travel = drums.turns(drums.starts[:, :1].T)
@@ -188,7 +188,7 @@ class Trial:
 
 
 def _fitted(problem: FitProblem, state: SearchState) -> Evaluated:
-    """State after a few steps of the least squares; a robot that fits is found in half of them."""
+    """State after a few least-squares steps; if a robot fits, half of them are sufficient."""
     begun = evaluate_step(problem, state, None, np.ones(len(state.poses), dtype=np.bool_))
     fit = solve(problem, begun, np.isfinite(begun[1].squares), robust=False, steps=STEPS, tolerance=TOLERANCE)
     return fit.state, fit.normal

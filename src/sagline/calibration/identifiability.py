@@ -15,22 +15,22 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.robot import Robot
 
-OPEN: Final = 1e-12  # of the largest singular value: rounding of slopes that cancel
-_SPREAD: Final = 1e-9  # of the largest: no lower does a gap between observable and open directions begin
-_FIXED: Final = 5e-2  # of the usual deviation: a parameter with a smaller stated deviation counts as known
-_WIDE: Final = 1e3  # of the usual deviation of an unknown value: limit of wider priors
-_SAME: Final = 1e-6  # sine of an angle between directions that are one
+OPEN: Final = 1e-12  # share of the largest singular value: rounding of slopes that cancel
+_SPREAD: Final = 1e-9  # share of the largest singular value: lower limit for the gap before open directions
+_FIXED: Final = 5e-2  # share of the usual deviation: a parameter with a smaller stated deviation counts as known
+_WIDE: Final = 1e3  # times the usual deviation of an unknown value: limit for wider priors
+_SAME: Final = 1e-6  # sine of the angle below which two directions are equal
 _TINY: Final = 1e-300
-_NAMED: Final = 3  # numbers that a direction without a name shows
+_NAMED: Final = 3  # number of components in the text of a direction without a name
 
 
 class PriorUnits(NamedTuple):
-    """The unknowns in standard deviations of their priors.
+    """Unknowns in standard deviations of their priors.
 
     Attributes:
         scale: One standard deviation in the internal parameters, (P,).
         units: One standard deviation in the units of the parameters, (P,).
-        free: Indices of those that are not known almost exactly.
+        free: Indices of the parameters that are not almost exactly known.
     """
 
     scale: Array
@@ -39,9 +39,9 @@ class PriorUnits(NamedTuple):
 
 
 def append_rows(triangle: Array, matrix: Array) -> Array:
-    """Triangular factor (at most P, P) of all rows so far and some more (..., P); rows with NaN are left out.
+    """Triangular factor (at most P, P) of the previous rows and additional rows (..., P); rows with NaN are left out.
 
-    By reflections, so that singular values down to rounding are distinguished; products would lose half of the digits.
+    Householder reflections keep singular values down to rounding; normal equations would lose half of the digits.
     """
     rows = matrix.reshape(-1, matrix.shape[-1])
     rows = rows[~np.isnan(rows).any(axis=1) & rows.any(axis=1)]
@@ -49,9 +49,9 @@ def append_rows(triangle: Array, matrix: Array) -> Array:
 
 
 def prior_units(parameters: Parameters) -> PriorUnits:
-    """Priors as the unit of directions; without a prior the usual deviation of an unknown value.
+    """Priors as units of directions; the usual deviation of an unknown value if there is no prior.
 
-    A much wider prior counts as `_WIDE`: beside it the others would be rounding.
+    A much wider prior is limited to `_WIDE`: otherwise the other parameters would be lost in rounding.
     """
     usual = np.array([KINDS[name].assumed for name in parameters.names])
     usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
@@ -64,7 +64,7 @@ def prior_units(parameters: Parameters) -> PriorUnits:
 
 
 def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
-    """Unit vectors, in standard deviations of the priors, that change no reading: columns, (P, d)."""
+    """Unit vectors, in standard deviations of the priors, that change no reading, as columns (P, d)."""
     vectors = np.zeros((len(frame.scale), 0))
     if not frame.free.size:
         return vectors
@@ -77,7 +77,7 @@ def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
 
 
 def numerical_rank(values: Array) -> int:
-    """Number of singular values, falling, above rounding: those above the widest gap near `OPEN`."""
+    """Number of singular values (decreasing) above rounding, that is, before the widest gap near `OPEN`."""
     largest = values[0] if values.size else 0.0
     if largest == 0.0:
         return 0
@@ -93,7 +93,7 @@ def numerical_rank(values: Array) -> int:
 def gauge_of(
     triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
 ) -> tuple[Direction, ...]:
-    """Unobservable directions of the unknowns, each with its name; the priors decide along them."""
+    """Unobservable directions of the unknowns, each with its name; along them the values follow from the priors."""
     frame = prior_units(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
@@ -114,7 +114,7 @@ def gauge_of(
 
 
 def _rotation_of_frame(parameters: Parameters, values: Array) -> Array:
-    """Rotation vector of the measuring system that is estimated [rad], (3,); zero where it is known."""
+    """Rotation vector of the measuring system, if it is estimated [rad], (3,); zero if it is known."""
     where = parameters.where[kinds.TURN : kinds.TURN + 3, 0]
     return np.where(where >= 0, values[where], 0.0)
 
@@ -134,17 +134,17 @@ def _symmetric_part(
         return np.zeros((len(frame.scale), 0)), []
     basis, upper = np.linalg.qr(vectors)
     _, sines, turned = np.linalg.svd(basis - left @ (left.T @ basis), full_matrices=False)
-    inside = np.linalg.solve(upper, turned[sines < _SAME].T)  # of the symmetries, and open
+    inside = np.linalg.solve(upper, turned[sines < _SAME].T)  # directions that are symmetries and unobservable
     mixed = _echelon((shares @ inside).T).T
     found = vectors @ np.linalg.lstsq(shares, mixed, rcond=None)[0]
     return found, [_named(column, known.each) for column in mixed.T]
 
 
 def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries) -> tuple[Array, Array]:
-    """Combinations of symmetries that change unknowns alone: vectors (P, k), and shares of the symmetries (g, k).
+    """Combinations of symmetries that change only unknowns: vectors (P, k), and shares of the symmetries (g, k).
 
-    Both in standard deviations. Known values stay, shared ones change alike, and the drums pay out the lengths that the
-    symmetries need.
+    Both in standard deviations. Known values do not change, shared values change together, and the drums pay out the
+    lengths that the symmetries require.
     """
     free = np.isin(where, frame.free)
     conditions = [known.table[known.matters & ~free], known.lengths]
@@ -163,7 +163,7 @@ def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries)
 
 
 def _null(matrix: Array) -> Array:
-    """Orthonormal basis of the null space of a matrix, in columns."""
+    """Orthonormal basis of the null space of a matrix, as columns."""
     _, values, rows = np.linalg.svd(matrix, full_matrices=True)
     rank = int(np.sum(values > 1e-9 * max(values.max(initial=0.0), _TINY)))
     return np.asarray(rows[rank:].T)
@@ -188,7 +188,7 @@ def _echelon(rows: Array) -> Array:
 
 
 def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
-    """Name and step of a combination of symmetries: those of the first, and names of others that are no shifts."""
+    """Name and step of a combination of symmetries: those of the first one, and names of others except shifts."""
     size = np.abs(shares)
     taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
     first = taken[0]
@@ -197,12 +197,12 @@ def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
 
 
 def _sparse(basis: Array) -> Array:
-    """Sparse columns of the same span."""
+    """Sparse basis of the same span, as columns."""
     return _echelon(basis.T).T if basis.size else basis
 
 
 def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:
-    """Name, vector and step of a direction, by the parameters that it changes most."""
+    """Name, vector and step of a direction, from the parameters that it changes most."""
     size = np.abs(vector)
     order = np.argsort(-size, kind="stable")
     moved = [int(index) for index in order if size[index] > 1e-3 * size.max()]
@@ -212,7 +212,7 @@ def _largest(vector: Array, parameters: Parameters) -> tuple[str, Array, str]:
     return name, vector, easiest_measurement(parameters.names[index] for index in moved)
 
 
-STEPS: Final = {  # the easiest first
+STEPS: Final = {  # the easiest measurement first
     "pulley_radius": "measure the pulley with a caliper",
     "mass": "weigh the platform",
     "linear_density": "weigh some meters of the cable",
@@ -231,10 +231,10 @@ STEPS: Final = {  # the easiest first
 
 
 def measurement_rank(name: str) -> int:
-    """Place of a kind among those that are easier to measure."""
+    """Rank of a kind of parameter by ease of measurement."""
     return list(STEPS).index(name)
 
 
 def easiest_measurement(names: Iterable[str]) -> str:
-    """Measurement that separates parameters of some kinds with the least work."""
+    """Easiest measurement that separates parameters of some kinds."""
     return STEPS[min(names, key=measurement_rank)]

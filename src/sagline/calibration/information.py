@@ -16,19 +16,19 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
-FEW: Final = 8  # readings for each parameter: with more, exchanges lower no error by a hundredth
-OPEN: Final = 1e-12  # of the largest singular value: a direction with less is unobservable
-ROUNDING: Final = 1e-6  # of a direction's square: a parameter with less of it is not part of it
-CONDITION: Final = 1e-13  # of the information of all candidates: a smaller prior is lost in rounding
-_WORTH: Final = 1e-9  # of a log det: an exchange that gains less is rounding
+FEW: Final = 8  # readings per parameter: with more, exchanges reduce no error by more than 1 %
+OPEN: Final = 1e-12  # share of the largest singular value: a direction with less is unobservable
+ROUNDING: Final = 1e-6  # share of a direction's square: a parameter with a smaller share is not part of it
+CONDITION: Final = 1e-13  # share of the information of all candidates: a smaller prior is lost in rounding
+_WORTH: Final = 1e-9  # of the log det: an exchange that gains less is rounding
 
 
 class Information:
     """Information of some of N candidates on P parameters, each candidate with k whitened rows.
 
     Attributes:
-        rows: Slopes of the readings by the numbers, shape (N, k, P).
-        covariance: Of the parameters, by the prior and the chosen candidates, shape (P, P).
+        rows: Derivatives of the readings with respect to the internal parameters, shape (N, k, P).
+        covariance: Covariance of the parameters from the prior and the chosen candidates, shape (P, P).
         chosen: Chosen candidates, in order.
     """
 
@@ -41,19 +41,19 @@ class Information:
         self.covariance, self._heard = self._recompute()
 
     def gains(self) -> Array:
-        """Gain of log det of the information by each candidate, shape (N,); -1 for those chosen."""
+        """Increase of the log det of the information by each candidate, shape (N,); -1 for chosen ones."""
         gains: Array = np.linalg.slogdet(self._unit + self._heard)[1]
         gains[self.chosen] = -1.0
         return gains
 
     def best(self) -> tuple[int, float]:
-        """The most informative candidate beside those chosen, and the increase of the log det."""
+        """The most informative candidate that is not chosen yet, and its increase of the log det."""
         gains = self.gains()
         best = int(np.argmax(gains))
         return best, float(gains[best])
 
     def take(self, candidate: int) -> None:
-        """Add a candidate: C - C J^T (1 + J C J^T)^-1 J C, and the information of all others."""
+        """Add a candidate: C - C J^T (1 + J C J^T)^-1 J C; update the gains of all candidates."""
         rows = self.rows[candidate]
         across = self.covariance @ rows.T
         by = across @ np.linalg.inv(np.linalg.cholesky(self._unit + rows @ across)).T
@@ -63,19 +63,19 @@ class Information:
         self.chosen.append(candidate)
 
     def leave(self, candidate: int) -> None:
-        """Remove a candidate; all is summed again, because a difference would be rounding."""
+        """Remove a candidate; everything is summed again, because a difference would be lost in rounding."""
         self.chosen.remove(candidate)
         self.covariance, self._heard = self._recompute()
 
     def _recompute(self) -> tuple[Array, Array]:
-        """Covariance, and J C J^T of each candidate, from the chosen ones."""
+        """Covariance, and J C J^T of each candidate, from the chosen candidates."""
         root = np.linalg.inv(np.linalg.cholesky(self._known + information_of(self.rows[self.chosen])))
         shares = self.rows @ root.T
         return root.T @ root, shares @ shares.transpose(0, 2, 1)
 
 
 def prior_information(rows: Array) -> Array:
-    """Prior information (P, P) in units of the priors: 1, but no less than rounding of the observations."""
+    """Prior information (P, P) in units of the priors: 1, but not less than the rounding of the observations."""
     return np.eye(rows.shape[-1]) * max(1.0, CONDITION * float((rows**2).sum()))
 
 
@@ -94,7 +94,7 @@ class Choice(NamedTuple):
 
 
 def choose_informative(rows: Array, known: Array, count: int) -> Choice:
-    """D-optimal choice of `count` candidates: greedy; if few, each exchanged for a better one.
+    """D-optimal choice of `count` candidates: greedy; a small choice is then improved by exchanges.
 
     The greedy choice alone is within 1 - 1/e of the best, as log det is submodular (Nemhauser, Wolsey & Fisher 1978);
     exchanges after Fedorov 1972.
@@ -115,7 +115,7 @@ def choose_informative(rows: Array, known: Array, count: int) -> Choice:
 
 
 def _exchange(found: Information) -> None:
-    """Replace each candidate once by the best one beside the others."""
+    """Replace each chosen candidate once by the best one that is not chosen."""
     for candidate in tuple(found.chosen):
         found.leave(candidate)
         gains = found.gains()
@@ -126,7 +126,7 @@ def _exchange(found: Information) -> None:
 def deviations_of(rows: Array, held: Array) -> Array:
     """Standard deviations (P,) from whitened slopes (..., P) and inverse prior deviations (P,); infinite if open."""
     whole = np.concatenate((rows.reshape(-1, len(held)), np.diag(held)))
-    _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # no squaring of the information
+    _, size, vectors = np.linalg.svd(np.linalg.qr(whole, mode="r"))  # avoids squaring of the information
     there = size > OPEN * size[0]
     variance = ((vectors[there] / size[there, None]) ** 2).sum(axis=0)
     left = (vectors[~there] ** 2).sum(axis=0)
@@ -141,12 +141,13 @@ def information_of(rows: Array) -> Array:
 
 
 TOTAL_STATION: Final = 1e-3  # m, of each coordinate
-CELL_SHARE: Final = 0.01  # of the tension in the middle: a usual load cell
-NEARLY: Final = 0.9  # of the most that the logarithms of the errors fall by: what costs less will do
-WORTH: Final = 0.99  # of the errors: a measurement that leaves more is not recommended
+CELL_SHARE: Final = 0.01  # share of the mean tension: a typical load cell
+NEARLY: Final = 0.9  # share of the largest decrease of the log errors: a cheaper measurement is sufficient with it
+WORTH: Final = 0.99  # share of the errors: a measurement that leaves more is not recommended
 
 
-# by kind: the measurement, its standard deviation in the unit of the kind, and True if that is a share of the value
+# by kind: the measurement, its standard deviation in the unit of the kind, and True if the deviation is a share of the
+# value
 TOOLS: Final[dict[str, tuple[str, float, bool]]] = {
     "mass": ("weighing the platform to 0.1 %", 1e-3, True),
     "linear_density": ("weighing a length of the cable to 1 %", 0.01, True),
@@ -156,7 +157,7 @@ TOOLS: Final[dict[str, tuple[str, float, bool]]] = {
     "load_cell_gain": ("a known weight on each load cell, to 0.5 %", 5e-3, True),
     "load_cell_bias": ("reading each load cell without load, to 1 N", 1.0, False),
 }
-Option = tuple[str, Array]  # a measurement in words, and the information with it, shape (P, P)
+Option = tuple[str, Array]  # text of a measurement, and the information with it, shape (P, P)
 
 
 class Situation(NamedTuple):
@@ -167,11 +168,11 @@ class Situation(NamedTuple):
         model: Cable model.
         parameters: The unknowns.
         sensors: The sensors.
-        scale: A unit of each internal parameter, in which information is counted, shape (P,).
-        slopes: Of the values by the internal parameters, shape (P,).
-        known: Prior information, with a little where there is none, shape (P, P).
-        standing: The poses chosen.
-        rows: Whitened rows of their readings, in the scale, shape (N, k, P).
+        scale: Unit of each internal parameter for the information, shape (P,).
+        slopes: Derivatives of the values with respect to the internal parameters, shape (P,).
+        known: Prior information, with a small value where there is no prior, shape (P, P).
+        standing: The chosen poses.
+        rows: Whitened rows of their readings, in units of `scale`, shape (N, k, P).
     """
 
     robot: Robot
@@ -186,22 +187,22 @@ class Situation(NamedTuple):
 
     @property
     def information(self) -> Array:
-        """Information afterwards, shape (P, P)."""
+        """Information after the measurements at the chosen poses, shape (P, P)."""
         return np.asarray(self.known + information_of(self.rows))
 
     def rows_by(self, sensors: Sensors) -> Array:
-        """Whitened rows of the poses with other sensors, in the scale, shape (N, m + 6, P)."""
+        """Whitened rows of the poses with other sensors, in units of `scale`, shape (N, m + 6, P)."""
         poses, lengths = self.standing.poses, self.standing.lengths
         found = predicted_rows(self.robot, self.model, self.parameters, sensors, poses, lengths)
         return np.asarray(found.matrix * self.scale)
 
 
 def most_helpful(situation: Situation) -> str:
-    """Sentence on the recommended measurement: the one that lowers the mean logarithm of the errors most."""
+    """Sentence with the recommended measurement, which reduces the mean log error most."""
     before = _deviations(situation.information)
     best: Option | None = None
     most = -np.log(WORTH)
-    for option in _options(situation):  # from the least costly of its kind on
+    for option in _options(situation):  # the least costly option of each kind first
         fall = float(np.log(before / _deviations(option[1])).mean())
         if fall > most / (1.0 if best is None else NEARLY):
             best, most = option, fall
@@ -214,7 +215,7 @@ def most_helpful(situation: Situation) -> str:
 
 
 def _options(situation: Situation) -> Iterator[Option]:
-    """Possible measurements that are not among the readings."""
+    """Possible measurements that the readings do not include yet."""
     parameters, sensors = situation.parameters, situation.sensors
     for name, (words, deviation, is_share) in TOOLS.items():
         if name in parameters.names:
@@ -234,7 +235,7 @@ def _options(situation: Situation) -> Iterator[Option]:
 
 
 def _measured_anchors(situation: Situation) -> Iterator[Option]:
-    """One frame anchor, or three, measured."""
+    """Options: one or three measured frame anchors."""
     names, cables = np.array(situation.parameters.names), situation.parameters.cables
     m = situation.robot.cable_count
     rows = np.zeros((m, 3, len(names)))
@@ -245,7 +246,7 @@ def _measured_anchors(situation: Situation) -> Iterator[Option]:
 
 
 def _measured_positions(situation: Situation) -> Iterator[Option]:
-    """The position measured at three of the poses, or six."""
+    """Options: the position measured at three or six of the poses."""
     sensors = situation.sensors.replace(position_deviation=TOTAL_STATION)
     alone = situation.rows_by(sensors.replace(tension_deviation=None, rotation_deviation=None))
     words = dict.fromkeys((3, 6), "the position at poses {} measured")
@@ -255,9 +256,9 @@ def _measured_positions(situation: Situation) -> Iterator[Option]:
 def _best_subset(
     situation: Situation, rows: Array, beside: Array, words: dict[int, str], instead: Array | None = None
 ) -> Iterator[Option]:
-    """Most informative subset of some rows, for each number of them for which there are words.
+    """Most informative subset of some rows, for each number of rows with a text.
 
-    rows: information of each alone; beside: with what it comes with; instead: readings that are replaced.
+    rows: information of each measurement alone; beside: information added to it; instead: replaced readings.
     """
     found = Information(rows, situation.information)
     for _ in range(min(max(words), len(rows))):
@@ -275,7 +276,7 @@ def _deviations(known: Array) -> Array:
 
 
 def _largest_reduction(situation: Situation, before: Array, after: Array) -> str:
-    """Largest reduction of errors among the kinds."""
+    """Text of the largest reduction of errors among the kinds."""
     names = np.array(situation.parameters.names)
     name = min(dict.fromkeys(names), key=lambda name: float(np.log(after / before)[names == name].mean()))
     mine = names == name
@@ -286,10 +287,10 @@ def _largest_reduction(situation: Situation, before: Array, after: Array) -> str
 
 
 def error_text(value: float, unit: str) -> str:
-    """An error to two digits; lengths in millimeters."""
+    """Text of an error with two digits; lengths in millimeters."""
     return n(1e3 * value, ".2g", "mm") if unit == "m" else n(value, ".2g", unit)
 
 
 def typical_load_cell_deviation(tensions: Array) -> float:
-    """Standard deviation of load cells as sold for tensions (N, m) [N]."""
+    """Standard deviation of commercial load cells for tensions (N, m) [N]."""
     return float(f"{CELL_SHARE * float(np.median(tensions)):.1g}")

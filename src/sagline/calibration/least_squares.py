@@ -1,7 +1,7 @@
 """The least squares of a calibration: Gauss-Newton on exact cables, the true lengths eliminated pose by pose.
 
-The objective is the sum over the poses of ((reading - prediction)/sigma)^2 and ((length - reported length)/sigma_L)^2,
-and over the numbers of ((value - prior)/its deviation)^2; docs/model.md, section 14.
+The objective has two sums over the poses, ((reading - prediction)/sigma)^2 and ((length - reported length)/sigma_L)^2,
+and one over the internal parameters, ((value - prior)/its deviation)^2; docs/model.md, section 14.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.robot import Robot
 
-SIGNIFICANT: Final = 1e-13  # of the largest: smaller eigenvalues are rounding
+SIGNIFICANT: Final = 1e-13  # share of the largest eigenvalue: smaller ones are rounding
 STEPS: Final = 60
 HALVINGS: Final = 12
-TOLERANCE: Final = 1e-5  # of the sum of squares: smaller steps end within 3e-3 standard deviations of the minimum
-ROUNDING: Final = 1e-12  # of the sum of squares
-QUANTILE: Final = 0.99  # of chi squared of a pose: beyond it a pose counts less
-NEARLY: Final = 1e-3  # of the sum of squares: as near is near enough where rounding hides the rest
+TOLERANCE: Final = 1e-5  # share of the sum of squares: smaller steps end within 3e-3 standard deviations of the minimum
+ROUNDING: Final = 1e-12  # share of the sum of squares
+QUANTILE: Final = 0.99  # of the chi squared of a pose: beyond it the pose has less weight
+NEARLY: Final = 1e-3  # share of the sum of squares: sufficient accuracy if rounding hides further decrease
 GROSS: Final = 0.1  # weight of a pose that would spoil the first step
-LESS: Final = 0.9  # of the scale of misfits, where it is worth another look
+LESS: Final = 0.9  # share of the misfit scale: if it falls below, the weights are computed again
 
 
 def whitened_at(
@@ -63,8 +63,8 @@ def whitened_at(
 ) -> WhitenedRows:
     """Whitened readings of some poses at a state, with their slopes; reported lengths [m], (n, m).
 
-    With a direction (P,) only the slopes along it. `free_of_noise` takes slopes at true instead of reported lengths:
-    else the scale of all lengths would seem to be observed, by the noise that it scales too.
+    With a direction (P,), only the slopes along it. `free_of_noise` computes slopes at the true lengths: at the
+    reported lengths the scale of all lengths would seem observable, because it scales the noise too.
     """
     log, parameters, machine = problem.log, problem.parameters, state.machine
     counts, along = (None if log.counts is None else log.counts[part]), reported
@@ -85,7 +85,7 @@ def whitened_at(
 
 
 def _squares_of(sensors: Sensors, rows: WhitenedRows, reported: Array, lengths: Array) -> tuple[Array, Indices]:
-    """Sum of squares of each pose in standard deviations, and how many readings it has."""
+    """Sum of squares of each pose in standard deviations, and its number of readings."""
     m = reported.shape[1]
     deviation = reading_deviations(sensors, m)
     misses = rows.residual / deviation[m:]
@@ -96,12 +96,12 @@ def _squares_of(sensors: Sensors, rows: WhitenedRows, reported: Array, lengths: 
 
 
 def _limits_of(readings: Indices, scale: float) -> Array:
-    """Sums of squares beyond which poses have less weight, (N,): a quantile of chi squared times a scale."""
+    """Sums of squares beyond which poses have less weight, (N,): quantile of chi squared times a scale."""
     return np.asarray(scale * exceeded_with(1.0 - QUANTILE, readings))
 
 
 def _pose_weights(squares: Array, readings: Indices, scale: float) -> Array:
-    """Weights of poses: less than 1 beyond the 99 % quantile of chi squared, times a scale."""
+    """Weights of poses: less than 1 beyond the 99 % quantile of chi squared times a scale."""
     if not np.isfinite(scale):
         return np.ones(len(squares))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -129,7 +129,7 @@ def predict_state(
 ) -> tuple[Array, Array]:
     """First-order prediction of true lengths [m] and pose rows of some poses after a step of the parameters (P,).
 
-    known: whitened readings before the step, if kept. machine, reported (n, m) [m]: after the step.
+    known: whitened readings before the step, if stored. machine, reported (n, m) [m]: values after the step.
     """
     if known is not None:
         off = np.einsum("nij,nj->ni", known.back, known.misfit - known.matrix @ step)
@@ -151,10 +151,10 @@ def evaluate_step(
     known: WhitenedRows | None = None,
     progress: Progress | None = None,
 ) -> Evaluated:
-    """One pass over the log: solve every pose after a step of the parameters, and sum up the normal equations.
+    """One pass over the log: solve every pose after a step of the parameters, and sum the normal equations.
 
-    Without a step, the state itself. Poses of more than `scale` times the expected squares have less weight. Refused if
-    the robot cannot have the parameters.
+    Without a step, the state itself is evaluated. Poses with more than `scale` times the expected squares have less
+    weight. Raises an error if the parameters are invalid for the robot.
     """
     numbers = before.numbers if step is None else np.maximum(before.numbers + step, problem.least)
     machine = before.machine if step is None else machine_at(problem, numbers)
@@ -188,7 +188,7 @@ def evaluate_step(
 
 
 def _cost_of(problem: FitProblem, current: Evaluated, kept: Flags, scale: float) -> float:
-    """Objective function; infinite where a pose that counts finds no equilibrium."""
+    """Objective function; infinite if a pose that counts has no equilibrium."""
     state, normal = current
     squares = normal.squares[kept]
     if np.isfinite(scale):
@@ -232,7 +232,7 @@ def solve(
         for halving in range(HALVINGS):
             try:
                 trial = evaluate_step(problem, current[0], step * 0.5**halving, kept, scale, current[1].rows, progress)
-            except InvalidValueError:  # a negative radius, say
+            except InvalidValueError:  # for example a negative radius
                 continue
             if _cost_of(problem, trial, kept, scale) <= cost + ROUNDING * abs(cost):
                 better = trial
@@ -262,28 +262,28 @@ def best_step(problem: FitProblem, state: SearchState, normal: Normal) -> tuple[
 
 
 def _lowest(matrix: Array, downhill: Array, *, positive: bool) -> Array:
-    """Minimizer of x^T M x - 2 b^T x of least norm."""
+    """Least-norm minimizer of x^T M x - 2 b^T x."""
     if positive:
         try:
             return np.asarray(cho_solve(cho_factor(matrix), downhill))
-        except LinAlgError:  # the priors are lost in rounding beside the readings
+        except LinAlgError:  # the priors are lost in rounding relative to the readings
             pass
     values, vectors = _significant_eigenpairs(matrix)
     return np.asarray(vectors @ ((vectors.T @ downhill) / values))
 
 
 def _lowest_within(matrix: Array, downhill: Array, lower: Array) -> Array:
-    """The same with x >= lower (P,), which are zero or less."""
-    from scipy.optimize import lsq_linear  # of use to few, and a quarter of a second to load
+    """Minimizer of the same function with x >= lower (P,); lower is zero or negative."""
+    from scipy.optimize import lsq_linear  # rarely needed, and the import takes a quarter of a second
 
     values, vectors = _significant_eigenpairs(matrix)
     root = np.sqrt(values)
     found = lsq_linear(root[:, None] * vectors.T, vectors.T @ downhill / root, (lower, np.inf), method="bvls")
-    return np.where(found.active_mask < 0, lower, found.x)  # there, not near there
+    return np.where(found.active_mask < 0, lower, found.x)  # exactly at the bound, not near it
 
 
 def _significant_eigenpairs(matrix: Array) -> tuple[Array, Array]:
-    """Eigenvalues above rounding, and their vectors in columns."""
+    """Eigenvalues above rounding, with their eigenvectors as columns."""
     values, vectors = eigh(matrix)
     significant = values > SIGNIFICANT * values[-1]
     return values[significant], vectors[:, significant]
@@ -295,10 +295,10 @@ def exceeded_with(probability: Any, freedoms: Any) -> Array:
 
 
 def _move_poses(before: Robot, after: Robot, poses: Array, motion: Array) -> Array:
-    """Pose rows after small motions of the center of mass (N, 6) [m, rad]; it may differ in the platform afterwards."""
+    """Pose rows after small motions of the center of mass (N, 6) [m, rad]; its location may differ in `after`."""
     turned = Rotation.from_quat(poses[:, 3:])
     turning = Rotation.from_rotvec(motion[:, 3:]) * turned
-    first, last = (np.array(robot.center_of_mass) for robot in (before, after))  # scipy takes no locked array
+    first, last = (np.array(robot.center_of_mass) for robot in (before, after))  # scipy needs writable arrays
     shift = motion[:, :3] + turned.apply(first) - turning.apply(last)
     free = before.freedom[:, :3]
     return np.hstack((poses[:, :3] + shift @ free.T @ free, turning.as_quat()))

@@ -1,4 +1,4 @@
-"""Logs of a robot's own readings, one row a pose at which it stood, and the accuracy of the sensors."""
+"""Logs of a robot's own readings, one row per pose at rest, and the accuracy of the sensors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sagline.core.results import Result, Saved
 from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
 
-LENGTH_DEVIATION = 5e-4  # m, of an unmeasured length off a drum: rope on a grooved drum
+LENGTH_DEVIATION = 5e-4  # m, for an unmeasured length off a drum: rope on a grooved drum
 
 
 def _world_if_none(frame: Pose | None) -> Pose:
@@ -34,13 +34,13 @@ class _Replaceable(Result):
     __slots__ = ()
 
     def replace(self, **changes: Any) -> Self:
-        """The same with some fields changed, checked like a new one.
+        """Copy with some fields changed, checked like a new object.
 
         Args:
             changes: Fields and their new values.
 
         Raises:
-            InvalidValueError: If there is no such field, or the constructor refuses a value.
+            InvalidValueError: If a field does not exist, or the constructor rejects a value.
         """
         for name in changes:
             choice(name, "field", self.__slots__)
@@ -54,18 +54,18 @@ class Sensors(_Replaceable):
     """Accuracy of a robot's sensors, and the pose of its measuring system.
 
     Attributes:
-        length_deviation: Standard deviation of a length off a drum, by counts or given [m], > 0, shape () or (m,).
-        tension_deviation: Of a load cell's reading [N], > 0, shape () or (m,); None where there are no load cells.
-        position_deviation: Of a coordinate of a measured position [m], > 0, shape () or (3,), along the measuring
-            system's axes; None where positions are not measured.
-        rotation_deviation: Of a measured rotation about each axis [rad], > 0, shape () or (3,); None where rotations
-            are not measured.
-        frame: Pose of the measuring system in the world: a point that it reads as p is at frame.position +
-            frame.matrix p; None is given for the world's own axes.
+        length_deviation: Standard deviation of a length off a drum, counted or given [m], > 0, shape () or (m,).
+        tension_deviation: Standard deviation of a load cell [N], > 0, shape () or (m,); None without load cells.
+        position_deviation: Standard deviation of each coordinate of a measured position [m], > 0, shape () or (3,),
+            along the axes of the measuring system; None if positions are not measured.
+        rotation_deviation: Standard deviation of a measured rotation about each axis [rad], > 0, shape () or (3,); None
+            if rotations are not measured.
+        frame: Pose of the measuring system in the world: a point with measured coordinates p is at frame.position +
+            frame.matrix p. None for the axes of the world.
         target: The point of the platform whose position is measured, platform frame [m], shape (3,).
 
     Raises:
-        InvalidValueError: If a deviation is not positive, or something is of the wrong kind or shape.
+        InvalidValueError: If a deviation is not positive, or a value is of the wrong kind or shape.
 
     Examples:
         >>> import sagline as sl
@@ -98,7 +98,7 @@ class Sensors(_Replaceable):
 
 
 def reading_deviations(sensors: Sensors, cables: int) -> Array:
-    """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite for no sensor."""
+    """Standard deviations of lengths, load cells, position and rotation, (2 m + 6,); infinite without a sensor."""
     parts = (
         (sensors.length_deviation, cables),
         (sensors.tension_deviation, cables),
@@ -109,12 +109,12 @@ def reading_deviations(sensors: Sensors, cables: int) -> Array:
 
 
 def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
-    """Gain of a robot's load cells and their bias [N], (m,) or a number; those of ideal ones without winches."""
+    """Gain of a robot's load cells and their bias [N], (m,) or a number; ideal values without winches."""
     return (1.0, 0.0) if robot.winches is None else (robot.winches.load_cell_gain, robot.winches.load_cell_bias)
 
 
 _BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "time", "commanded")
-_UNIT = 1e-6  # by how much the length of a quaternion may be off: one printed with seven digits is taken
+_UNIT = 1e-6  # tolerance of the length of a quaternion: one printed with seven digits is accepted
 
 
 @frozen(eq=False, repr=False, weakref_slot=False)
@@ -122,23 +122,23 @@ class WinchLog(_Replaceable, Saved):
     """Readings of a robot at rest at N poses; NaN where a reading is missing.
 
     Attributes:
-        counts: Of the encoders, shape (N, m), or None; either these or lengths are there. A row without a count of
-            every cable is left out of a calibration.
+        counts: Encoder counts, shape (N, m), or None. Exactly one of counts and lengths is given. A row without the
+            count of every cable is left out of a calibration.
         unstrained_length: Reported lengths off the drums [m], shape (N, m), or None.
-        load_cells: Readings of the load cells at the frame ends [N], may be negative, shape (N, m), NaN for none; or
+        load_cells: Readings of the load cells at the frame ends [N], may be negative, shape (N, m), NaN if missing; or
             None.
-        position: Position of the target in the measuring system's axes [m], shape (N, 3), NaN for a coordinate that was
+        position: Position of the target in the axes of the measuring system [m], shape (N, 3), NaN for an unmeasured
+            coordinate; or None.
+        rotation: Rotation of the platform in these axes as unit quaternions, scalar last, shape (N, 4), rows of NaN if
             not measured; or None.
-        rotation: Of the platform in those axes as unit quaternions, scalar last, shape (N, 4), rows of NaN if not
-            measured; or None.
-        time: [s], shape (N,), in any order; or None.
-        commanded: Commanded poses, near those of the platform, N of them; or None.
-        sensors: Standard deviations of all readings; None for `Sensors()`, of lengths alone.
+        time: Time of each row [s], shape (N,), in any order; or None.
+        commanded: Commanded poses, near the actual ones, N of them; or None.
+        sensors: Standard deviations of all readings; None for `Sensors()`, which has length deviations only.
         source: Origin of the readings.
 
     Raises:
-        InvalidValueError: If both or none of counts and lengths are given, a field is of the wrong kind, shape or
-            range, or the sensors have no deviation of a reading.
+        InvalidValueError: If both or neither of counts and lengths are given, a field is of the wrong kind, shape or
+            range, or the sensors lack the standard deviation of a reading.
 
     Examples:
         >>> import numpy as np
@@ -166,7 +166,7 @@ class WinchLog(_Replaceable, Saved):
     source: str = ""
 
     def __attrs_post_init__(self) -> None:
-        """Check every field once, and that they fit together."""
+        """Check every field once, and the consistency of the fields."""
         name, unit_, values = _lengths_or_counts(self.counts, self.unstrained_length)
         read = _table(values, name, unit_, None, None)
         n, m = read.shape
@@ -186,7 +186,7 @@ class WinchLog(_Replaceable, Saved):
     def readings(self) -> Array:
         """The counts, or the lengths [m], shape (N, m)."""
         given = self.counts if self.counts is not None else self.unstrained_length
-        assert given is not None  # the constructor saw to it
+        assert given is not None  # checked by the constructor
         return given
 
     def __len__(self) -> int:
@@ -194,20 +194,20 @@ class WinchLog(_Replaceable, Saved):
         return len(self.readings)
 
     def rows(self, which: Flags | Indices | slice) -> WinchLog:
-        """The log of some of the rows.
+        """Log of some of the rows.
 
         Args:
-            which: Flags (N,), numbers of rows, or a slice.
+            which: Flags (N,), row indices, or a slice.
 
         Raises:
-            NoSuchEntryError: If it names no rows; it is an IndexError too.
+            NoSuchEntryError: If a row does not exist; it is an IndexError too.
         """
         part = part_of(which, (len(self),), "single row")
         part = np.array([part]) if isinstance(part, int) else part
         parts: dict[str, Any] = {name: values[part] for name in _BY_ROW if (values := getattr(self, name)) is not None}
         for values in parts.values():
             if isinstance(values, np.ndarray):
-                locked(values)  # ours: no need for another copy
+                locked(values)  # a new array: no copy needed
         return evolve(self, **parts)
 
     def __str__(self) -> str:
@@ -228,7 +228,7 @@ class WinchLog(_Replaceable, Saved):
 
 
 def _lengths_or_counts(counts: ArrayLike | None, lengths: ArrayLike | None) -> tuple[str, str, ArrayLike]:
-    """Name, unit and values of the one that is given."""
+    """Name, unit and values of the given one."""
     if (counts is None) == (lengths is None):
         value = "neither given" if counts is None else "both given"
         step = "Give what the drives report: counts, or lengths that they computed from them."
@@ -237,7 +237,7 @@ def _lengths_or_counts(counts: ArrayLike | None, lengths: ArrayLike | None) -> t
 
 
 def _table(value: ArrayLike, item: str, unit: str, rows: int | None, columns: int | None) -> Array:
-    """Readings, NaN where there is none."""
+    """Readings, with NaN for missing ones."""
     low = 0.0 if item == "unstrained_length" else -np.inf
     array = checked(value, item, unit, low=low, missing=True)
     fits = array.ndim == 2 and rows in (None, array.shape[0]) and columns in (None, array.shape[1])
@@ -251,7 +251,7 @@ def _table(value: ArrayLike, item: str, unit: str, rows: int | None, columns: in
 
 
 def _quaternions(given: Array) -> Array:
-    """Unit quaternions, with rows of NaN."""
+    """Unit quaternions; rows of NaN are kept."""
     missing = np.isnan(given)
     whole = ~missing.any(axis=1)
     length = np.linalg.norm(given, axis=1)
@@ -281,7 +281,7 @@ def _check_poses(pose: Pose | None, rows: int) -> None:
 
 
 def _check_sensors(log: WinchLog, cables: int) -> None:
-    """Refuse readings without a standard deviation, and deviations of other cables."""
+    """Reject readings without a standard deviation, and deviations for another number of cables."""
     pairs = (
         ("length_deviation", log.readings, cables),
         ("tension_deviation", log.load_cells, cables),

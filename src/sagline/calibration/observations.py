@@ -1,4 +1,4 @@
-"""Readings at equilibria: residuals and their slopes by the parameters, and lengths at encoder counts."""
+"""Readings at equilibria: residuals and their derivatives by the parameters, and lengths at encoder counts."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-STEP: Final = 1e-4  # of a drum radius or a zero, for differences: lengths are nearly linear in both
+STEP: Final = 1e-4  # relative step of a drum radius or a zero for differences: lengths are nearly linear in both
 SLOPES: Final = 3  # by length_zero, drum_radius and axial_stiffness, in the order of `kernels.calibration.observe`
-BLOCK: Final = 1 << 9  # poses at once: some 10 MB
-NO_LOAD: Final = locked(np.zeros((1, 6)))  # nothing pulls at the platform but its cables and its weight
+BLOCK: Final = 1 << 9  # number of poses per kernel call: some 10 MB
+NO_LOAD: Final = locked(np.zeros((1, 6)))  # only cable forces and weight act on the platform
 
 
 def lengths_at_counts(drums: Drums, counts: Array) -> Array:
@@ -35,18 +35,18 @@ def lengths_at_counts(drums: Drums, counts: Array) -> Array:
 
 
 def counts_at(drums: Drums, lengths: Array) -> Array:
-    """Counts, not rounded, at unstrained lengths off the drums [m], both (N, m)."""
+    """Counts (not rounded) at unstrained lengths off the drums [m], both (N, m)."""
     return drums.counts(lengths * (1.0 + drums.rest_strain))
 
 
 def has_drum_data(robot: Robot) -> bool:
-    """True if lengths follow from counts with what is known of the winches."""
+    """True if lengths follow from counts with the known data of the winches."""
     names = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")
     return robot.winches is not None and all(getattr(robot.winches, name) is not None for name in names)
 
 
 def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, lengths: Array) -> Array:
-    """Slopes of reported lengths (N, m) [m] by length_zero, drum_radius and axial_stiffness [m/N], (3, N, m)."""
+    """Derivatives of reported lengths (N, m) [m] by length_zero, drum_radius and axial_stiffness [m/N], (3, N, m)."""
     slopes = np.zeros((SLOPES, *lengths.shape))
     if counts is None or robot.winches is None:
         slopes[0] = 1.0
@@ -60,7 +60,7 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
         if with_radius:
             radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
             circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
-            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # of a helix, by the radius
+            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # of a helix, with respect to the radius
             turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
             slopes[1] = turns * turn_slope / (1.0 + strain)
         return slopes
@@ -74,23 +74,24 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
 
 
 def _known_field(of: Winch | Cable, name: str) -> Array:
-    """A field whose presence `drums_of` has checked."""
+    """Value of a field whose presence `drums_of` has checked."""
     return np.asarray(getattr(of, name))
 
 
 class WhitenedRows(NamedTuple):
     """Whitened observations at N equilibria: independent rows of one standard deviation each.
 
-    R is m + 6, or m where no system measures positions or rotations.
+    R is m + 6, or m if no system measures positions or rotations.
 
     Attributes:
-        matrix: Slopes by the internal parameters (logarithms where `logarithmic`), with the lengths following,
-            (N, R, P); rows without a reading are zero.
-        misfit: Readings less predictions, (N, R).
-        residual: As they are [N, m, rad], at the lengths given, (N, m + 6); NaN for none.
+        matrix: Derivatives by the internal parameters (logarithms where `logarithmic`), with the lengths adapted, (N,
+            R, P); rows without a reading are zero.
+        misfit: Readings minus predictions, (N, R).
+        residual: Residuals in physical units [N, m, rad] at the given lengths, (N, m + 6); NaN if missing.
         back: Change of the true lengths [m] by a misfit, (N, m, R).
-        motion: Of the platform about its center of mass [m, rad], world axes: by each true length, the last row by the
-            step along a direction, lengths following, (N, m + 1, 6); of no rows without a direction.
+        motion: Motion of the platform about its center of mass [m, rad], world axes. One row per true length, and a
+            last row for the step along a direction, with the lengths adapted, (N, m + 1, 6); no rows without a
+            direction.
     """
 
     matrix: Array
@@ -101,12 +102,12 @@ class WhitenedRows(NamedTuple):
 
 
 def _locked_view(array: Array) -> Array:
-    """The same numbers, write-locked and contiguous, as kernels are compiled for."""
+    """Write-locked contiguous view of an array, as the kernels are compiled for it."""
     return locked(np.ascontiguousarray(array).view())
 
 
 def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
-    """Sensors as the kernel takes them; the deviation of a missing sensor is infinite."""
+    """Sensors in the form of the kernel; a missing sensor has an infinite deviation."""
     m, (gain, bias) = robot.cable_count, load_cells_of(robot)
 
     def spread(value: Array | None, count: int) -> Array:
@@ -125,18 +126,18 @@ def _sensor_arrays(robot: Robot, sensors: Sensors) -> SensingArrays:
 
 
 class MachineTerms(NamedTuple):
-    """A robot with some numbers and its sensors, as the kernel takes them.
+    """A robot with parameter values and its sensors, in the form of the kernel.
 
     Attributes:
         robot: The robot with the parameter values.
         sensors: The sensors.
         offset: Offset of reported lengths [m], (m,).
-        drums: Its drums, where counts are read; else None.
-        terms: Cable model of the kernel.
+        drums: Drums if counts are read; else None.
+        terms: Cable model in the form of the kernel.
         body: body_table.
         cables: cable_table.
-        sensing: Sensors of the kernel.
-        slopes: Slopes of the values by the internal parameters, (P,).
+        sensing: Sensors in the form of the kernel.
+        slopes: Derivatives of the values by the internal parameters, (P,).
     """
 
     robot: Robot
@@ -153,8 +154,8 @@ class MachineTerms(NamedTuple):
 def machine_of(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
 ) -> MachineTerms:
-    """A robot and its sensors as the kernel takes them; refused if counts are read and drum data are missing."""
-    # pulleys and dead length that are unknown have slopes, even where the robot has none yet
+    """A robot and its sensors in the form of the kernel; an error if counts are read and drum data are missing."""
+    # unknown pulley radii and dead lengths have slopes, even if the robot has none yet
     routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     return MachineTerms(
         robot,
@@ -180,7 +181,8 @@ def whitened_rows(
 ) -> WhitenedRows:
     """Readings near equilibria to first order; NaN where the platform is not stable.
 
-    slopes: of the reported lengths (3, N, m), by `winch_slopes`. With a direction (P,) only the slopes along it, P = 1.
+    slopes: derivatives of reported lengths (3, N, m), by `winch_slopes`. With a direction (P,), only slopes along it, P
+        = 1.
     """
     count, m = lengths.shape
     factor, width = machine.slopes, len(parameters.names)
@@ -218,7 +220,7 @@ def whitened_rows(
 def predicted_rows(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, poses: Array, lengths: Array
 ) -> WhitenedRows:
-    """Slopes of readings by these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; no misfit."""
+    """Slopes of readings of these sensors at equilibria: pose rows and unstrained lengths (N, m) [m]; no misfit."""
     machine = machine_of(robot, model, parameters, sensors, np.zeros(robot.cable_count))
     counts = None if machine.drums is None else counts_at(machine.drums, lengths)
     slopes, count = winch_slopes(robot, parameters, counts, lengths), len(lengths)
@@ -228,11 +230,11 @@ def predicted_rows(
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
 
-_EXACT: Final = 1e-10  # m: deviation of lengths with which whitening changes nothing
+_EXACT: Final = 1e-10  # m: deviation of lengths that is too small to affect the whitening
 
 
 def _unit_sensors(sensors: Sensors) -> Sensors:
-    """The same sensors, all reading with a deviation of 1 in SI units, and exact lengths."""
+    """Sensors with all readings at a deviation of 1 in SI units, and exact lengths."""
     return Sensors(_EXACT, 1.0, 1.0, 1.0, frame=sensors.frame, target=sensors.target)
 
 
@@ -250,11 +252,11 @@ def unwhitened_slopes(
 
 
 class Reference(NamedTuple):
-    """A robot and its sensors in SI units, to compare readings with.
+    """A robot and its sensors in SI units, for comparison with readings.
 
     Attributes:
         model: Cable model.
-        machine: The robot with its sensors, as kernels take them.
+        machine: The robot with its sensors, in the form of the kernel.
         parameters: A placeholder; its slopes are not used.
     """
 
@@ -264,14 +266,14 @@ class Reference(NamedTuple):
 
 
 def reference_of(robot: Robot, model: CableModel, sensors: Sensors) -> Reference:
-    """A robot and its sensors, to compare readings with."""
+    """A robot and its sensors, for comparison with readings."""
     exact = _unit_sensors(sensors)
     parameters = parameters_of(robot, (Unknown("mass", deviation=1.0),), exact, counted=False)
     return Reference(model, machine_of(robot, model, parameters, exact, np.zeros(robot.cable_count)), parameters)
 
 
 def misfit_at(reference: Reference, readings: PoseReadings, pose: Array, lengths: Array) -> tuple[Array, Array]:
-    """Readings less predictions at one equilibrium [N, m, rad], (m + 6,), NaN for none; slopes by length (m + 6, m)."""
+    """Residuals at one equilibrium [N, m, rad], (m + 6,), NaN if missing; slopes by length (m + 6, m)."""
     slopes = np.zeros((SLOPES, 1, lengths.shape[1]))
     rows = whitened_rows(reference.machine, reference.parameters, readings, slopes, pose, lengths)
     return rows.residual[0], rows.back[0].T / _EXACT**2
