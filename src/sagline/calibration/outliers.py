@@ -1,4 +1,4 @@
-"""Outliers: poses that do not fit the rest, and the length, load cell or measured pose that is wrong there."""
+"""Outliers: poses that do not fit the rest, and the wrong length, load cell or measured pose at them."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from sagline.core.arrays import Array, Flags, Indices, locked
 from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 
-CHANCE: Final = 0.01  # of one outlier among all poses of a log that has none
-EXAMINED: Final = 100  # poses, the worst of them: where there are more, the calibration is wrong and not the poses
-_MOST: Final = 3  # errors at one pose; with more the pose as a whole is the outlier
-_CLEAR: Final = 3.0  # of the logarithm of the probability: closer explanations are not distinguished
-_REST: Final = 0.1  # of the squares that one thing explains: what the rest of the calibration may be wrong by
-_WORTH: Final = 20.0  # of the same, to first order: how much worse an explanation may be to be looked at closely
-_NONLINEAR: Final = 0.6  # of the same: of what is off by far, this share of the slopes is sufficient for a closer look
+CHANCE: Final = 0.01  # probability of one outlier among all poses of a log without errors
+EXAMINED: Final = 100  # number of worst poses; if more are bad, the calibration is wrong and not the poses
+_MOST: Final = 3  # largest number of errors at one pose; with more, the pose as a whole is the outlier
+_CLEAR: Final = 3.0  # difference in log probability: closer explanations are not distinguished
+_REST: Final = 0.1  # share of the squares that one error explains: allowance for errors of the calibration
+_WORTH: Final = 20.0  # ratio of squares, to first order: worse explanations are not computed exactly
+_NONLINEAR: Final = 0.6  # ratio of squares: large errors need only this linear improvement for an exact fit
 _DROP: Final = 500.0  # of chi squared
 _ITERATIONS: Final = 10
 _QUANTITIES: Final = ("length", "load cell", "position", "rotation")
-_TOLERANCE: Final = 1e-3  # of a sum of squares
+_TOLERANCE: Final = 1e-3  # of the sum of squares
 _HALVINGS: Final = 6
 
 
@@ -36,9 +36,9 @@ class _Suspect(NamedTuple):
     """A possible error at a pose.
 
     Attributes:
-        quantity: Of `Outlier`.
-        cable: Its number, or None.
-        which: Lengths, then readings that it changes, of 2 m + 6.
+        quantity: Quantity of the `Outlier`.
+        cable: Index of the cable, or None.
+        which: Indices among 2 m + 6 of the lengths and readings that the error changes.
     """
 
     quantity: str
@@ -47,12 +47,12 @@ class _Suspect(NamedTuple):
 
 
 class _SuspectFit(NamedTuple):
-    """The fit of a pose with the suspects off by what fits best.
+    """Best fit of a pose with free errors of the suspects.
 
     Attributes:
         squares: Remaining sum of squares.
         sizes: Error of each suspect.
-        deviations: The same in standard deviations.
+        deviations: Errors in standard deviations.
     """
 
     squares: float
@@ -65,11 +65,11 @@ class _Case(NamedTuple):
 
     Attributes:
         reference: The robot and its sensors.
-        deviation: Of lengths and readings, (2 m + 6,).
-        readings: Its readings, one row.
-        pose: Its pose row, (1, POSE_COLUMNS).
-        lengths: Its true lengths [m], (1, m).
-        read: Flags of the readings that were read, (m + 6,).
+        deviation: Standard deviations of lengths and readings, (2 m + 6,).
+        readings: Readings at the pose, one row.
+        pose: Pose row, (1, POSE_COLUMNS).
+        lengths: True lengths [m], (1, m).
+        read: Flags of the available readings, (m + 6,).
     """
 
     reference: Reference
@@ -80,13 +80,13 @@ class _Case(NamedTuple):
     read: Flags
 
     def misses(self) -> tuple[Array, Array]:
-        """Reported less true lengths, and readings less predictions, (2 m + 6,); slopes by length, (m + 6, m)."""
+        """Reported minus true lengths, and readings minus predictions, (2 m + 6,); slopes by length, (m + 6, m)."""
         residual, by_length = misfit_at(self.reference, self.readings, self.pose, self.lengths)
         return np.concatenate((self.readings.lengths[0] - self.lengths[0], residual)), by_length
 
 
 def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _SuspectFit:
-    """Best fit of a pose with any error of the suspects: linear with one iteration, else nonlinear."""
+    """Best fit of a pose with free errors of the suspects: linear with one iteration, else nonlinear."""
     which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
     counts = np.concatenate((np.ones(case.lengths.shape[1], dtype=np.bool_), case.read))
     counts[which] = False
@@ -103,14 +103,14 @@ def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _S
 
 
 def _squares(case: _Case, counts: Flags) -> float:
-    """Sum of squares of what counts."""
+    """Sum of squares of the terms that count."""
     return float(np.sum((case.misses()[0] / case.deviation)[counts] ** 2))
 
 
 def _linear_fit(
     case: _Case, taken: Sequence[_Suspect], which: Indices, counts: Flags
 ) -> tuple[_SuspectFit, Array, float]:
-    """The best fit by the slopes, the true lengths that it asks for (m,), and the sum of squares before it."""
+    """Best linear fit, its true lengths (m,), and the sum of squares before it."""
     misses, by_length = case.misses()
     m, read = case.lengths.shape[1], case.read
     slopes, variance = by_length[read], case.deviation[:m] ** 2
@@ -135,7 +135,7 @@ def _linear_fit(
 
 
 def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Case | None:
-    """The case at lengths on the way to those wanted, with a smaller sum of squares; None if there is none."""
+    """Case at lengths between the present and the wanted ones, with a smaller sum of squares; None if not found."""
     reference = case.reference
     for halving in range(_HALVINGS):
         lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
@@ -152,7 +152,7 @@ def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Cas
 
 
 def misfitting(squares: Array, readings: Indices) -> Indices:
-    """Rising indices of poses that chance does not explain, at most `EXAMINED`; squares (N,), NaN if unused."""
+    """Increasing indices of poses that chance does not explain, at most `EXAMINED`; squares (N,), NaN if unused."""
     known = np.where(np.isfinite(squares), squares, 0.0)
     bad = np.flatnonzero(known > exceeded_with(CHANCE / max(len(squares), 1), readings))
     return np.sort(bad[np.argsort(-known[bad], kind="stable")][:EXAMINED])
@@ -161,11 +161,11 @@ def misfitting(squares: Array, readings: Indices) -> Indices:
 def outliers_in(
     problem: FitProblem, state: SearchState, which: Indices, rows: Indices, *, count: int
 ) -> tuple[Outlier, ...]:
-    """Causes of misfit at some poses of a search, in the order of their rows of the log.
+    """Causes of misfit at some poses of a search, in the order of the rows of the log.
 
-    For every length, load cell and measured position or rotation of a pose: the error that explains the readings best.
-    The one that explains most is taken, then the one that explains most of the rest. Where several cables explain it
-    equally, or none does, the pose as a whole is the outlier.
+    For every length, load cell, measured position or rotation of a pose, the error that fits the readings best is
+    computed. The most explaining error is taken first, then the most explaining one of the rest. If several cables
+    explain the misfit equally well, or none does, the pose as a whole is the outlier.
     """
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = reported_lengths(problem, machine, slice(None))
@@ -195,7 +195,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         fits = [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
         if min(fit.squares for fit in fits) > _limit(
             case.read, (*taken, close[0]), count
-        ):  # none is right, or far from it
+        ):  # no explanation is right, or the linear fit is far from it
             likely = ~near_best & (np.array([fit.squares for fit in first]) < _NONLINEAR * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
             fits += [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in more]
@@ -220,21 +220,21 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
 
 
 def _limit(there: Flags, taken: Sequence[_Suspect], count: int) -> float:
-    """Sum of squares that chance lets the worst of so many poses have, with some suspects taken out."""
+    """Largest sum of squares that chance allows for the worst of `count` poses, without some suspects."""
     used = sum(len(one.which) for one in taken)
     return float(exceeded_with(CHANCE / count, int(there.sum()) - used))
 
 
 def _rarity(before: float, after: _SuspectFit, suspect: _Suspect) -> float:
-    """Logarithm of the probability that chance alone improves the fit so much."""
+    """Log probability that chance alone improves the fit by this amount."""
     half, drop = 0.5 * len(suspect.which), max(before - after.squares, 0.0)
     if drop < _DROP:
         return float(np.log(chdtrc(len(suspect.which), drop)))
-    return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # of its tail, which underflows
+    return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # of the tail, which underflows
 
 
 def _suspects(m: int, there: Flags) -> list[_Suspect]:
-    """All lengths and readings of a pose, as suspects."""
+    """All lengths and readings of a pose as suspects."""
     found = [_Suspect("length", cable, np.array([cable])) for cable in range(m)]
     found += [_Suspect("load cell", cable, np.array([m + cable])) for cable in range(m) if there[cable]]
     for quantity, first in (("position", m), ("rotation", m + 3)):
@@ -244,7 +244,7 @@ def _suspects(m: int, there: Flags) -> list[_Suspect]:
 
 
 def _whole(case: _Case, row: int, squares: float) -> Outlier:
-    """The pose as a whole, by the kind of reading that is the farthest off."""
+    """Outlier for the whole pose, with the reading of the largest error."""
     m = case.lengths.shape[1]
     off, _ = case.misses()
     parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))

@@ -22,15 +22,15 @@ class _Kind(NamedTuple):
     """A kind of unknown.
 
     Attributes:
-        owner: Part of the robot that has it as a field, "robot", "cables" or "winches"; "system" for what measures.
+        owner: Part of the robot with this field: "robot", "cables" or "winches"; "system" for the measuring system.
         unit: Its unit in SI.
-        first: Its first row of `kernels.calibration.kinds`.
+        first: First row of the kind in `kernels.calibration.kinds`.
         axes: Names of its components, ("",) for a single number.
-        each: True if every cable has its own.
-        shared: True if all cables share one number by default.
-        logarithmic: True if the logarithm is estimated: a positive number known to a share of itself.
-        deviation: Standard deviation of a drawing or data sheet, a share of the value where logarithmic.
-        assumed: The same of a value that the robot's source does not give.
+        each: True if every cable has its own value.
+        shared: True if all cables share one value by default.
+        logarithmic: True if the logarithm is estimated: a positive value with a relative deviation.
+        deviation: Standard deviation of a drawing or data sheet value, relative if logarithmic.
+        assumed: Standard deviation of a value that the robot's source does not give.
         needs: The readings that observe it: "counts", "load cells", "positions"; "" for any.
     """
 
@@ -74,7 +74,7 @@ class Unknown:
     Pulley radii and dead length have zero as a lower bound.
 
     Attributes:
-        name: Of `KINDS`.
+        name: Name of a kind in `KINDS`.
         shared: True if the cables share one value; None for the default of the kind.
         deviation: Standard deviation of the robot's value, in the unit of the kind (a share of the value for drum
             radius, linear density, axial stiffness and mass); infinite without a prior; None for that of the robot's
@@ -89,7 +89,7 @@ class Unknown:
         """Check name and deviation.
 
         Raises:
-            InvalidValueError: If there is no such kind, or the deviation is not positive.
+            InvalidValueError: If the kind does not exist, or the deviation is not positive.
         """
         object.__setattr__(self, "name", str(choice(self.name, "unknown", KINDS)))
         if self.deviation is not None:
@@ -103,13 +103,13 @@ class Parameters(Result):
     """The P parameters of a calibration.
 
     Attributes:
-        names: Kind of each, (P,).
-        labels: Name of each: "frame_anchors[3].x", "axial_stiffness", "measuring_frame.about z".
-        units: Of each.
-        cables: Cable of each, or -1 for those of all cables or of the platform.
+        names: Kind of each parameter, (P,).
+        labels: Name of each parameter, for example "frame_anchors[3].x", "axial_stiffness", "measuring_frame.about z".
+        units: Unit of each parameter.
+        cables: Cable of each parameter, or -1 for one of all cables or of the platform.
         where: Index of the parameter of each row of `kernels.calibration.kinds` and cable, (KIND_ROWS, m), -1 for none.
-        prior: Prior values, in their units, (P,).
-        prior_deviation: Their standard deviations in their units, (P,); infinite without a prior.
+        prior: Prior values, in the units of the parameters, (P,).
+        prior_deviation: Standard deviations of the priors, in the same units, (P,); infinite without a prior.
         stated: True where the robot's tolerances or the caller give the prior, (P,).
         logarithmic: True where the logarithm is estimated, (P,).
         counted: True if encoders count turns of drums; otherwise lengths are reported, and length_zero is their offset.
@@ -131,9 +131,10 @@ _NOTHING: Final = {"load_cell_gain": "1", "load_cell_bias": "0 N", "dead_cable":
 
 
 def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sensors, *, counted: bool) -> Parameters:
-    """Parameters of some kinds of unknowns in their order, of a kind by cable and axis.
+    """Parameters of some kinds of unknowns in their order; within a kind, by cable and axis.
 
-    Refused if an unknown comes twice, the robot has no such value, or neither a reading nor a stated prior observes it.
+    Raises an error for a repeated unknown, for a value that the robot lacks, and for an unknown with neither a reading
+    nor a stated prior.
     """
     m = robot.cable_count
     where = np.full((kinds.KIND_ROWS, m), -1, dtype=np.int64)
@@ -158,7 +159,7 @@ def parameters_of(robot: Robot, unknowns: Sequence[str | Unknown], sensors: Sens
 
 
 def checked_unknowns(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
-    """Unknowns as a list, each once, checked."""
+    """Checked list of unknowns without repetitions."""
     items = [unknowns] if isinstance(unknowns, str | Unknown) else _as_list(unknowns)
     if not items:
         raise InvalidValueError("unknowns", "none", "one at least", f"Name some of {', '.join(KINDS)}.")
@@ -171,7 +172,7 @@ def checked_unknowns(unknowns: Sequence[str | Unknown]) -> list[Unknown]:
 
 def _as_list(unknowns: Any) -> list[Any]:
     try:
-        if not isinstance(unknowns, Mapping):  # its values would be lost
+        if not isinstance(unknowns, Mapping):  # the values of a mapping would be lost
             return list(unknowns)
         raise TypeError
     except TypeError:
@@ -199,7 +200,7 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
 
 
 def _field(robot: Robot, name: str) -> Array | None:
-    """Values of a kind in a robot; None where it has none."""
+    """Values of a kind in a robot; None if the robot has none."""
     owner = KINDS[name].owner
     part = robot if owner == "robot" else getattr(robot, owner)
     value: Array | None = None if part is None else getattr(part, name)
@@ -225,7 +226,7 @@ def _refuse_unobserved(robot: Robot, sensors: Sensors, unknown: Unknown, kind: _
 
 
 def _is_shared(unknown: Unknown, kind: _Kind, own: Array, width: Array) -> bool:
-    """True if the cables share one number: it must be the same for all, and as well known."""
+    """True if the cables share one value, which requires equal values and equal deviations."""
     alike = bool((own == own[0]).all() and (width == width[0]).all())
     if unknown.shared is None:
         return kind.shared and alike
@@ -236,7 +237,7 @@ def _is_shared(unknown: Unknown, kind: _Kind, own: Array, width: Array) -> bool:
 
 
 def _prior_deviation(robot: Robot, unknown: Unknown, kind: _Kind, own: Array) -> tuple[Array, bool]:
-    """Prior deviation in the unit of the kind, shape of own, and whether it was stated."""
+    """Prior deviation in the unit of the kind, shape of `own`, and True if it was stated."""
     if unknown.deviation is not None:
         width = np.full(own.shape, unknown.deviation)
         return (width * np.abs(own) if kind.logarithmic else width), True
@@ -253,7 +254,7 @@ def _prior_deviation(robot: Robot, unknown: Unknown, kind: _Kind, own: Array) ->
 
 
 def internal(parameters: Parameters, values: Array) -> Array:
-    """Internal parameters (P,) of values: the logarithms of some."""
+    """Internal parameters (P,) of values: logarithms for the logarithmic ones."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(parameters.logarithmic, np.log(values), values)
 
@@ -265,7 +266,7 @@ def external(parameters: Parameters, numbers: Array) -> Array:
 
 
 def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
-    """Slopes of the values by the internal parameters (P,): the value itself for logarithms, else 1."""
+    """Derivatives of the values by the internal parameters (P,): the value itself for logarithms, else 1."""
     slopes = np.ones(len(parameters.names))
     for name in dict.fromkeys(parameters.names):
         kind = KINDS[name]
@@ -277,7 +278,7 @@ def slopes_of_values(robot: Robot, parameters: Parameters) -> Array:
 
 
 def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
-    """The robot with other parameter values (P,); refused if it cannot have them."""
+    """Robot with other parameter values (P,); an error if they are invalid."""
     changes: dict[str, dict[str, Any]] = {"cables": {}, "winches": {}, "robot": {}}
     for name in dict.fromkeys(parameters.names):
         kind = KINDS[name]
@@ -293,7 +294,7 @@ def with_values(robot: Robot, parameters: Parameters, values: Array) -> Robot:
 
 
 def sensors_with(sensors: Sensors, parameters: Parameters, values: Array) -> Sensors:
-    """The sensors with other values (P,) of frame and target; rotations count from the frame."""
+    """Sensors with other values (P,) of frame and target; rotations are relative to the given frame."""
     changes: dict[str, Any] = {}
     if "target" in parameters.names:
         changes["target"] = values[parameters.where[kinds.TARGET : kinds.TARGET + 3, 0]]

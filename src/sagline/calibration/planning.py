@@ -39,15 +39,15 @@ from sagline.robot.robot import Robot
 
 WIDTH: Final = 80
 COLUMNS: Final = (20, 9, 13, 13, 15)  # of the table of errors
-NARROW: Final = (16, 8, 9, 11, 13)  # the same in a narrow terminal
+NARROW: Final = (16, 8, 9, 11, 13)  # for a narrow terminal
 WIDE: Final = 2 + sum(COLUMNS)
-KILO: Final = 1e4  # N: tensions from here on are written in kN
-FAR: Final = 100.0  # m: positions from here on are written with one decimal less
+KILO: Final = 1e4  # N: larger tensions are written in kN
+FAR: Final = 100.0  # m: larger positions are written with one decimal less
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CalibrationPoses(Result, Saved):
-    """Result of `calibration_poses`, in an order that is short to drive.
+    """Result of `calibration_poses`, in the order of a short tour.
 
     Attributes:
         robot: The robot.
@@ -57,11 +57,12 @@ class CalibrationPoses(Result, Saved):
         frame_end_tension: Tensions at the frame ends [N], (N, m).
         unstrained_length: All cable off the drums [m], (N, m).
         expected_error: Standard error of each parameter, in its unit, (P,).
-        random_error: Median of the same of as many random poses, (P,).
+        random_error: Median standard errors of sets of equally many random poses, (P,).
         share_of_random: Ratio of the errors to those of random poses in the observable directions, geometric mean.
-            Single parameters hide it where the readings leave, say, the place of the world open.
-        gain: log det of the information of the first k poses, in the order of choosing, (N,).
-        enough: Number of poses from which on another one changes no error by more than a hundredth; N if none.
+            Errors of single parameters hide this ratio if the readings leave a direction open, such as a shift of the
+            world.
+        gain: log det of the information of the first k poses, in the order of the choice, (N,).
+        enough: Number of poses after which another one reduces no error by more than 1 %; N if there is no such number.
         most_helpful: Recommended measurement, in words.
     """
 
@@ -87,17 +88,17 @@ class CalibrationPoses(Result, Saved):
         return poses_text(self)
 
     def table(self) -> str:
-        """Poses and tensions, one a line."""
+        """Poses and tensions, one pose per line."""
         return poses_table(self)
 
 
 def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Expected errors of calibration poses, beside random ones, in lines of at most `width` columns."""
+    """Expected errors of calibration poses and of random ones, in lines of at most `width` columns."""
     return "\n".join((*_head(plan, width), *_errors(plan, width), *_advice(plan, width))).replace(SPACE, " ")
 
 
 def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Poses and tensions in the order to drive, one a line; more cables than fit continue in the next."""
+    """Poses and tensions in driving order, one pose per line; excess cables continue on the next line."""
     position, tension = plan.poses.position, plan.frame_end_tension
     angles = np.degrees(plan.poses.rotation.as_euler("ZYX"))
     decimals = 1 if np.abs(position).max() >= FAR else 2
@@ -122,7 +123,7 @@ def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
 
 
 def _column(head: str, values: Iterable[float], decimals: int) -> list[str]:
-    """A column of numbers below its head, all of one width."""
+    """Column of numbers below its heading, all of one width."""
     cells = [head, *(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)]
     width = 1 + max(map(len, cells))
     return [f"{cell:>{width}}" for cell in cells]
@@ -137,7 +138,7 @@ def _head(plan: CalibrationPoses, width: int) -> Iterator[str]:
 
 
 def _first_of_each(position: Array) -> Array:
-    """Flags of the poses that are not at the place of the one before."""
+    """Flags of the poses whose position differs from the previous one."""
     return np.asarray(np.concatenate(([True], (np.diff(position, axis=0) != 0.0).any(axis=1))))
 
 
@@ -154,7 +155,7 @@ def _sensors(plan: CalibrationPoses) -> Iterator[str]:
 
 
 def _errors(plan: CalibrationPoses, width: int) -> Iterator[str]:
-    """Root mean squares of the errors of each kind."""
+    """Lines with the root mean square errors of each kind."""
     names = np.array(plan.parameters.names)
     first, *others = COLUMNS if width >= WIDE else NARROW
     heads = (*zip(("numbers", "before", "afterwards", "random poses"), others, strict=True),)
@@ -186,10 +187,10 @@ def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
 
 MOST: Final = 1_000  # poses: more take days to measure
 MOST_CANDIDATES: Final = 20_000
-DRAWS: Final = 21  # of random poses, for a median
-ENOUGH: Final = 0.01  # of an error: a smaller improvement does not matter
-SEEN: Final = 3.0  # of the prior information: so much more lowers an error by half
-LOOSE: Final = 10.0  # usual deviations of an unknown value: the unit of a parameter without a prior
+DRAWS: Final = 21  # sets of random poses, for a median
+ENOUGH: Final = 0.01  # share of an error: a smaller improvement does not matter
+SEEN: Final = 3.0  # ratio to the prior information: this much more reduces an error by half
+LOOSE: Final = 10.0  # usual deviations of an unknown value: unit of a parameter without a prior
 _CATENARY: Final = Catenary()
 
 
@@ -204,7 +205,7 @@ def calibration_poses(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> CalibrationPoses:
-    """The poses and tension sets that are most informative of the unknowns, before any measurement.
+    """Most informative poses and tension sets for the unknowns, before any measurement.
 
     D-optimal choice among feasible poses of a box, each with several sets of tensions: greedy, with exchanges. Sets of
     tensions at one pose follow each other.
@@ -217,11 +218,11 @@ def calibration_poses(
             load_cell_deviation of the winches) and lengths with 0.5 mm.
         box: Box of poses; None for the robot's test_box.
         candidates: Number of poses and sets of tensions to choose from, `count` to 20,000.
-        seed: Of the candidates, and of the random poses to compare with.
-        progress: Called after every few candidates with the number of poses that are done, and of all.
+        seed: Seed of the candidates and of the random poses for comparison.
+        progress: Called after every few candidates with the number of finished poses and the number of all poses.
 
     Returns:
-        The poses, their tensions and lengths, and the errors to expect.
+        The poses, their tensions and lengths, and the expected errors.
 
     Raises:
         InvalidValueError: If there is no box, not enough of it is feasible, no reading observes the unknowns, or an
@@ -302,7 +303,7 @@ def _default_sensors(robot: Robot, tensions: Array) -> Sensors:
 
 
 def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
-    """Unit of each internal parameter, and the inverse of its prior deviation in it: 1, or less, or 0."""
+    """Unit of each internal parameter, and the inverse of its prior deviation in this unit: 1, less, or 0."""
     deviation = parameters.prior_deviation / np.abs(slopes)
     loose = np.array([LOOSE * KINDS[name].assumed for name in parameters.names])
     scale = np.fmin(deviation, loose)
@@ -310,13 +311,13 @@ def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
 
 
 def _read(rows: Array) -> Array:
-    """Rows of the sensors; where they observe nothing, one of zeros."""
+    """Rows of sensors that observe something; one row of zeros if there is none."""
     there = rows.any(axis=(0, 2))
     return np.ascontiguousarray(rows[:, there] if there.any() else rows[:, :1])
 
 
 def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: Array) -> None:
-    """Refuse too few poses, and unknowns without observations and prior."""
+    """Reject too few poses, and unknowns without observations and prior."""
     if len(rows) < count:
         value = f"{count}, with {len(rows)} of {tried} candidates feasible and stable"
         step = "Ask for fewer, raise candidates, or give a box of which more is feasible."
@@ -330,7 +331,7 @@ def _refuse(robot: Robot, parameters: Parameters, count: int, tried: int, rows: 
 
 
 def _driving_order(chosen: CandidatePoses) -> Indices:
-    """Order of a short tour of the positions, at each from the least sum of tensions to the largest."""
+    """Order of a short tour of the positions; at each position, by increasing sum of tensions."""
     _, first, place = np.unique(chosen.place, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
     rank[shortest_tour(chosen.poses[first, :3])] = np.arange(len(first))
@@ -345,7 +346,7 @@ def _random(rows: Array, usual: Flags, count: int, seed: int) -> list[Array]:
 
 
 def _share(known: Array, rows: Array, random: list[Array]) -> float:
-    """Ratio of errors to those of random poses, in directions whose errors these lower by half or more."""
+    """Ratio of errors to those of random poses, in directions whose errors the random poses reduce by half or more."""
     own, *others = (information_of(each) for each in (rows, *random))
     size, vectors = np.linalg.eigh(np.mean(others, axis=0))
     seen = vectors[:, size > SEEN]
@@ -356,7 +357,7 @@ def _share(known: Array, rows: Array, random: list[Array]) -> float:
 
 
 def _sufficient_count(choice: Choice) -> int:
-    """Number of poses from which on another one lowers no error by more than a hundredth."""
+    """Number of poses after which another one reduces no error by more than 1 %."""
     lowered = (1.0 - choice.deviation[1:] / choice.deviation[:-1]).max(axis=1)
     still = np.flatnonzero(lowered > ENOUGH)
     return int(still[-1]) + 2 if still.size else 1

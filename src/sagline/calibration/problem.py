@@ -21,19 +21,19 @@ from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
 _PAIRS: Final = 3  # measured points needed to align a measuring system
-_LINE: Final = 1e-3  # of its length: points nearer than that lie on a line
+_LINE: Final = 1e-3  # share of the length: points closer than this to a line count as collinear
 _NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds for which zero is usual
 
 
 class ReadingsTable(NamedTuple):
-    """Readings at N poses, NaN where there is none.
+    """Readings at N poses, NaN if missing.
 
     Attributes:
-        counts: Of the encoders, (N, m), or None.
-        lengths: Reported lengths [m], (N, m), or None; either these or counts are there.
-        cells: Of the load cells [N], (N, m).
-        positions: [m], (N, 3).
-        rotations: Unit quaternions, (N, 4).
+        counts: Encoder counts, (N, m), or None.
+        lengths: Reported lengths [m], (N, m), or None; exactly one of counts and lengths is given.
+        cells: Load cell readings [N], (N, m).
+        positions: Measured positions [m], (N, 3).
+        rotations: Measured rotations as unit quaternions, (N, 4).
     """
 
     counts: Array | None
@@ -44,7 +44,7 @@ class ReadingsTable(NamedTuple):
 
 
 def readings_table(log: WinchLog) -> ReadingsTable:
-    """The readings of a log with NaN in place of missing columns."""
+    """Readings of a log with NaN in place of missing columns."""
     count, m = log.readings.shape
     columns = ((log.load_cells, m), (log.position, 3), (log.rotation, 4))
     tables = (np.full((count, width), np.nan) if read is None else read for read, width in columns)
@@ -75,19 +75,19 @@ class FitProblem(NamedTuple):
 
     @property
     def prior_deviation(self) -> Array:
-        """Its standard deviation, (P,)."""
+        """Standard deviation of the prior, (P,)."""
         known, prior = self.parameters.prior_deviation, self.parameters.prior
         return np.asarray(known / np.where(self.parameters.logarithmic, prior, 1.0))
 
     def missed(self, numbers: Array) -> Array:
-        """Internal parameters less their prior, in its standard deviations, (P,)."""
+        """Internal parameters minus their prior, in prior standard deviations, (P,)."""
         return np.asarray((numbers - self.prior) / self.prior_deviation)
 
     @property
     def scale(self) -> Array:
         """Scale of each internal parameter (P,): the smaller of its prior and its usual deviation.
 
-        In wider units sums of squares are rounding where a number is well observed.
+        In wider units, sums of squares of well-observed parameters are lost in rounding.
         """
         usual = np.array([KINDS[name].assumed for name in self.parameters.names])
         return np.asarray(np.fmin(self.prior_deviation, usual))
@@ -120,10 +120,10 @@ class Normal(NamedTuple):
     Attributes:
         matrix: J^T W J of all poses, without the prior, (P, P).
         gradient: J^T W y, (P,).
-        squares: Sum of squares of each pose, infinite where the platform finds no equilibrium, (N,).
+        squares: Sum of squares of each pose, infinite without an equilibrium, (N,).
         readings: Number of readings at each pose, (N,).
-        weights: With which the poses count, (N,).
-        rows: Whitened readings of a log of one block; None of a longer one, where they are computed again.
+        weights: Weights of the poses, (N,).
+        rows: Whitened readings if the log has one block; None for a longer log, which computes them again.
     """
 
     matrix: Array
@@ -138,9 +138,9 @@ class Fit(NamedTuple):
     """Result of the least squares.
 
     Attributes:
-        state: The last one.
-        normal: Normal equations there.
-        converged: Whether it met the tolerance.
+        state: Last state.
+        normal: Normal equations at this state.
+        converged: True if the tolerance is met.
         iterations: Number of steps.
     """
 
@@ -154,7 +154,7 @@ Evaluated = tuple[SearchState, Normal]
 
 
 def machine_at(problem: FitProblem, numbers: Array) -> MachineTerms:
-    """The robot and its sensors with internal parameters (P,); refused if the robot cannot have them."""
+    """Robot and sensors with internal parameters (P,); an error if they are invalid for the robot."""
     values, parameters = external(problem.parameters, numbers), problem.parameters
     robot = with_values(problem.robot, parameters, values)
     sensors = sensors_with(problem.sensors, parameters, values)
@@ -163,7 +163,7 @@ def machine_at(problem: FitProblem, numbers: Array) -> MachineTerms:
 
 
 def reported_lengths(problem: FitProblem, machine: MachineTerms, part: slice) -> Array:
-    """Lengths reported by the winches [m], (n, m), of some of the poses."""
+    """Lengths reported by the winches [m], (n, m), for some of the poses."""
     log = problem.log
     if log.counts is not None and machine.drums is not None:
         return lengths_at_counts(machine.drums, log.counts[part])
@@ -172,10 +172,10 @@ def reported_lengths(problem: FitProblem, machine: MachineTerms, part: slice) ->
 
 
 def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
-    """Initial state: the priors, and the platform at commanded poses, or where the reported lengths put it.
+    """Initial state: the priors, with the platform at commanded poses or at those from the reported lengths.
 
-    True lengths are those that hold it there with the measured tensions: a millimeter of a steel cable is 90 N, so that
-    reported lengths say little of tensions before the anchors are known.
+    The true lengths hold the platform there with the measured tensions. One millimeter of a steel cable changes its
+    tension by 90 N, so reported lengths say little about tensions before the anchors are known.
     """
     numbers = problem.prior
     machine = machine_at(problem, numbers)
@@ -187,7 +187,7 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
 
 
 def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array) -> Array:
-    """Unstrained lengths [m] of cables with the measured tensions at poses; the reported ones without load cells."""
+    """Unstrained lengths [m] of cables with the measured tensions at poses; reported ones without load cells."""
     if problem.sensors.tension_deviation is None:
         return reported.copy()
     robot, cells = machine.robot, problem.log.cells
@@ -212,7 +212,7 @@ def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, repor
 
 
 def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commanded: Pose | None) -> Array:
-    """Initial pose rows: measured, else commanded, else by forward kinematics of the reported lengths."""
+    """Initial pose rows: measured, otherwise commanded, otherwise from forward kinematics of the reported lengths."""
     if commanded is not None:
         poses = np.array(pose_rows(commanded))
         poses = np.broadcast_to(poses, (len(reported), poses.shape[1])).copy()
@@ -220,7 +220,7 @@ def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commande
         found = search(machine.robot, problem.model, locked(reported.view()), NO_LOAD, None)
         poses = found.poses.copy()
     if np.any(problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0):
-        return poses  # the place of the measured points is not known yet
+        return poses  # the position of the measuring system is not known yet
     sensors, log = machine.sensors, problem.log
     turned = ~np.isnan(log.rotations).any(axis=1)
     placed = ~np.isnan(log.positions).any(axis=1)
@@ -235,9 +235,9 @@ def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commande
 
 
 def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
-    """The parameters with the measuring system aligned to the poses, if it is unknown and there are enough readings.
+    """Parameters with the measuring system aligned to the poses, if it is unknown and has enough readings.
 
-    Its rotation is the mean of those between the platform's and the measured ones, or that between measured points.
+    Its rotation is the mean rotation between platform and measured rotations, or the one between measured points.
     """
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:
@@ -260,7 +260,7 @@ def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
 
 
 def _spans(points: Array) -> bool:
-    """True if points (N, 3) lie on no line, so that they determine a rotation."""
+    """True if points (N, 3) are not collinear, so that they determine a rotation."""
     if len(points) < _PAIRS:
         return False
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

@@ -27,16 +27,16 @@ from sagline.statics.tables import pose_rows
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class PoseError(Result):
-    """Expected errors of poses, single or with a leading axis N.
+    """Expected errors of poses, for a single pose or with a leading axis N.
 
-    Errors of the platform with the calibrated robot's lengths for a commanded pose, by the covariance of all parameters
-    and the deviation of the winches' lengths.
+    Errors of the platform with the calibrated robot's lengths for a commanded pose. They follow from the covariance of
+    all parameters and the deviation of the winches' lengths.
 
     Attributes:
         pose: The commanded poses.
-        covariance: Of the displacement of the platform frame's origin and its rotation vector, world axes, shape
-            (..., 6, 6) [m^2, m rad, rad^2].
-        own_covariance: The same without the shift of the world and the rotation about the vertical that the poses of
+        covariance: Covariance of the displacement of the platform frame's origin and of its rotation vector, world
+            axes, shape (..., 6, 6) [m^2, m rad, rad^2].
+        own_covariance: Covariance without the shift of the world and the rotation about the vertical that the poses of
             the log have in common: errors relative to the robot itself.
     """
 
@@ -45,7 +45,7 @@ class PoseError(Result):
     own_covariance: Array
 
     def __str__(self) -> str:
-        """Errors in a line, root mean squares over the feasible poses."""
+        """Errors in one line, root mean squares over the feasible poses."""
         held = ~np.isnan(self.position)
         world, own, turn = (
             n(float(np.sqrt(np.mean(one[held] ** 2))), ".3g", unit) if held.any() else "–"
@@ -56,17 +56,17 @@ class PoseError(Result):
 
     @property
     def position(self) -> Array:
-        """Root of the mean square of the distance from the commanded position [m], shape (...)."""
+        """Root mean square distance from the commanded position [m], shape (...)."""
         return _root_of_trace(self.covariance[..., :3, :3])
 
     @property
     def own_position(self) -> Array:
-        """The same by own_covariance [m], shape (...)."""
+        """Root mean square distance from `own_covariance` [m], shape (...)."""
         return _root_of_trace(self.own_covariance[..., :3, :3])
 
     @property
     def rotation(self) -> Array:
-        """Root of the mean square of the angle [rad], shape (...)."""
+        """Root mean square angle [rad], shape (...)."""
         return _root_of_trace(self.covariance[..., 3:, 3:])
 
 
@@ -74,9 +74,9 @@ def _root_of_trace(covariance: Array) -> Array:
     return locked(np.asarray(np.sqrt(np.trace(covariance, axis1=-2, axis2=-1))))
 
 
-MOST = 300  # poses of a log from which the motion common to all of them is found
-_NEGLIGIBLE = 1e-12  # of the largest slope: smaller slopes are rounding
-_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # unknowns that move no platform
+MOST = 300  # poses of a log that determine the motion common to all of them
+_NEGLIGIBLE = 1e-12  # share of the largest slope: smaller slopes are rounding
+_WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # unknowns without effect on poses
 
 
 def motion_slopes(
@@ -89,7 +89,7 @@ def motion_slopes(
 
 
 def _common_motions(poses: Array) -> Array:
-    """Slopes of poses by a shift of the world and a rotation about the vertical, (N, 6, 4)."""
+    """Derivatives of poses by a shift of the world and a rotation about the vertical, (N, 6, 4)."""
     slopes = np.zeros((len(poses), 6, 4))
     slopes[:, :3, :3] = np.eye(3)
     slopes[:, 0, 3], slopes[:, 1, 3] = -poses[:, 1], poses[:, 0]
@@ -119,23 +119,24 @@ class Calibration(Findings, Saved):
         length_offset: Offset of reported lengths [m], shape (m,); zero where counts were read.
         status: Status of the calibration.
         parameters: The parameters and their priors.
-        values: Their values, in their units, (P,).
-        covariance: Of the values, (P, P); infinite on the diagonal without observations and a prior.
+        values: Values of the parameters, in their units, (P,).
+        covariance: Covariance of the values, (P, P); infinite on the diagonal without observations and a prior.
         chi_squared: Sum of squares of all residuals in standard deviations, priors included.
-        degrees_of_freedom: Expected value of chi_squared: readings and lengths less the estimated parameters.
+        degrees_of_freedom: Expected value of chi_squared: number of readings and lengths minus the estimated
+            parameters.
         rows: Rows of the log that were used, (N,).
-        left_out: Other rows of the log, by reason.
+        left_out: Omitted rows of the log, by reason.
         poses: Poses of the platform, N of them.
         unstrained_length: True lengths of the cables [m], (N, m).
-        residuals: Readings less predictions: lengths [m], load cells [N], position [m], rotation [rad], shape
-            (N, 2 m + 6); NaN where nothing was read.
-        chi_squared_of_pose: Of each pose, (N,).
-        weights: Of the poses: less than 1 for one that does not fit the rest, (N,).
+        residuals: Readings minus predictions: lengths [m], load cells [N], position [m], rotation [rad], shape (N, 2 m
+            + 6); NaN if missing.
+        chi_squared_of_pose: Chi squared of each pose, (N,).
+        weights: Weights of the poses: less than 1 for one that does not fit the rest, (N,).
         outliers: Readings that do not fit.
-        gauge: Unobservable directions; the priors decide along them.
+        gauge: Unobservable directions; along them the values follow from the priors.
         cannot_tell_apart: Weakly identifiable directions.
         cross_validation: Errors at poses left out; None without cross-validation.
-        iterations: Of the least squares.
+        iterations: Number of iterations of the least squares.
         model: Cable model.
         log: Origin of the readings.
         date: Date of the calibration, ISO 8601.
@@ -148,13 +149,13 @@ class Calibration(Findings, Saved):
             label: One of `parameters.labels`: "frame_anchors[3].x", "mass".
 
         Raises:
-            InvalidValueError: If there is no such label.
+            InvalidValueError: If the label does not exist.
         """
         k = self.parameters.labels.index(choice(label, "label", self.parameters.labels))
         return float(self.values[k]), float(self.standard_error[k])
 
     def __str__(self) -> str:
-        """Values with their standard errors and diagnostics, in lines of 80 columns, the verdict first."""
+        """Verdict, values with their standard errors, and diagnostics, in lines of 80 columns."""
         return summary.calibration_text(self)
 
     def pose_error(self, pose: Pose) -> PoseError:
@@ -170,7 +171,7 @@ class Calibration(Findings, Saved):
             PoseError; NaN where the pose is not feasible, infinite where it depends on an unobserved parameter.
 
         Raises:
-            InvalidValueError: If it is no pose, or outside the motion pattern of the robot.
+            InvalidValueError: If `pose` is not a pose, or is outside the motion pattern of the robot.
         """
         rows, shape = pose_rows(instance(pose, Pose, "pose")), pose.shape
         lengths = np.atleast_2d(inverse(self.robot, pose, model=self.model).unstrained_length)
@@ -186,15 +187,15 @@ class Calibration(Findings, Saved):
         """Pose of the platform at reported lengths, with its covariance.
 
         Args:
-            unstrained_length: [m], shape (m,) or (N, m); `length_offset` is added to them.
-            start: As of `forward`.
+            unstrained_length: Reported lengths [m], shape (m,) or (N, m); `length_offset` is added to them.
+            start: Initial pose, as in `forward`.
 
         Returns:
-            ForwardSolution of the calibrated robot; `covariance` is that of the parameters and of
-            `sensors.length_deviation` together, NaN where there is no solution.
+            ForwardSolution of the calibrated robot. Its `covariance` includes the parameters and
+            `sensors.length_deviation`; NaN without a solution.
 
         Raises:
-            InvalidValueError: As of `forward`.
+            InvalidValueError: For the same reasons as `forward`.
         """
         believed = numbers(unstrained_length, "unstrained_length", "m")
         lengths = believed if believed.shape[-1:] != self.length_offset.shape else believed + self.length_offset
@@ -214,14 +215,14 @@ class Calibration(Findings, Saved):
         return motion_slopes(self.robot, self.model, self.parameters, poses, lengths)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:
-        """Covariance of origin and rotation vector (N, 6, 6), by that of the values and of the winches' lengths."""
+        """Covariance of origin and rotation vector (N, 6, 6), from those of the values and of the winches' lengths."""
         size = np.abs(by_values).max(axis=(1, 2), keepdims=True)
         by_length = by_length * self.sensors.length_deviation
         known = _transformed_covariance(by_values, self.covariance, _NEGLIGIBLE * size)
         return np.asarray(known + by_length @ np.swapaxes(by_length, 1, 2))
 
     def _common_motion(self) -> Array:
-        """Shift of the world and rotation about the vertical that the poses of the log share, by the values, (4, P)."""
+        """Derivatives by the values of the world shift and vertical rotation common to the poses of the log, (4, P)."""
         poses = pose_rows(self.poses)
         part = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), MOST)).round().astype(np.int64))
         by_values = self._slopes(poses[part], np.atleast_2d(self.unstrained_length)[part])[0][:, :3]
@@ -231,5 +232,5 @@ class Calibration(Findings, Saved):
         return np.asarray(np.linalg.lstsq(motions, right, rcond=None)[0])
 
     def table(self) -> str:
-        """Every value with its standard error, its prior and its change, one a line."""
+        """Every value with its standard error, its prior and its change, one per line."""
         return summary.table(self)

@@ -1,4 +1,4 @@
-"""Screening of a log: rows fit for a calibration, and reasons for the others."""
+"""Screening of a log: rows that are suitable for a calibration, and reasons for the omission of the others."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ from sagline.kinematics.winches import lengths_from_counts
 from sagline.robot.robot import Robot
 
 SPEED_LIMIT: Final = 0.005  # m/s
-SOONEST: Final = 0.1 * (1.0 - 1e-9)  # s: over a shorter time a step of an encoder is as fast as a platform that moves
+SOONEST: Final = 0.1 * (1.0 - 1e-9)  # s: over a shorter time, one encoder step looks as fast as a moving platform
 LATEST: Final = 1.0  # s: over a longer time the platform may have stopped between two rows
 PULLING: Final = 3.0  # standard deviations above zero that a load cell must read
-OTHERWISE: Final = 0.5  # share of the rows from which on a reading of a load cell is missed in the others
+OTHERWISE: Final = 0.5  # share of the rows with a reading of a load cell above which the other rows must have it too
 
 
 def screen(
     robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT
 ) -> tuple[WinchLog, Indices, Mapping[Omission, Indices]]:
-    """Log of the rows at which the platform stood on taut cables and every sensor was read, once.
+    """Also returns the indices of these rows (N,), and those of the omitted rows by the first reason of each.
 
-    Beside it the numbers of these rows (N,), and those of the others by the first reason that each has.
+    These rows are left out, in this order: rows
 
     Left out, in this order, are rows
 
     - without a count or length of a cable, or without a reading of a load cell that more than half of the rows have
       (measured positions and rotations may be missing anywhere);
-    - whose readings are all those of an earlier row;
-    - at which a length changes faster than the limit [m/s], against the nearest row in time that is at least a tenth of
-      a second and at most a second away; without times no row is left out for this;
-    - where a load cell, less its bias, reads no more than three of its standard deviations: the cable may be slack.
+    - with exactly the readings of an earlier row;
+    - with a length that changes faster than the limit [m/s], compared with the nearest row in time that is at least a
+      tenth of a second and at most a second away; without times this check is skipped;
+    - with a load cell reading, minus bias, of at most three standard deviations: the cable may be slack.
 
-    Refused if the log has another number of cables, or counts do not give lengths.
+    Raises an error if the log has another number of cables, or counts do not give lengths.
     """
     limit = number(speed_limit, "speed_limit", "m/s", above=0.0)
     lengths = lengths_of(robot, log)
@@ -58,7 +58,7 @@ def screen(
 
 
 def lengths_of(robot: Robot, log: WinchLog) -> Array:
-    """Lengths off the drums (N, m) [m] of the readings of a log, NaN for none."""
+    """Lengths off the drums (N, m) [m] from the readings of a log, NaN if missing."""
     m = instance(robot, Robot, "robot").cable_count
     cables = instance(log, WinchLog, "log").readings.shape[1]
     if cables != m:
@@ -70,13 +70,13 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
         return lengths_from_counts(robot, log.counts)
     except InvalidValueError as error:
         where = error.item.replace("sample", "row") if len(log) > 1 else f"row 0, {error.item}"
-        if "count" not in error.item or "cable" not in error.item:  # a field of the robot, and no reading
+        if "count" not in error.item or "cable" not in error.item:  # the error concerns a field of the robot, not a reading
             raise
         raise InvalidValueError(where, error.value, error.allowed, error.next_step) from None
 
 
 def reading_count(log: WinchLog) -> int:
-    """Number of informative readings; lengths are not, as every row has as many unknown lengths as read ones."""
+    """Number of informative readings; lengths do not count, because every row has as many unknown lengths."""
     cells, positions, rotations = (
         0 if values is None else int(np.count_nonzero(~np.isnan(values)))
         for values in (log.load_cells, log.position, None if log.rotation is None else log.rotation[:, :3])
@@ -94,7 +94,7 @@ def _incomplete(log: WinchLog) -> Flags:
 
 
 def _repeated(log: WinchLog) -> Flags:
-    """Rows that have the readings of an earlier one, to the last bit."""
+    """Flags of rows whose readings equal those of an earlier row, bit by bit."""
     read = [v for v in (log.readings, log.load_cells, log.position, log.rotation) if v is not None]
     bits: list[NDArray[np.uint64]] = [np.ascontiguousarray(v + 0.0).view(np.uint64) for v in read]  # no -0.0
     digest = np.zeros(len(log), dtype=np.uint64)
@@ -105,7 +105,7 @@ def _repeated(log: WinchLog) -> Flags:
     earlier = first[inverse]
     found: Flags = earlier != np.arange(len(log))
     late = np.flatnonzero(found)
-    found[late] = np.all([(b[late] == b[earlier[late]]).all(axis=1) for b in bits], axis=0)  # not their digests alone
+    found[late] = np.all([(b[late] == b[earlier[late]]).all(axis=1) for b in bits], axis=0)  # compare the values, not only their digests
     return found
 
 
@@ -121,13 +121,13 @@ def _moving(log: WinchLog, lengths: Array, limit: float) -> Flags:
         step = np.abs(time[other] - time)
         there = (near == other) & (step <= LATEST)
         change = np.abs(length[other] - length).max(axis=1, initial=0.0)
-        moving[order[there & (change > limit * step)]] = True  # NaN, a row that is left out anyway, is not fast
+        moving[order[there & (change > limit * step)]] = True  # NaN compares false; such rows are left out anyway
     return moving
 
 
 def _slack(robot: Robot, log: WinchLog) -> Flags:
     if log.load_cells is None:
         return np.zeros(len(log), dtype=np.bool_)
-    assert log.sensors.tension_deviation is not None  # the log saw to it
+    assert log.sensors.tension_deviation is not None  # checked by the log
     _, bias = load_cells_of(robot)
     return np.asarray((log.load_cells - bias <= PULLING * log.sensors.tension_deviation).any(axis=1))

@@ -1,4 +1,4 @@
-"""The search of a calibration: poses that end in another equilibrium get a second chance, or are left out."""
+"""Search of a calibration: poses that converge to another equilibrium are restarted once, then left out."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from sagline.kinematics.forward import search
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.pose import Pose
 
-STRANGE: Final = 1e-9  # probability of a sum of squares that noise does not reach
-FEW: Final = 0.1  # of the poses: with more at another equilibrium, slipped cables are not the cause
-FAR: Final = 0.03  # m from the pose by the reported lengths: another equilibrium
+STRANGE: Final = 1e-9  # probability of a sum of squares: smaller ones are not caused by noise
+FEW: Final = 0.1  # share of the poses: if more are at another equilibrium, slipped cables are not the cause
+FAR: Final = 0.03  # m from the pose by the reported lengths: beyond it another equilibrium
 
 
 class SearchResult(NamedTuple):
     """Result of the search for all parameters.
 
     Attributes:
-        fit: The last one.
+        fit: Last fit.
         kept: Poses that count, (N,).
-        left_out: The others, by reason.
+        left_out: Omitted poses, by reason.
     """
 
     fit: Fit
@@ -92,7 +92,7 @@ def _without_equilibrium(current: Evaluated) -> Flags:
 
 
 def _improbable(fit: Fit, kept: Flags) -> Flags:
-    """Flags of the poses whose misfit no noise explains, (N,)."""
+    """Flags of the poses whose misfit noise does not explain, (N,)."""
     limit = exceeded_with(STRANGE, fit.normal.readings)
     return np.asarray(kept & (fit.normal.squares > limit))
 
@@ -109,7 +109,7 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses, among few ones, that fit except for single cables: outliers of little weight."""
+    """Flags of the poses, among a few, that fit except for single cables: outliers with a small weight."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))
@@ -118,7 +118,7 @@ def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags
 
 
 def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses, among some, far from those by forward kinematics of the reported lengths, (N,)."""
+    """Flags of the poses, among some, that are far from those by forward kinematics of the reported lengths, (N,)."""
     reported = reported_lengths(problem, state.machine, slice(None))[which]
     found = search(state.machine.robot, problem.model, locked(reported), NO_LOAD, None)
     far = which.copy()
@@ -129,10 +129,10 @@ def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) ->
 def cross_validate(
     problem: FitProblem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
-    """Calibrate without each part of the poses, and predict their readings from the reported lengths.
+    """Calibrate without each part of the poses, and predict the readings of this part from the reported lengths.
 
-    Parts are runs of consecutive poses, so that rows of one pose with several tensions stay together. None where there
-    are fewer than two poses.
+    Parts are runs of consecutive poses, so that rows of one pose with several tensions remain together. None for fewer
+    than two poses.
     """
     places = np.flatnonzero(found.kept)
     folds = min(folds, len(places))
@@ -152,25 +152,25 @@ def cross_validate(
     tension, position = _root_mean_squares(now)
     tension_before, position_before = _root_mean_squares(before)
     if (problem.parameters.where[kinds.SHIFT : kinds.TARGET + 3, 0] >= 0).any():
-        position_before = np.nan  # the measuring system was not known before
+        position_before = np.nan  # unknown measuring system before the calibration
     return CrossValidation(folds, tension, position, tension_before, position_before)
 
 
 def _root_mean_squares(sums: Array) -> tuple[float, float]:
-    """Root mean squares of load cells [N] and positions [m], NaN for none, of sums by `_prediction_errors`."""
+    """Root mean squares of load cells [N] and positions [m], NaN if missing, from sums by `_prediction_errors`."""
     cells, cell_count, positions, position_count = sums.tolist()
     tension = float(np.sqrt(cells / cell_count)) if cell_count else np.nan
     return tension, float(np.sqrt(positions / position_count)) if position_count else np.nan
 
 
 def _prediction_errors(problem: FitProblem, machine: MachineTerms, starts: Array, which: Flags, whole: slice) -> Array:
-    """Squared errors of predictions from reported lengths: sum and count of load cells, and of positions, (4,)."""
+    """Squared errors of predictions from reported lengths: sum and count for load cells and for positions, (4,)."""
     sums = np.zeros(4)
     for own in blocks(whole.stop - whole.start, BLOCK):
         part = slice(whole.start + own.start, whole.start + own.stop)
         try:
             reported = reported_lengths(problem, machine, part)
-        except InvalidValueError:  # counts run off drums that are too wrong
+        except InvalidValueError:  # lengths out of range because the drum data are too wrong
             continue
         there = which[part] & np.isfinite(reported).all(axis=1) & (reported > 0.0).all(axis=1)
         asked = locked(np.where(there[:, None], reported, np.nan))

@@ -14,14 +14,14 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
-MOST_OUTLIERS: Final = 12  # that are listed; the rest are counted
-MOST_ROWS: Final = 8  # of the log that are named; the rest are counted
+MOST_OUTLIERS: Final = 12  # listed ones; the rest are counted
+MOST_ROWS: Final = 8  # listed rows of the log; the rest are counted
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
 
 def calibration_text(found: Findings, width: int = WIDTH) -> str:
-    """A calibration in lines of at most `width` columns, the verdict first."""
+    """Text of a calibration in lines of at most `width` columns, verdict first."""
     parts = (
         _verdict(found, width),
         _rows(found, width),
@@ -35,7 +35,7 @@ def calibration_text(found: Findings, width: int = WIDTH) -> str:
 
 
 def table(found: Findings) -> str:
-    """Every value with its standard error and its prior, one a line."""
+    """Every value with its standard error and its prior, one per line."""
     numbers = found.parameters
     head = ("number", "found", "before", "moved by, of the error before")
     rows = [head]
@@ -59,7 +59,7 @@ def outlier_text(outlier: Outlier) -> str:
 
 
 def row_ranges(rows: Sequence[int] | Indices) -> str:
-    """Rising numbers of rows as ranges: "rows 3, 17 to 19 and 5 more"."""
+    """Increasing row indices as ranges: "rows 3, 17 to 19 and 5 more"."""
     spans: list[list[int]] = []
     for row in map(int, rows):
         if spans and row == spans[-1][1] + 1:
@@ -73,7 +73,7 @@ def row_ranges(rows: Sequence[int] | Indices) -> str:
 
 
 def chi_squared_text(found: Findings) -> str:
-    """Chi squared beside its expected value."""
+    """Chi squared and its expected value."""
     freedom = found.degrees_of_freedom
     if freedom <= 0:
         return f"chi squared {n(found.chi_squared, '.4g')} without degrees of freedom: nothing confirms the values"
@@ -82,7 +82,7 @@ def chi_squared_text(found: Findings) -> str:
 
 
 def _verdict(found: Findings, width: int) -> Iterator[str]:
-    """Verdict; doubts come first."""
+    """Lines of the verdict; doubts come first."""
     source = found.log or "the log"
     what = f"{len(found.values)} numbers of {found.robot.name} from {counted(len(found.rows), 'pose')} of {source}"
     when = f", {found.date}" if found.date else ""
@@ -100,7 +100,7 @@ def _verdict(found: Findings, width: int) -> Iterator[str]:
 
 
 def _rows(found: Findings, width: int) -> Iterator[str]:
-    """Number of rows used, and the reasons for the others."""
+    """Lines with the number of used rows, and the reasons for the omission of the others."""
     left = {reason: rows for reason, rows in found.left_out.items() if len(rows)}
     count = sum(map(len, left.values()))
     if not count:
@@ -112,7 +112,7 @@ def _rows(found: Findings, width: int) -> Iterator[str]:
 
 
 def _values(found: Findings, width: int) -> Iterator[str]:
-    """Values by kinds."""
+    """Lines with the values by kind."""
     yield "Values ± standard errors:"
     numbers = found.parameters
     for name in dict.fromkeys(numbers.names):
@@ -132,7 +132,7 @@ def _values(found: Findings, width: int) -> Iterator[str]:
 
 
 def _moved(found: Findings, mine: list[int]) -> str:
-    """Largest change among some numbers, and its cable."""
+    """Text of the largest change among some parameters, and its cable."""
     numbers = found.parameters
     moved = np.abs(found.values[mine] - numbers.prior[mine])
     units = {numbers.units[k] for k in mine}
@@ -145,7 +145,7 @@ def _moved(found: Findings, mine: list[int]) -> str:
 
 
 def _coordinates(found: Findings, name: Anchors, columns: int) -> Iterator[str]:
-    """The anchors, one a line, and how well they are known relative to one another."""
+    """Lines with the anchors, one per line, and their errors relative to one another."""
     first = KINDS[name].first
     where = found.parameters.where[first : first + 3].T.astype(np.int64)
     anchors = getattr(found.robot, name)
@@ -174,7 +174,7 @@ def _coordinates(found: Findings, name: Anchors, columns: int) -> Iterator[str]:
 
 
 def _cell(found: Findings, k: int) -> str:
-    """One number, by its cable or its axis."""
+    """Text of one value, with its cable or axis."""
     numbers = found.parameters
     _, _, axis = numbers.labels[k].partition(".")
     cable = int(numbers.cables[k])
@@ -183,7 +183,7 @@ def _cell(found: Findings, k: int) -> str:
 
 
 def _in_columns(cells: list[str], columns: int) -> Iterator[str]:
-    """Cells beside each other, as many as a line holds."""
+    """Cells in columns, as many as fit in a line."""
     width = max(map(len, cells)) + 3
     each = max((columns - 4) // width, 1)
     for start in range(0, len(cells), each):
@@ -191,7 +191,7 @@ def _in_columns(cells: list[str], columns: int) -> Iterator[str]:
 
 
 def _directions(directions: Sequence[Direction], head: str, width: int) -> Iterator[str]:
-    """Directions, those with one step together, with the share of their priors that is left."""
+    """Lines of directions, grouped by step, with the remaining share of their priors."""
     if not directions:
         return
     yield from _wrapped(head, width)
@@ -203,7 +203,7 @@ def _directions(directions: Sequence[Direction], head: str, width: int) -> Itera
 
 
 def _together(directions: Sequence[Direction]) -> Iterator[str]:
-    """Names, those that differ in their last word alone as one, with what is left of their priors."""
+    """Names with the remaining share of the prior; names that differ only in the last word are joined."""
     ends: dict[tuple[str, str], list[str]] = {}
     for one in directions:
         head, _, end = one.name.rpartition(" ")
@@ -213,12 +213,12 @@ def _together(directions: Sequence[Direction]) -> Iterator[str]:
 
 
 def _outliers(found: Findings, width: int) -> Iterator[str]:
-    """Outliers, with the position of the platform."""
+    """Lines of outliers, with the position of the platform."""
     if not found.outliers:
         yield "Outliers: none"
         return
     place = {int(row): k for k, row in enumerate(found.rows)}
-    less = (found.weights < 1.0).any()  # not of a calibration with robust=False
+    less = (found.weights < 1.0).any()  # no pose has less weight with robust=False
     yield f"Outliers, {len(found.outliers)}{'; their poses count less' if less else ''}:"
     for outlier in found.outliers[:MOST_OUTLIERS]:
         at = ""
@@ -247,12 +247,12 @@ def _cross_validation(found: Findings, width: int) -> Iterator[str]:
 
 
 def _wrapped(text: str, width: int, indent: str = "", further: str = "") -> list[str]:
-    """A sentence in lines."""
+    """Lines of a wrapped sentence."""
     return wrap(text, width, initial_indent=indent, subsequent_indent=further or indent + "  ", break_on_hyphens=False)
 
 
 Anchors = Literal["frame_anchors", "platform_anchors"]
-_TURNS: Final = {"frame_anchors": (2,), "platform_anchors": (0, 1, 2)}  # axes about which nothing would notice
+_TURNS: Final = {"frame_anchors": (2,), "platform_anchors": (0, 1, 2)}  # axes of rotations that no reading observes
 
 
 def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors) -> Array | None:
@@ -272,7 +272,8 @@ def without_motion(points: Array, which: Anchors) -> Array:
     """Projection (3 m, 3 m) of small changes of anchors (m, 3) without their common rigid motion.
 
     Removed are shifts and rotations that no reading observes: of the frame about the vertical, of the platform about
-    all axes, as its anchors define its own (S-transformation with all anchors alike, Baarda 1973).
+    all axes, because its anchors define its own frame (S-transformation with equal weights of all anchors, Baarda
+    1973).
     """
     m = len(points)
     ways = [np.tile(axis, m) for axis in np.eye(3)]

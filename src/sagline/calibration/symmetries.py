@@ -1,7 +1,7 @@
 """Symmetries of a robot: changes that no reading observes, as directions of the parameters.
 
-The origins of the world and of the platform's frame, the meter and the newton are conventions: another choice changes
-every parameter that depends on it, and no reading. docs/model.md, section 14.
+The origins of the world and of the platform frame, the meter and the newton are conventions: another choice changes
+every parameter that depends on it, but no reading. docs/model.md, section 14.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ _FORCE: Final = "weigh the platform, or check a load cell with a known weight"
 
 
 class Generator(NamedTuple):
-    """A change of all parameters that no reading observes if all may change.
+    """A change of all parameters that no reading observes if all of them may change.
 
     Attributes:
         name: Name of the quantity.
-        step: Measurement that removes it.
-        change: Of every number of `kernels.calibration.kinds`, (KIND_ROWS, m), logarithms where these are looked for.
+        step: Measurement that fixes the quantity.
+        change: Change of every row of `kernels.calibration.kinds`, (KIND_ROWS, m); of the logarithm if that is
+            estimated.
         lengths: Relative change of the lengths off the drums.
     """
 
@@ -47,13 +48,13 @@ class Generator(NamedTuple):
 
 
 class Symmetries(NamedTuple):
-    """Symmetries of a robot, g of them with the freedoms of its drums.
+    """g symmetries of a robot, including the free parameters of its drums.
 
     Attributes:
-        each: Those with a name, before the others.
+        each: Symmetries with a name, which come first.
         table: Change of every row of `kinds`, (KIND_ROWS, m, g).
-        lengths: Lengths that the drums pay out too much, which must vanish, (2 m, g).
-        matters: Parameters that must not change where they are known, (KIND_ROWS, m).
+        lengths: Excess lengths that the drums pay out, which must vanish, (2 m, g).
+        matters: Parameters that must not change if they are known, (KIND_ROWS, m).
     """
 
     each: tuple[Generator, ...]
@@ -63,7 +64,7 @@ class Symmetries(NamedTuple):
 
 
 def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) -> Symmetries:
-    """Symmetries of a robot and its sensors, the most general first; turn: rotation vector of the frame [rad], (3,)."""
+    """Symmetries of a robot and its sensors, most general first; turn: rotation vector of the frame [rad], (3,)."""
     m, turning = robot.cable_count, bool(robot.freedom[:, 3:].any())
     each = [_scale(robot, sensors), _force(robot), _yaw(robot, sensors, turn)]
     each += [_turned(robot, sensors, axis) for axis in range(3)]
@@ -80,16 +81,16 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
     matters[kinds.PER_CABLE :, 1:] = False
-    matters[kinds.SHIFT :] = False  # few measured points leave open what many do not: the readings decide
+    matters[kinds.SHIFT :] = False  # a few measured points leave more directions open than many do: the readings determine which
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False
-    if not turning:  # its mass may be anywhere
+    if not turning:  # without rotations, the center of mass has no effect
         matters[kinds.CENTER : kinds.CENTER + 3] = False
     return Symmetries(tuple(each), table, np.concatenate((shift, share - asked)), matters)
 
 
 def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
-    """Coefficients a [m] and b of the length off each drum, a + b L, by every row of `kinds`, (KIND_ROWS, m)."""
+    """Coefficients a [m] and b of the length off each drum, a + b L, for every row of `kinds`, (KIND_ROWS, m)."""
     shift, share = np.zeros((2, kinds.KIND_ROWS, robot.cable_count))
     if not counted:
         shift[kinds.ZERO] = 1.0
@@ -97,10 +98,10 @@ def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
     drums = drums_of(robot)
     stretch, zero = 1.0 + drums.rest_strain, drums.winches.length_zero
     radius, diameter, pitch = drums.winches.drum_radius, robot.cables.diameter, drums.winches.groove_pitch
-    if zero is None or radius is None or diameter is None or pitch is None:  # which counts need
+    if zero is None or radius is None or diameter is None or pitch is None:  # counts need these data
         raise InvalidValueError("robot", "without counts", "with drums and their zeros", "Give them in the robot file.")
     circle = (2.0 * np.pi * (radius + 0.5 * diameter)) ** 2
-    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # of a turn, by the logarithm
+    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # length of one turn, derivative by the logarithm of the radius
     shift[kinds.ZERO] = 1.0 / stretch
     shift[kinds.DRUM], share[kinds.DRUM] = -by_radius * zero / stretch, by_radius
     share[kinds.STIFFNESS] = drums.rest_strain / stretch
@@ -132,14 +133,14 @@ def _platform_shift(robot: Robot, axis: int) -> Generator:
 
 
 def _cable_shift(robot: Robot, cable: int, axis: int) -> Generator:
-    """Of a platform that cannot turn."""
+    """Shift of one cable of a platform that cannot rotate."""
     change = _empty(robot)
     change[[kinds.FRAME + axis, kinds.PLATFORM + axis], cable] = 1.0
     return Generator(f"both anchors of cable {cable} shifted along {_AXES[axis]}", _BOTH, change)
 
 
 def _turned(robot: Robot, sensors: Sensors, axis: int) -> Generator:
-    """About the center of mass, which stays where it is."""
+    """Rotation of the platform frame about the center of mass, which keeps its position."""
     change, unit = _empty(robot), np.eye(3)[axis]
     change[kinds.PLATFORM : kinds.PLATFORM + 3] = np.cross(unit, robot.platform_anchors - robot.center_of_mass).T
     change[kinds.TARGET : kinds.TARGET + 3] = np.cross(unit, sensors.target - robot.center_of_mass)[:, None]
@@ -147,7 +148,7 @@ def _turned(robot: Robot, sensors: Sensors, axis: int) -> Generator:
 
 
 def _scale(robot: Robot, sensors: Sensors) -> Generator:
-    """Everything larger, of cables lighter by the meter: forces stay."""
+    """Scale of all lengths, with lighter cables per meter: forces do not change."""
     change = _empty(robot)
     change[kinds.FRAME : kinds.FRAME + 3] = robot.frame_anchors.T
     change[kinds.PLATFORM : kinds.PLATFORM + 3] = robot.platform_anchors.T
@@ -161,7 +162,7 @@ def _scale(robot: Robot, sensors: Sensors) -> Generator:
 
 
 def _force(robot: Robot) -> Generator:
-    """Everything heavier and stiffer, as load cells of less gain read it."""
+    """Scale of all masses and stiffnesses, with a smaller gain of the load cells."""
     change = _empty(robot)
     change[[kinds.DENSITY, kinds.STIFFNESS, kinds.MASS]] = 1.0
     change[kinds.GAIN] = -1.0 if robot.winches is None else -robot.winches.load_cell_gain

@@ -13,22 +13,22 @@ from sagline.calibration.identifiability import PriorUnits, easiest_measurement,
 from sagline.calibration.parameters import Parameters
 from sagline.core.arrays import Array, Flags, Indices, locked
 
-LITTLE: Final = 0.5  # of the prior's deviation: where more is left, the readings said little
-ALIKE: Final = 0.98  # correlation: beyond it two numbers are known five times worse than their sum or difference
-_MOST: Final = 0.8  # of a direction's square, which the numbers that name it must have
+LITTLE: Final = 0.5  # share of the prior's deviation: if more is left, the readings are not informative
+ALIKE: Final = 0.98  # correlation: above it two parameters are known five times worse than their sum or difference
+_MOST: Final = 0.8  # share of a direction's square that the named parameters must have
 _NAMES: Final = 3
-_SINGULAR: Final = 1e-10  # of all variances: numbers that do alike to so much are one
+_SINGULAR: Final = 1e-10  # share of all variances: parameters with so similar effects count as one
 _TINY: Final = 1e-300
 
 
-Groups = dict[str, Indices]  # indices of the parameters of one kind and axis, by "frame_anchors z" for instance
+Groups = dict[str, Indices]  # indices of the parameters of one kind and axis, by name such as "frame_anchors z"
 
 
 def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direction, ...]) -> tuple[Direction, ...]:
     """Weakly identifiable directions, without the unobservable ones.
 
-    Directions with more than `LITTLE` of the prior deviation left, the least known first; then parameters with a
-    correlation beyond `ALIKE`, and single parameters that those of all cables substitute.
+    First come directions with more than `LITTLE` of the prior deviation left, least known first. Then follow pairs of
+    parameters with a correlation above `ALIKE`, and single parameters that those of all cables substitute.
     """
     frame = prior_units(parameters)
     complement = _complement(frame, gauge)
@@ -43,7 +43,7 @@ def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direct
 
 
 def _complement(frame: PriorUnits, gauge: tuple[Direction, ...]) -> Array:
-    """Orthonormal directions that are unknown and observable, in standard deviations of the priors, (P, k)."""
+    """Orthonormal basis of the unknown and observable directions, in prior standard deviations, (P, k)."""
     count = len(frame.scale)
     fixed = np.eye(count)[:, np.setdiff1d(np.arange(count), frame.free)]
     left = np.array([one.vector / frame.units for one in gauge]).reshape(len(gauge), count).T
@@ -64,7 +64,7 @@ def _groups(parameters: Parameters, frame: PriorUnits) -> Groups:
 def _little_observed(
     triangle: Array, seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: Groups
 ) -> list[Direction]:
-    """Directions with little information; those of the same parameters are one, with their count."""
+    """Directions with little information; those of the same parameters are joined, with their count."""
     _, sizes, rows = np.linalg.svd(seen, full_matrices=True)
     sizes = np.concatenate((sizes, np.zeros(len(rows) - len(sizes))))
     left = 1.0 / np.hypot(1.0, sizes)
@@ -88,9 +88,9 @@ def _little_observed(
 
 
 def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices, member: Array) -> tuple[str, ...]:
-    """Names of a direction (P,): kinds of parameters, or the axis or single parameter that has nearly all of it.
+    """Names of a direction (P,): kinds of parameters, or the axis or parameter that has nearly all of it.
 
-    kinds: rank of each parameter's kind (P,); member: 1 where a group has a parameter, else 0, (g, P).
+    kinds: rank of each parameter's kind (P,); member: 1 if a group has the parameter, else 0, (g, P).
     """
     square = vector**2
     shares = np.bincount(kinds, square, minlength=kinds.max() + 1)
@@ -111,7 +111,7 @@ def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices
 
 
 def _substitutes(scaled: Array, index: int, groups: Groups) -> tuple[str, ...]:
-    """One or two other groups whose effect on the readings is nearly that of a parameter."""
+    """One or two other groups whose effect on the readings is nearly the same as that of a parameter."""
     others = [name for name, members in groups.items() if index not in members]
     for count in (1, 2):
         best: tuple[str, ...] = ()
@@ -131,7 +131,7 @@ def _substitutes(scaled: Array, index: int, groups: Groups) -> tuple[str, ...]:
 def _correlated_pairs(
     seen: Array, complement: Array, parameters: Parameters, frame: PriorUnits, groups: Groups
 ) -> list[Direction]:
-    """Correlated pairs of parameters, the worst of each two groups; and single ones with groups as substitutes."""
+    """Correlated pairs of parameters, the worst of every two groups; also single ones with groups as substitutes."""
     known = np.isfinite(parameters.prior_deviation)[:, None] * complement
     _, sizes, rows = np.linalg.svd(np.vstack((seen, known)), full_matrices=False)
     spread = complement @ rows.T / np.maximum(sizes, _TINY)
@@ -163,7 +163,7 @@ def _most_correlated(likeness: Array, first: Indices, second: Indices) -> tuple[
 
 
 def _is_substituted(scatter: Array, many: Indices) -> Flags:
-    """True for parameters (P,) whose multiple correlation with those of many cables is beyond `ALIKE`."""
+    """True for parameters (P,) whose multiple correlation with those of many cables exceeds `ALIKE`."""
     within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
     share = np.sum(between * np.linalg.solve(within + ridge, between), axis=0)
