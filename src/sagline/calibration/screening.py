@@ -26,18 +26,18 @@ OTHERWISE: Final = 0.5  # share of the rows with a reading of a load cell above 
 def screen(
     robot: Robot, log: WinchLog, speed_limit: float = SPEED_LIMIT
 ) -> tuple[WinchLog, Indices, Mapping[Omission, Indices]]:
-    """Also returns the indices of these rows (N,), and those of the omitted rows by the first reason of each.
+    """Log of the rows with the platform at rest, taut cables and all readings, without repetitions.
 
-    These rows are left out, in this order: rows
+    Also returns the indices of these rows (N,), and those of the omitted rows by the first reason of each.
 
-    Left out, in this order, are rows
+    These rows are left out, in this order:
 
-    - without a count or length of a cable, or without a reading of a load cell that more than half of the rows have
-      (measured positions and rotations may be missing anywhere);
-    - with exactly the readings of an earlier row;
-    - with a length that changes faster than the limit [m/s], compared with the nearest row in time that is at least a
-      tenth of a second and at most a second away; without times this check is skipped;
-    - with a load cell reading, minus bias, of at most three standard deviations: the cable may be slack.
+    - rows without a count or length of a cable, or without a reading of a load cell that more than half of the rows
+      have (measured positions and rotations may be missing anywhere);
+    - rows with exactly the readings of an earlier row;
+    - rows with a length that changes faster than the limit [m/s], compared with the nearest row in time that is at
+      least a tenth of a second and at most a second away; without times this check is skipped;
+    - rows with a load cell reading, minus bias, of at most three standard deviations: the cable may be slack.
 
     Raises an error if the log has another number of cables, or counts do not give lengths.
     """
@@ -70,7 +70,7 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
         return lengths_from_counts(robot, log.counts)
     except InvalidValueError as error:
         where = error.item.replace("sample", "row") if len(log) > 1 else f"row 0, {error.item}"
-        if "count" not in error.item or "cable" not in error.item:  # the error concerns a field of the robot, not a reading
+        if "count" not in error.item or "cable" not in error.item:  # an error of the robot, not of a reading
             raise
         raise InvalidValueError(where, error.value, error.allowed, error.next_step) from None
 
@@ -105,7 +105,7 @@ def _repeated(log: WinchLog) -> Flags:
     earlier = first[inverse]
     found: Flags = earlier != np.arange(len(log))
     late = np.flatnonzero(found)
-    found[late] = np.all([(b[late] == b[earlier[late]]).all(axis=1) for b in bits], axis=0)  # compare the values, not only their digests
+    found[late] = np.all([(b[late] == b[earlier[late]]).all(axis=1) for b in bits], axis=0)  # not their digests alone
     return found
 
 

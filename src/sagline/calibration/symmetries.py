@@ -81,7 +81,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
     matters[kinds.PER_CABLE :, 1:] = False
-    matters[kinds.SHIFT :] = False  # a few measured points leave more directions open than many do: the readings determine which
+    matters[kinds.SHIFT :] = False  # a few measured points leave more directions open than many do
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False
     if not turning:  # without rotations, the center of mass has no effect
@@ -101,7 +101,7 @@ def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
     if zero is None or radius is None or diameter is None or pitch is None:  # counts need these data
         raise InvalidValueError("robot", "without counts", "with drums and their zeros", "Give them in the robot file.")
     circle = (2.0 * np.pi * (radius + 0.5 * diameter)) ** 2
-    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # length of one turn, derivative by the logarithm of the radius
+    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # of a turn, by the logarithm
     shift[kinds.ZERO] = 1.0 / stretch
     shift[kinds.DRUM], share[kinds.DRUM] = -by_radius * zero / stretch, by_radius
     share[kinds.STIFFNESS] = drums.rest_strain / stretch

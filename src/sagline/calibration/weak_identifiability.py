@@ -182,7 +182,7 @@ def _least_known_combination(scatter: Array, members: Indices, names: tuple[str,
 def _direction(
     names: tuple[str, ...], many: str, vector: Array, left: float, frame: PriorUnits, *, alone: bool = False
 ) -> Direction:
-    """A direction by its names; of a single parameter with substitutes, that one is to be measured."""
+    """Direction from its names; for a single parameter with substitutes, the step is to measure this one."""
     vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
     step = easiest_measurement(re.split(r"[ .[]", name)[0] for name in (names[:1] if alone else names))
     name = " with ".join((names[0], " and ".join(names[1:]))) if names[1:] else names[0]

@@ -1,4 +1,4 @@
-"""One class for each kind of state: how the next command is prepared, and which state follows."""
+"""One class for each kind of state: it prepares the next command and returns the next state."""
 
 from __future__ import annotations
 
@@ -20,39 +20,39 @@ from sagline.control.states import RefusedError, State
 from sagline.core.arrays import Array
 from sagline.kinematics.status import ForwardStatus
 
-LEAVING: Final = 0.3  # s, at most, until all grants are given back
+LEAVING: Final = 0.3  # s, longest time until all grants are given back
 LOOP_ON: Final = frozenset({State.IDLE, State.MOVING, State.PAUSING})
 POSE_LOST: Final = "the pose of the platform is not known; home again"
 
 
 class ActiveState(ABC):
-    """The state of a controller as an object; `context.state` has its name.
+    """State of a controller as an object; `context.state` has its name.
 
     Attributes:
         context: Shared by all states.
-        point: Set point of the command that goes out next; None where the drives rest.
-        source: Source of the set points; None where nothing is followed.
+        point: Set point of the next command; None if the drives rest.
+        source: Source of the set points; None if there is none.
     """
 
     def __init__(self, context: Context, point: SetPoint | None = None, source: SetPointSource | None = None) -> None:
-        """Take over set points from the state before."""
+        """Take over set points from the previous state."""
         self.context, self.point, self.source = context, point, source
         self._equilibrium: Future[Standing | ForwardStatus] | None = None
 
     @abstractmethod
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Prepare the command of the next cycle; the state from now on."""
+        """Prepare the command of the next cycle; return the next state."""
 
     def stop(self) -> ActiveState:
-        """The state after a stop by the operator."""
+        """State after a stop by the operator."""
         return self
 
     def fail(self, line: str) -> ActiveState:
-        """The state after a fault that stops the motion."""
+        """State after a fault that stops the motion."""
         return Stopping(self, State.FAULT, ExecutionStatus.FAULT, line)
 
     def rest(self, mode: Mode, *, enabled: bool) -> None:
-        """Command drives that rest."""
+        """Command the drives to rest."""
         self.point = None
         self.context.sender.rest(mode, enabled=enabled, claims=self.context.state is State.CONNECTING)
 
@@ -63,7 +63,7 @@ class ActiveState(ABC):
         row, sample = point.row, c.sample
         if c.tension_loop is not None and row is not None and sample is not None and c.state in LOOP_ON:
             planned = point.tension if due is None else due.tension
-            leads = point.leading or (due is not None and due.leading)  # tensions differ because they are meant to
+            leads = point.leading or (due is not None and due.leading)  # the tensions differ by intention
             c.correction = c.tension_loop.step(sample.tension, planned, row, frozen=c.degraded or leads)
         length = point.length + c.correction
         length -= c.zero
@@ -71,7 +71,7 @@ class ActiveState(ABC):
         c.sender.follow(length, point.rate, point.drum_tension, point.enable)
 
     def settle(self, length: Array, status: ExecutionStatus, reason: str) -> ActiveState | None:
-        """IDLE at lengths [m], once the pose there is known, until then this state; None where there is no pose."""
+        """IDLE at lengths [m] once the pose is known, until then this state; None if no pose is found."""
         c = self.context
         if self._equilibrium is None:
             self._equilibrium = c.find_equilibrium(length)
@@ -82,10 +82,10 @@ class ActiveState(ABC):
 
 
 class Off(ActiveState):
-    """OFF: all grants are given back, then nothing is sent."""
+    """OFF: all grants are given back, then no commands are sent."""
 
     def __init__(self, context: Context, reason: str = "", point: SetPoint | None = None) -> None:
-        """Begin to give the grants back, after the command of a set point; without a reason there are none yet."""
+        """Begin to give the grants back, after the command of a set point; without a reason there are no grants yet."""
         super().__init__(context, point)
         self._cycles = 0
         if reason:
@@ -101,7 +101,7 @@ class Off(ActiveState):
         return self
 
     def leave(self, sample: Sample | None) -> None:
-        """Command to leave, as long as a group is ours."""
+        """Command to leave, as long as the controller has the grant of a group."""
         self._cycles = max(self._cycles - 1, 0)
         if self._cycles and (sample is None or bool((sample.owner == self.context.owner).any())):
             self.rest(Mode.LEAVE, enabled=False)
@@ -111,10 +111,10 @@ class Off(ActiveState):
 
 
 class Connecting(ActiveState):
-    """CONNECTING: the groups are claimed.
+    """CONNECTING: the controller claims the groups.
 
     Attributes:
-        claim: Of all groups.
+        claim: Claim of all groups.
     """
 
     def __init__(self, context: Context) -> None:
@@ -124,7 +124,7 @@ class Connecting(ActiveState):
         self.claim = Claim(context.owner, context.link.groups, context.period, context.random)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """READY where all groups agree, OFF where they do not."""
+        """READY if all groups agree, OFF if the claim fails."""
         c, claim = self.context, self.claim
         claim.look(answer, c.sender.counter)
         c.sender.stand_at(c.sample)
@@ -145,20 +145,20 @@ class Connecting(ActiveState):
 
 
 class Holding(ActiveState):
-    """READY or FAULT: the drives hold."""
+    """READY or FAULT: the drives hold their position."""
 
     def __init__(self, context: Context, state: State, reason: str) -> None:
-        """Enter one of both."""
+        """Enter the given one of these two states."""
         context.enter(state, reason)
         super().__init__(context)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Hold."""
+        """Command to hold."""
         self.rest(Mode.HOLD, enabled=True)
         return self
 
     def fail(self, line: str) -> ActiveState:
-        """FAULT, by way of STOPPING."""
+        """STOPPING, then FAULT."""
         return self if self.context.state is State.FAULT else super().fail(line)
 
 
@@ -174,7 +174,7 @@ class Emergency(ActiveState):
         super().__init__(c, source=before.source)
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Lock."""
+        """Command to lock."""
         self.rest(Mode.LOCK, enabled=False)
         return self
 
@@ -187,7 +187,7 @@ class HomingState(ActiveState):
     """HOMING: single winches are jogged until the tensions agree with the plan.
 
     Attributes:
-        homing: The pose named by the operator, and what samples say of it.
+        homing: The pose named by the operator, and its comparison with samples.
     """
 
     def __init__(self, context: Context, homing: Homing) -> None:
@@ -198,7 +198,7 @@ class HomingState(ActiveState):
         self._largest_tension = np.full(len(context.zero), np.inf)  # during a jog [N]
 
     def jog(self, winch: int, by: float) -> None:
-        """Begin to jog one winch [m] while the others have no power and only tensions are watched."""
+        """Begin to jog one winch [m]; the other winches have no power, and only tensions are monitored."""
         c = self.context
         if c.sample is None or self.source is not None:
             raise RefusedError("the jog", "another winch is being jogged", "Wait until it stands.")
@@ -208,7 +208,7 @@ class HomingState(ActiveState):
         c.say(EventKind.NOTE, "jog", f"winch {winch} by {1e3 * by:+g} mm")
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """Go on with the jog, or compare tensions at rest; IDLE where they agree."""
+        """Continue the jog, or compare tensions at rest; IDLE if they agree."""
         c, sample, homing = self.context, self.context.sample, self.homing
         if sample is None:
             pass
@@ -233,7 +233,7 @@ class HomingState(ActiveState):
         return self
 
     def _reason_to_end(self, sample: Sample) -> str:
-        """Reason to end a jog, "" to go on."""
+        """Reason to end a jog; "" to continue."""
         c = self.context
         stale = ~(sample.age <= FRESH * c.period)
         if stale.any():
@@ -253,18 +253,18 @@ class HomingState(ActiveState):
 
 
 class Following(ActiveState):
-    """IDLE, MOVING, JOGGING or PAUSING: set points of a source, one in each cycle."""
+    """IDLE, MOVING, JOGGING or PAUSING: one set point of a source in each cycle."""
 
     def __init__(
         self, context: Context, state: State, text: str, point: SetPoint | None, source: SetPointSource
     ) -> None:
-        """Enter one of them at the set point that was sent last."""
+        """Enter one of these states at the last set point that was sent."""
         context.enter(state, text)
         super().__init__(context, point, source)
         self._followed = source
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """The next set point; at the end of the source IDLE."""
+        """Command the next set point; IDLE at the end of the source."""
         point = self.point
         if self.context.state is not State.IDLE and point is not None and point.done:
             after = self._finish(point)
@@ -280,7 +280,7 @@ class Following(ActiveState):
         return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, "the operator stopped")
 
     def _finish(self, point: SetPoint) -> ActiveState:
-        """The state after the last set point was sent."""
+        """State after the last set point was sent."""
         c, source = self.context, self.source
         if isinstance(source, PlatformJog) and source.failed and source.stops_hard:
             return Stopping(self, State.IDLE, ExecutionStatus.STOPPED, source.failed)
@@ -297,14 +297,14 @@ class Following(ActiveState):
 
 
 class Stopping(ActiveState):
-    """STOPPING: all rates go to zero together, from the set point that was sent last.
+    """STOPPING: all rates go to zero together, from the last set point that was sent.
 
     Attributes:
         after: State at the end of the ramp.
     """
 
     def __init__(self, before: ActiveState, after: State, status: ExecutionStatus, reason: str) -> None:
-        """Begin the ramp; status and reason are those of the motion."""
+        """Begin the ramp; status and reason describe the end of the motion."""
         c, point, source = before.context, before.point, before.source
         if point is not None:
             point = point._replace(done=False)
@@ -315,7 +315,7 @@ class Stopping(ActiveState):
         self.after = after
 
     def next(self, answer: Sample | Missing) -> ActiveState:
-        """The next set point of the ramp; at its end IDLE, READY or FAULT."""
+        """Command the next set point of the ramp; IDLE, READY or FAULT at its end."""
         if self.point is None or self.point.done:
             after = self._finish()
             if after is not self:
@@ -334,7 +334,7 @@ class Stopping(ActiveState):
         self.after, run.status, run.reason = State.FAULT, ExecutionStatus.FAULT, line
 
     def _finish(self) -> ActiveState:
-        """The state after the ramp."""
+        """State after the ramp."""
         c, point = self.context, self.point
         if self.after is State.IDLE and point is not None:
             after = self.settle(point.length, c.run.status, c.run.reason)
@@ -347,7 +347,7 @@ class Stopping(ActiveState):
 
 
 def idle_at(context: Context, found: Standing | ForwardStatus, reason: str) -> Following | None:
-    """IDLE at an equilibrium; None, and no known pose, where there was none."""
+    """IDLE at an equilibrium; without one, None, and the pose becomes unknown."""
     context.previous_plan = None
     if isinstance(found, Standing):
         return Following(context, State.IDLE, reason, found.step(), found)

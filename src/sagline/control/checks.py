@@ -22,27 +22,27 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
 START: Final = 2e-3  # m: largest distance of the first pose of a path from the platform
-ON_TICK: Final = 1e-6  # of a period: largest distance of a sample from a tick
-LARGEST_LEAD: Final = 5e-3  # m: no more than the tension loop may change
-ROUNDING: Final = 5e-6  # m: difference of a plan's lengths and rates, without accelerations
-LARGEST_STEP: Final = 1e-3  # m: from here on the fault rules see a jump of an encoder
-AT_REST: Final = 1e-3  # m/s and rad/s: a path that begins or ends faster would strike the winches
+ON_TICK: Final = 1e-6  # share of a period: largest distance of a sample from a tick
+LARGEST_LEAD: Final = 5e-3  # m: equal to the largest correction of the tension loop
+ROUNDING: Final = 5e-6  # m: allowed difference between a plan's lengths and rates, without accelerations
+LARGEST_STEP: Final = 1e-3  # m: larger steps count as a jump of an encoder
+AT_REST: Final = 1e-3  # m/s and rad/s: a path that begins or ends faster would cause a shock at the winches
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A checked plan with one row for each cycle, from which set points are taken.
+    """Checked plan with one row for each cycle, from which set points are taken.
 
     Attributes:
-        period: Of a cycle, and between two rows [s].
-        plan: At the ticks, the last of them at or after the path's end; None for a jog.
+        period: Period of a cycle, and between two rows [s].
+        plan: Plan at the ticks, the last tick at or after the path's end; None for a jog.
         state: Robot, poses and cables at the rows.
         length: Unstrained lengths off the drums [m], shape (N, m).
         rate: Their rates [m/s], shape (N, m); zero in the last row.
-        tension: T_A, at the frame ends [N], shape (N, m).
+        tension: T_A, tension at the frame ends [N], shape (N, m).
         drum_tension: Tension at the drums [N], shape (N, m).
-        wrench: External plus inertial, on the platform [N, N m], shape (N, 6).
-        gains: Of the tension loop; None for a robot without redundancy.
+        wrench: External plus inertial wrench on the platform [N, N m], shape (N, 6).
+        gains: Gains of the tension loop; None for a robot without redundancy.
     """
 
     period: float
@@ -61,7 +61,7 @@ class Motion:
 
     @property
     def robot(self) -> Robot:
-        """The robot as it is planned for."""
+        """Robot of the plan."""
         return self.state.one_robot
 
 
@@ -73,7 +73,7 @@ def plan_motion(
     method: TensionMethod,
     previous: Plan | None = None,
 ) -> Motion:
-    """Plan a path and check all of it; period [s]."""
+    """Plan a path and check it completely; period [s]."""
     _check_rest(path)
     ticked = _at_ticks(path, period)
     plan = inverse(robot, ticked, model, method, previous=previous)
@@ -99,7 +99,7 @@ def plan_motion(
 
 
 def check_motion(motion: Motion, robot: Robot, period: float) -> None:
-    """Refuse a motion that was planned for another robot or period [s]."""
+    """Reject a motion that was planned for another robot or period [s]."""
     step = "Plan it with this controller: control.plan(path)."
     if abs(motion.period - period) > ON_TICK * period:
         reason = f"it was planned for cycles of {1e3 * motion.period:g} ms; they take {1e3 * period:g} ms"
@@ -109,7 +109,7 @@ def check_motion(motion: Motion, robot: Robot, period: float) -> None:
 
 
 def check_lead(what: str, lead: Array) -> None:
-    """Refuse lengths at rest that differ too much from the first ones of a plan; lead: their difference [m], (m,)."""
+    """Reject lengths at rest too far from the first ones of a plan; lead: their difference [m], (m,)."""
     i = int(np.argmax(np.abs(lead)))
     if not abs(lead[i]) <= LARGEST_LEAD:
         away, allowed = f"{1e3 * lead[i]:+.3g} mm", f"{1e3 * LARGEST_LEAD:g} mm"
@@ -118,7 +118,7 @@ def check_lead(what: str, lead: Array) -> None:
 
 
 def check_start(robot: Robot, here: Pose, start: Pose) -> None:
-    """Refuse a motion that begins elsewhere."""
+    """Reject a motion that begins at another pose."""
     points = np.vstack((np.zeros(3), robot.platform_anchors))
     jump = float(np.linalg.norm(start.transform(points) - here.transform(points), axis=1).max())
     if not jump <= START:
@@ -128,7 +128,7 @@ def check_start(robot: Robot, here: Pose, start: Pose) -> None:
 
 
 def _at_ticks(path: Path, period: float) -> Path:
-    """Samples of a path at the ticks; its end is held until the next tick."""
+    """Samples of a path at the ticks; its end pose is held until the next tick."""
     time = path.time - path.time[0]
     count = int(np.floor(time[-1] / period + ON_TICK)) + 1
     ticks = np.asarray(period * np.arange(count), dtype=np.float64)
@@ -171,12 +171,12 @@ def _check_feasible(plan: Plan, path: Path) -> None:
 
 
 def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: Array) -> None:
-    """Refuse speeds and torques beyond the known limits of the winches."""
+    """Reject speeds and torques beyond the known limits of the winches."""
     winches = robot.winches
-    lever = drum_lever(robot, length)  # refuses missing data
+    lever = drum_lever(robot, length)  # raises an error for missing data
     if winches is None:
         return
-    ratio = np.abs(winches.gear) / lever  # radians of the motor for a meter of cable
+    ratio = np.abs(winches.gear) / lever  # radians of the motor per meter of cable
     speed, step = winches.speed_limit, np.diff(length, axis=0) / np.diff(path.time)[:, None]
     _refuse_beyond(path, "turn at", rate * ratio, speed, "rad/s")
     _refuse_beyond(path, "turn at", step * 0.5 * (ratio[1:] + ratio[:-1]), speed, "rad/s")
@@ -187,11 +187,11 @@ def _check_winches(robot: Robot, path: Path, length: Array, rate: Array, drum: A
 
 
 def _check_steps(time: Array, length: Array, rate: Array) -> None:
-    """Refuse lengths that jump against their rates: a path whose twist is not that of its poses.
+    """Reject lengths that jump relative to their rates: the twist of the path is not that of its poses.
 
-    Where a rate stays between those at the two ends of a step, wherever it changes or jumps within, the step is off
-    the mean rate by half of what they differ at most, times h; the largest difference of the steps beside it counts.
-    More than an encoder may jump is never allowed. Times are the path's own: its end may be before a tick.
+    If a rate remains between those at the two ends of a step, the step deviates from the mean rate times h by at most
+    half of their difference times h. The largest difference among the adjacent steps counts. More than the allowed jump
+    of an encoder is never accepted. The times are those of the path, whose end may be before a tick.
     """
     h = np.diff(time)[:, None]
     off = np.abs(np.diff(length, axis=0) - 0.5 * h * (rate[1:] + rate[:-1]))

@@ -22,19 +22,19 @@ from sagline.control.link import (
 from sagline.control.states import RefusedError
 from sagline.core.arrays import Array, Flags
 
-VALID_FOR: Final = HEARTBEAT  # s: time for which a PLC may use a command
+VALID_FOR: Final = HEARTBEAT  # s: validity of a command for a PLC
 MOST_OWNER: Final = 2**31
 
 
 class Sender:
-    """Maker of the next command.
+    """Sender of the next command.
 
     Attributes:
-        owner: The controller's id.
-        counter: Of the last command.
-        command: To be sent next; None: nothing is sent.
-        length: At rest, as read [m], shape (m,).
-        tension: At rest, at the drums [N], shape (m,).
+        owner: Id of the controller.
+        counter: Counter of the last command.
+        command: Next command; None if nothing is sent.
+        length: Measured lengths at rest [m], shape (m,).
+        tension: Tensions at rest, at the drums [N], shape (m,).
     """
 
     def __init__(self, cable_count: int, random: np.random.Generator) -> None:
@@ -51,7 +51,7 @@ class Sender:
         self._send(Mode.FOLLOW, length, rate, tension, self._enabled if enable is None else enable, claims=False)
 
     def rest(self, mode: Mode, *, enabled: bool, claims: bool = False) -> None:
-        """Command the drives to stand where they are."""
+        """Command the drives to hold their present position."""
         enable = self._enabled if enabled else self._disabled
         self._send(mode, self.length, np.zeros(len(self.length)), self.tension, enable, claims)
 
@@ -60,25 +60,25 @@ class Sender:
         self.command = None
 
     def stand_at(self, sample: Sample | None, tension: Array | None = None) -> None:
-        """Set the lengths of rest to those of a sample, and the tensions [N] (m,) to those given or read."""
+        """Set the lengths at rest to those of a sample, and the tensions [N] (m,) to the given or measured ones."""
         if sample is not None:
             self.length, self.tension = sample.length, sample.filtered if tension is None else tension
 
     def _send(self, mode: Mode, length: Array, rate: Array, tension: Array, enable: Flags, claims: bool) -> None:
         self.counter = self.counter % COUNTERS + 1
-        positive = np.maximum(tension, 0.0)  # of a reading below zero; a PLC refuses to push
+        positive = np.maximum(tension, 0.0)  # for a reading below zero: a PLC rejects negative tensions
         self.command = Command(self.counter, self.owner, mode, VALID_FOR, length, rate, positive, enable, claims)
 
 
-CLAIMING: Final = OWNER_TIMEOUT + 0.7  # s, at most, until all grants are there
-SILENT: Final = 7.0  # s, at most, until every group has answered once
-GIVING_BACK: Final = 0.05  # s, for grants of some groups only
-LONGEST_WAIT: Final = 0.6  # s, at random, before the next claim
+CLAIMING: Final = OWNER_TIMEOUT + 0.7  # s, longest time until all grants are available
+SILENT: Final = 7.0  # s, longest time until every group has answered once
+GIVING_BACK: Final = 0.05  # s, for the grants of an incomplete set of groups
+LONGEST_WAIT: Final = 0.6  # s, upper limit of the random wait before the next claim
 TRIES: Final = 4
 FRESH: Final = 3  # cycles: largest age of a sample
-AGREEING: Final = 5  # cycles in a row
-SURE: Final = 20  # cycles: a cause that lasts longer is not a state before the claim
-BEHIND: Final = 10  # commands: largest distance of an echo
+AGREEING: Final = 5  # consecutive cycles
+SURE: Final = 20  # cycles: a cause that persists longer is not a state from before the claim
+BEHIND: Final = 10  # commands: largest lag of an echo
 _LOCKED, _PRESSED, _READY = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupStatus.READY)
 _AGAIN: Final = "Try again; if it continues, check the program of the PLC."
 
@@ -87,9 +87,9 @@ class Disagreement(NamedTuple):
     """Reason why groups do not agree.
 
     Attributes:
-        reason: The groups and the cause, in words.
-        next_step: For the reader.
-        lasting: Whether it needs the operator.
+        reason: The groups and the cause as text.
+        next_step: Next step for the reader.
+        lasting: True if the operator must act.
     """
 
     reason: str
@@ -97,17 +97,17 @@ class Disagreement(NamedTuple):
     lasting: bool = False
 
     def refusal(self, what: str) -> RefusedError:
-        """Error for a request."""
+        """Error for a rejected request."""
         return RefusedError(what, self.reason, self.next_step)
 
 
 def disagreement(
     sample: Sample, owner: int, counter: int, groups: tuple[tuple[int, ...], ...], period: float = PERIOD
 ) -> Disagreement | None:
-    """Reason why not all groups agree, the most general one first; None where all do.
+    """Reason why not all groups agree, most general first; None if all agree.
 
-    A group agrees where its sample is fresh, its grant is ours, its drives are ready, without fault and not locked, and
-    it has taken one of the last commands.
+    A group agrees if its sample is fresh, this controller has its grant, its drives are ready, without fault and not
+    locked, and it has accepted one of the last commands.
     """
     status, other = sample.status, sample.owner
     faulty = (sample.winch_fault != 0) | (sample.state == int(WinchState.FAULT))
@@ -143,9 +143,9 @@ class Claim:
     """Claim of the grants of all groups.
 
     Attributes:
-        mode: Of the next command; None: nothing is sent.
-        ready: Whether all groups agree.
-        refused: Reason of the failure; None before.
+        mode: Mode of the next command; None if nothing is sent.
+        ready: True if all groups agree.
+        refused: Reason of the failure; None before a failure.
     """
 
     def __init__(
@@ -161,7 +161,7 @@ class Claim:
         self.refused: Disagreement | None = None
 
     def look(self, answer: Sample | Missing, counter: int) -> None:
-        """Judge an answer, and decide on the next command."""
+        """Evaluate an answer, and set the next command."""
         if isinstance(answer, Missing):
             self._silent += 1
             if self._silent * self._period >= SILENT:
@@ -186,7 +186,7 @@ class Claim:
         return self._cycles * self._period >= CLAIMING
 
     def _give_back(self) -> None:
-        """Leave for a random time: another controller may have the missing grants, and wait for ours."""
+        """Leave for a random time: another controller may have the missing grants, and wait for the present ones."""
         self._tries += 1
         self.mode = Mode.LEAVE
         longest = LONGEST_WAIT / self._period

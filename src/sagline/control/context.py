@@ -36,17 +36,17 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest
 
 MOST_SEED: Final = 2**128
-SAME: Final = 1e-9  # of a period
-MARGIN: Final = 500  # cycles on the tape besides those of the plan: ramps, pauses
+SAME: Final = 1e-9  # share of a period
+MARGIN: Final = 500  # cycles on the tape in addition to those of the plan: ramps, pauses
 
 
 class Estimator:
-    """Forward kinematics of each sample, started at the pose before.
+    """Forward kinematics of each sample, started at the previous pose.
 
     Attributes:
-        position: Of the platform's origin [m], shape (3,); NaN where it was never known.
+        position: Position of the platform's origin [m], shape (3,); NaN if it was never known.
         quaternion: Rotation platform -> world, scalar last, shape (4,).
-        status: Code of its `ForwardStatus`; -1 where there is none.
+        status: Code of the `ForwardStatus`; -1 if there is none.
     """
 
     def __init__(self, robot: Robot, model: CableModel) -> None:
@@ -56,7 +56,7 @@ class Estimator:
 
     @property
     def pose(self) -> Pose | None:
-        """Pose of the platform; None where it is not known."""
+        """Pose of the platform; None if unknown."""
         return Pose.from_quaternion(self.position, self.quaternion) if self.status in STABLE else None
 
     def forget(self) -> None:
@@ -69,7 +69,7 @@ class Estimator:
         self.position, self.quaternion, self.status = pose.position, pose.quaternion, int(ForwardStatus.SOLVED)
 
     def locate(self, length: Array, wrench: Array | None) -> ForwardStatus | None:
-        """Solve for the pose; the status where it has just been lost. length [m] (m,), wrench (6,) or None."""
+        """Solve for the pose; return the status if the pose was just lost. length [m] (m,), wrench (6,) or None."""
         position, quaternion = np.empty(3), np.empty(4)
         status = self._solver.step_into(length, position, quaternion, wrench)
         lost = status not in STABLE and self.status in STABLE
@@ -78,17 +78,17 @@ class Estimator:
 
 
 class _Run:
-    """The motion that is executed now or was executed last, and its record.
+    """The present or last motion, and its record.
 
     Attributes:
-        motion: As planned; None for a platform jog, or before the first.
+        motion: Planned motion; None for a platform jog, or before the first motion.
         paused: Path that can be resumed.
         status: Final status; RUNNING before its end.
-        reason: One line on that.
-        first_event: Number of events before its beginning.
-        tape: Its cycles.
-        recording: Whether cycles are added to the tape.
-        announced: Whether the recorder knows the plan, but not yet its end.
+        reason: Reason of the status in one line.
+        first_event: Number of events before the motion.
+        tape: Table of its cycles.
+        recording: True if cycles are added to the tape.
+        announced: True if the recorder has received the plan but not yet its end.
     """
 
     def __init__(self) -> None:
@@ -105,15 +105,15 @@ class Context:
     """Data and services that the states of a controller share.
 
     Attributes:
-        state: Of the controller.
-        sample: The newest; None before the first.
-        zero: Added to lengths of samples since homing [m], shape (m,).
-        homed: Whether the pose of the platform is known.
-        run: The motion that is executed.
-        previous_plan: Plan at whose end the platform stands, which the next one continues; None elsewhere.
-        correction: Of the tension loop, added to the lengths of the plan [m], shape (m,).
-        number: Of the cycle, from 0.
-        time: On the link's clock [s].
+        state: State of the controller.
+        sample: Newest sample; None before the first.
+        zero: Offset from homing, added to lengths of samples [m], shape (m,).
+        homed: True if the pose of the platform is known.
+        run: Present or last motion.
+        previous_plan: Plan at whose end the platform rests, for the next plan to continue; None elsewhere.
+        correction: Correction of the tension loop, added to the lengths of the plan [m], shape (m,).
+        number: Index of the cycle, from 0.
+        time: Time on the link's clock [s].
     """
 
     def __init__(
@@ -132,7 +132,7 @@ class Context:
         self.robot = instance(robot, Robot, "robot")
         m = robot.cable_count
         _check_link(link)
-        drum_lever(robot, np.ones(m))  # raises where data of the winches are missing
+        drum_lever(robot, np.ones(m))  # raises an error if data of the winches are missing
         if sorted(winch for group in link.groups for winch in group) != list(range(m)):
             count = sum(map(len, link.groups))
             raise InvalidValueError("link", f"of {count} winches", f"{m}, as {robot.name} has", "Check its addresses.")
@@ -160,7 +160,7 @@ class Context:
 
     @property
     def owner(self) -> int:
-        """The controller's id."""
+        """Id of the controller."""
         return self.sender.owner
 
     # events
@@ -176,7 +176,7 @@ class Context:
             self.say(EventKind.FAULT, "recording stopped", line)
 
     def enter(self, state: State, text: str) -> None:
-        """Change the state, as the table allows."""
+        """Change the state if the table of transitions allows it."""
         check_transition(self.state, state, state.name)
         self.state = state
         self.say(EventKind.STATE, state.name, text)
@@ -184,7 +184,7 @@ class Context:
     # samples, faults and estimate
 
     def check_agreement(self, what: str) -> Sample:
-        """The newest sample; refuses a request that needs all groups, where one of them does not agree."""
+        """Newest sample; an error for a request that needs all groups if one of them does not agree."""
         if self.sample is None:
             raise RefusedError(what, "no group has answered", "Connect first.")
         why = disagreement(self.sample, self.owner, self.sender.counter, self.link.groups, self.period)
@@ -193,7 +193,7 @@ class Context:
         return self.sample
 
     def locate(self, sample: Sample, wrench: Array | None) -> str:
-        """Estimate the pose, the tension loop's correction as an error of the encoders; a line where it is lost."""
+        """Estimate the pose, with the correction of the tension loop as an encoder error; message if it is lost."""
         length = sample.length + self.zero
         length -= self.correction
         lost = self.estimator.locate(length, wrench)
@@ -204,7 +204,7 @@ class Context:
         return line
 
     def find_faults(self, cycle: Cycle) -> tuple[Reaction, str]:
-        """The strongest reaction that the rules ask for in a cycle, and the line of its first fault."""
+        """Strongest reaction of the fault rules in a cycle, and the message of its first fault."""
         reaction, first, homing = Reaction.EVENT, "", False
         for fault in self.faults:
             line = fault.look(cycle)
@@ -220,7 +220,7 @@ class Context:
         return reaction, first
 
     def clear_faults(self) -> None:
-        """Start with a fresh set of rules."""
+        """Start with a new set of rules."""
         self.faults: tuple[Fault, ...] = faults_of(
             self.robot, self.period, groups=self.link.groups, largest_correction=self.settings.largest
         )
@@ -228,13 +228,13 @@ class Context:
         self.degrading: list[Fault] = [fault for fault in self.faults if fault.reaction is Reaction.DEGRADED]
 
     def reset_tension_loop(self) -> None:
-        """Start a tension loop without correction; none for a robot without redundancy."""
+        """Start a tension loop without correction; None for a robot without redundancy."""
         m, n = self.robot.cable_count, self.robot.degrees_of_freedom
         self.tension_loop = TensionLoop(m, self.settings, self.period) if m > n else None
         self.correction = np.zeros(m)
 
     def find_equilibrium(self, length: Array) -> Future[Standing | ForwardStatus]:
-        """Begin to compute where the platform rests with these lengths [m], shape (m,)."""
+        """Begin to compute the equilibrium at these lengths [m], shape (m,)."""
         work = partial(standing_at, self.robot, length, self.estimator.pose, self.model)
         return in_background(work, self.pace is not None)
 
@@ -248,25 +248,25 @@ class Context:
         run.tape = Tape(self.robot.cable_count, len(self.link.groups), count)
         run.first_event = len(self.journal.events)
         if run.announced:
-            self._announce_end()  # of a plan that was paused
+            self._announce_end()  # end of a plan that was paused
         plan = None if motion is None else motion.plan
         if self.journal.watched and plan is not None:
             run.announced = True
             self.tell(lambda record: record.begins(plan))
 
     def continue_run(self) -> None:
-        """Record from here on, without garbage collection."""
+        """Start recording at this cycle, without garbage collection."""
         run = self.run
         run.recording, run.status, run.reason = True, ExecutionStatus.RUNNING, ExecutionStatus.RUNNING.text
         self.garbage.stop()
 
     def end_run(self, status: ExecutionStatus, reason: str) -> None:
-        """Note how the motion ended; collect garbage again."""
+        """Store the end of the motion; enable garbage collection again."""
         self.run.status, self.run.reason = status, reason
         self.garbage.go_on()
 
     def keep(self, cycle: Recorded) -> None:
-        """Hand a cycle to the tape and the recorder."""
+        """Pass a cycle to the tape and the recorder."""
         run = self.run
         if run.recording and run.tape is not None:
             run.tape.add(cycle)
@@ -280,7 +280,7 @@ class Context:
         self.tell(lambda record: record.ends(self.run.status, self.run.reason))
 
     def execution(self) -> Execution | None:
-        """Record of the last motion so far; None before the first."""
+        """Record of the last motion up to now; None before the first."""
         run = self.run
         if run.tape is None:
             return None
@@ -289,7 +289,7 @@ class Context:
 
 
 def _check_link(link: object) -> None:
-    """Refuse an object that is not a link."""
+    """Reject an object that is not a link."""
     has = all(hasattr(link, name) for name in ("groups", "period")) and callable(getattr(link, "exchange", None))
     if isinstance(link, type) or not has:
         step = "Take that of a machine, machine.link(), or make one: sl.plc.S7Link(addresses, robot)."
@@ -297,7 +297,7 @@ def _check_link(link: object) -> None:
 
 
 def _check_period(link: Link, period: float) -> None:
-    """Refuse PLCs with another period than the controller."""
+    """Reject PLCs with a different period than the controller."""
     own = number(link.period, "link.period", "s", above=0.0)
     if abs(own - period) > SAME * period:
         step = f"Give the machine period={period:g}, or the controller pace=Pace({own:g})."

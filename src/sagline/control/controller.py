@@ -1,4 +1,4 @@
-"""The controller: requests of an operator, or of a program, to the control loop."""
+"""The controller: passes requests of an operator or a program to the control loop."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-SPEED: Final = 0.1  # m/s, of go_to
+SPEED: Final = 0.1  # m/s, for go_to
 TURNING: Final = 0.2  # rad/s
-SPEEDING_UP: Final = 0.5  # s, to full speed at least: a short way is a slow one
+SPEEDING_UP: Final = 0.5  # s, shortest time to full speed: a short path is slow
 
 
 class Controller(Preparation):
     """Drives a robot through a `Link`.
 
-    All it knows comes from samples; each `cycle` sends one checked command. The methods that begin something (`start`,
-    `begin_homing`, `start_jog`, `claim`) return at once, and `cycle` is to be called each period; those that wait
-    (`execute`, `go_to`, `home`, `jog`, `connect`) call it themselves, until nothing moves.
+    All data come from samples; each `cycle` sends one checked command. The methods that begin an action (`start`,
+    `begin_homing`, `start_jog`, `claim`) return immediately, and the caller must call `cycle` each period. The methods
+    that wait (`execute`, `go_to`, `home`, `jog`, `connect`) call it themselves until the motion ends.
     """
 
     def __init__(
@@ -58,16 +58,16 @@ class Controller(Preparation):
         """Prepare everything; nothing is sent.
 
         Args:
-            robot: As it is planned for. Its winches need drum_radius at least.
-            link: The way to the machine.
-            pace: Real time; None: every cycle begins when the one before is over, on the clock of a machine that
-                waits for it.
-            model: Of the cables; the default is exact.
+            robot: Robot for planning. Its winches need at least drum_radius.
+            link: Connection to the machine.
+            pace: Real time. None for lockstep: every cycle begins when the previous one ends, on the clock of a machine
+                that waits for it.
+            model: Cable model; the default is exact.
             tension: Tension distribution method; the default is `Closest`.
             loop: Settings of the tension loop. A robot without redundancy has none.
             record: Receives every cycle and event.
-            shadow: Whether it reads only: nothing is ever sent, and the state stays OFF.
-            seed: Of its id and of random waiting; None: the system's, so that no two controllers are alike.
+            shadow: True for read-only operation: nothing is ever sent, and the state remains OFF.
+            seed: Seed of the id and of random waiting times; None for the system's, so that every controller differs.
 
         Raises:
             InvalidValueError: If data of the winches are missing, the link is for another number of winches, or an
@@ -89,16 +89,16 @@ class Controller(Preparation):
             load_kernels(robot, self.period, self._context.model, self._context.method)
 
     def plan(self, path: Path) -> Motion:
-        """Plan a path and check all of it; nothing is sent.
+        """Plan a path and check it completely; nothing is sent.
 
         Args:
-            path: From rest to rest, with a sample at every tick.
+            path: Path from rest to rest, with a sample at every tick.
 
         Returns:
             A motion for `start` and `execute`.
 
         Raises:
-            RefusedError: If a check fails; with the check, the place, and the next step.
+            RefusedError: If a check fails; with the check, the location, and the next step.
         """
         c, given = self._context, instance(path, Path, "path")
         arguments = c.robot, given, c.period, c.model, c.method, c.previous_plan
@@ -108,11 +108,11 @@ class Controller(Preparation):
         """Begin to follow a path.
 
         Args:
-            path: From rest to rest, with a sample at every tick, from the pose of the platform; or a motion that was
-                planned before.
+            path: Path from rest to rest, with a sample at every tick, from the pose of the platform; or an already
+                planned motion.
 
         Raises:
-            RefusedError: If the robot is not idle, a check fails, or the path begins elsewhere.
+            RefusedError: If the robot is not idle, a check fails, or the path begins at another pose.
         """
         check_transition(self.state, State.MOVING, "the path")
         motion = path if isinstance(path, Motion) else self.plan(path)
@@ -133,27 +133,27 @@ class Controller(Preparation):
         """Follow a path to its end.
 
         Args:
-            path: As of `start`.
+            path: As in `start`.
 
         Returns:
-            The execution: a fault is its status, not an error.
+            The execution. A fault is reported in its status, not as an error.
 
         Raises:
-            RefusedError: As `start`.
+            RefusedError: For the same reasons as `start`.
         """
         self.start(path)
         return self.wait()
 
     def path_to(self, pose: Pose, speed: float = SPEED, angular_speed: float = TURNING) -> Path:
-        """The straight path from the pose of the platform.
+        """Straight path from the pose of the platform.
 
         Args:
-            pose: At its end, a single pose.
-            speed: Largest of the origin [m/s], > 0.
-            angular_speed: Largest of the platform [rad/s], > 0.
+            pose: Pose at the end of the path, a single pose.
+            speed: Largest speed of the origin [m/s], > 0.
+            angular_speed: Largest angular speed of the platform [rad/s], > 0.
 
         Raises:
-            RefusedError: If the pose of the platform is not known, or it is there already.
+            RefusedError: If the pose of the platform is unknown, or already the requested one.
         """
         limits = number(speed, "speed", "m/s", above=0.0), number(angular_speed, "angular_speed", "rad/s", above=0.0)
         here = self._here()
@@ -172,18 +172,18 @@ class Controller(Preparation):
         )
 
     def go_to(self, pose: Pose, speed: float = SPEED, angular_speed: float = TURNING) -> Execution:
-        """Go straight to a pose.
+        """Move straight to a pose.
 
         Args:
-            pose: At the end, a single pose.
-            speed: Largest of the origin [m/s], > 0.
-            angular_speed: Largest of the platform [rad/s], > 0.
+            pose: Pose at the end, a single pose.
+            speed: Largest speed of the origin [m/s], > 0.
+            angular_speed: Largest angular speed of the platform [rad/s], > 0.
 
         Returns:
             The execution.
 
         Raises:
-            RefusedError: As `start`.
+            RefusedError: For the same reasons as `start`.
         """
         check_transition(self.state, State.MOVING, "the way")
         return self.execute(self._result_of(lambda: self.path_to(pose, speed, angular_speed)))
@@ -192,11 +192,11 @@ class Controller(Preparation):
         """Begin to jog one winch.
 
         Args:
-            winch: Its number, from 0.
-            by: Change of length [m], positive where cable is let out.
+            winch: Index of the winch, from 0.
+            by: Change of length [m], positive if cable is paid out.
 
         Raises:
-            RefusedError: If the robot is neither idle nor being homed, or a tension would leave its limits.
+            RefusedError: If the robot is neither idle nor in homing, or a tension would leave its limits.
         """
         c = self._context
         chosen, far = checked_winch(c.robot, winch, by)
@@ -215,17 +215,17 @@ class Controller(Preparation):
         """Jog one winch, and wait for its end.
 
         Args:
-            winch: Its number, from 0.
-            by: Change of length [m], positive where cable is let out.
+            winch: Index of the winch, from 0.
+            by: Change of length [m], positive if cable is paid out.
 
         Raises:
-            RefusedError: As `start_jog`.
+            RefusedError: For the same reasons as `start_jog`.
         """
         self.start_jog(winch, by)
         self._run_while(lambda: self.moving)
 
     def start_jog_platform(self, by: ArrayLike) -> None:
-        """Begin to jog the platform along a straight line, each pose solved when it is due.
+        """Begin to jog the platform along a straight line; each pose is solved in its cycle.
 
         Args:
             by: Displacement [m], and optionally a rotation vector [rad], world axes, shape (3,) or (6,).
@@ -242,19 +242,19 @@ class Controller(Preparation):
         self._begin(State.JOGGING, source, None, "the platform")
 
     def jog_platform(self, by: ArrayLike) -> None:
-        """Jog the platform, and wait for its end.
+        """Jog the platform, and wait for the end of the jog.
 
         Args:
-            by: As of `start_jog_platform`.
+            by: As in `start_jog_platform`.
 
         Raises:
-            RefusedError: As `start_jog_platform`.
+            RefusedError: For the same reasons as `start_jog_platform`.
         """
         self.start_jog_platform(by)
         self._run_while(lambda: self.moving)
 
     def wait(self) -> Execution:
-        """Go on until nothing moves; Ctrl-C stops the robot, and interrupts then.
+        """Run cycles until the motion ends; Ctrl-C stops the robot and then interrupts.
 
         Returns:
             The execution of the motion.
@@ -269,7 +269,7 @@ class Controller(Preparation):
         return done
 
     def pause(self) -> None:
-        """Slow down on the path and stop; `resume` continues.
+        """Slow down on the path and stop; `resume` continues the motion.
 
         Raises:
             RefusedError: If no path is being followed.
@@ -283,10 +283,10 @@ class Controller(Preparation):
         self._loop.active = Following(self._context, State.PAUSING, text, active.point, active.source)
 
     def resume(self) -> None:
-        """Go on where `pause` stopped.
+        """Continue the path at the point where `pause` stopped.
 
         Raises:
-            RefusedError: If there is nothing to go on with, or the platform is elsewhere.
+            RefusedError: If there is no paused path, or the platform is at another pose.
         """
         check_transition(self.state, State.MOVING, "resuming")
         run = self._context.run
@@ -301,7 +301,7 @@ class Controller(Preparation):
     # shared by the methods above
 
     def _begin(self, state: State, source: SetPointSource, motion: Motion | None, text: str) -> None:
-        """Begin to follow a source, and its record."""
+        """Begin to follow a source, and start its record."""
         self._context.begin_run(motion)
         self._follow(state, source, text)
 
@@ -311,14 +311,14 @@ class Controller(Preparation):
         self._loop.active = Following(self._context, state, text, point, source)
 
     def _set_point(self, what: str) -> SetPoint:
-        """The set point at rest, from which a motion begins."""
+        """Set point at rest, from which a motion begins."""
         point = self._loop.active.point
         if point is None:
             raise RefusedError(what, "there is no set point to begin from", "Home first: home(pose).")
         return point
 
     def _here(self) -> Pose:
-        """The planned pose of the platform at rest, with which the estimate agrees except for noise."""
+        """Planned pose of the platform at rest; the estimate differs from it only by noise."""
         source = self._loop.active.source
         pose = source.pose if isinstance(source, Standing) else None
         return self.estimate if pose is None else pose

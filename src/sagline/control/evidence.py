@@ -1,4 +1,4 @@
-"""Evidence that the fault rules share, and the base class of a rule."""
+"""Shared data of the fault rules, and the base class of a rule."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from sagline.control.null_space import SIGMAS, NullSpace
 from sagline.core.arrays import Array, Flags
 from sagline.robot.robot import Robot
 
-MOVING: Final = 1e-3  # m/s: a set point that changes faster is in motion
+MOVING: Final = 1e-3  # m/s: a faster change of a set point is a motion
 
 
 class Cycle(NamedTuple):
-    """One cycle, after its sample and before the next command.
+    """One cycle, between its sample and the next command.
 
     Attributes:
         sample: The newest sample.
-        before: The sample of the cycle before; None in the first.
-        command: Sent in the cycle before; None where nothing was sent.
-        tension: T_A, planned for this cycle [N], shape (m,); NaN where there is no plan, as before homing.
-        gains: Row of the plan's gains at this time; None where there is none.
-        correction: Of the lengths of the plan by the tension loop [m], shape (m,).
-        late: Delay of the beginning of the cycle [s]; 0 on the clock of an in-process machine.
-        recording: Reason why recording has stopped; "" while it continues, or where nothing is recorded.
+        before: Sample of the previous cycle; None in the first.
+        command: Command sent in the previous cycle; None if nothing was sent.
+        tension: T_A, planned for this cycle [N], shape (m,); NaN without a plan, for example before homing.
+        gains: Row of the plan's gains at this time; None if there is none.
+        correction: Correction of the plan's lengths by the tension loop [m], shape (m,).
+        late: Delay of the start of the cycle [s]; 0 on the clock of an in-process machine.
+        recording: Reason why recording has stopped; "" while it continues, or without recording.
     """
 
     sample: Sample
@@ -48,12 +48,12 @@ class Cycle(NamedTuple):
         return command is not None and command.mode == Mode.FOLLOW and bool(abs(command.rate).max() > MOVING)
 
 
-SLACK_SHARE: Final = 0.3  # of the lower limit: a cable with less is slack
-PLANNED_SHARE: Final = 0.9  # of the lower limit: a planned tension from which on the cable is taut
-PULLING: Final = 0.5  # of the planned tension: a motor that holds more has a taut cable
-STEADY_TIME: Final = 0.5  # s, of the filter for the constant part of the tension errors
-QUICK_TIME: Final = 0.1  # s, of the filter that is compared with the balance of the platform
-MOST_CHANGE: Final = 6.0  # N a cycle, of the latter: single outliers do not stay in it
+SLACK_SHARE: Final = 0.3  # share of the lower limit: a cable with less tension is slack
+PLANNED_SHARE: Final = 0.9  # share of the lower limit: a cable with a larger planned tension is taut
+PULLING: Final = 0.5  # share of the planned tension: a motor with a larger torque holds a taut cable
+STEADY_TIME: Final = 0.5  # s, time constant of the filter for the constant part of the tension errors
+QUICK_TIME: Final = 0.1  # s, time constant of the filter for the comparison with the balance of the platform
+MOST_CHANGE: Final = 6.0  # N per cycle, limit of the quick filter's change: it suppresses single outliers
 _TRIPPED: Final = int(WinchState.FAULT)
 
 
@@ -62,32 +62,32 @@ class Evidence:
 
     Attributes:
         group_of: Group of each winch, shape (m,).
-        period: Of a cycle [s].
-        largest: Correction of a length beyond which something is wrong [m].
+        period: Period of a cycle [s].
+        largest: Correction of a length above which there is a fault [m].
         noise: Standard deviation of a reading [N].
-        sigma: The same with the bias that a good cell may have [N].
+        sigma: Standard deviation of a reading including the bias of a good cell [N].
         limit: Upper limits of T_A [N], shape (m,).
-        full_scale: Of the cells [N], infinite where it is not known, shape (m,).
+        full_scale: Full scale of the cells [N], infinite if unknown, shape (m,).
         believed: Cells that are not ignored, shape (m,).
-        tension: T_A of these with a finite reading [N]; of the others the planned tension, or a value between
-            slack and tight where nothing is; shape (m,).
-        plain: Whether no cell is ignored and all readings are finite.
-        stopped: Whether a reported fault stops the motion, which does not stand yet.
+        tension: T_A [N], shape (m,): the reading of a cell that is not ignored and finite; otherwise the planned
+            tension, or without a plan a value between slack and tight.
+        plain: True if no cell is ignored and all readings are finite.
+        stopped: True while a reported fault stops the motion and the winches still move.
         broken: Cables found broken, shape (m,).
         jumped: Encoders that have jumped, shape (m,).
-        least: Smallest of these tensions [N].
-        most: Largest [N].
+        least: Smallest tension [N].
+        most: Largest tension [N].
         oldest: Age of the oldest group's sample [s].
-        bits: Status bits of any group.
-        common: Status bits of every group.
-        faulted: Whether a PLC reports a fault.
-        tripped: Whether a drive reports a fault.
+        bits: Status bits set in at least one group.
+        common: Status bits set in every group.
+        faulted: True if a PLC reports a fault.
+        tripped: True if a drive reports a fault.
         states: Codes of the winches' states, as plain numbers.
-        low: Number of consecutive new readings in which a cable that is taut in the plan was slack, shape (m,).
-        before_low: The reading before these [N], shape (m,).
-        steady: T_A minus the plan after the slow filter, which rests while a cable is slack [N], shape (m,).
-        quick: The same after the quick filter [N], shape (m,).
-        compared: Whether tensions can be compared with a plan.
+        low: Number of consecutive new readings with a slack cable that is taut in the plan, shape (m,).
+        before_low: Last reading before these [N], shape (m,).
+        steady: T_A minus the plan after the slow filter, which stops while a cable is slack [N], shape (m,).
+        quick: T_A minus the plan after the quick filter [N], shape (m,).
+        compared: True if tensions can be compared with a plan.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class Evidence:
         self.compared = self.any_low = self.stopped = False
         self.plain, self._all_believed = True, True
         self._still, self._settled = 0, round(RAMP / period)
-        # as wide as what they are multiplied by: numpy takes thrice as long with a number or a column
+        # full-size arrays: numpy takes three times as long with a number or a column
         self._shares = np.array([[period / (time + period)] * m for time in (STEADY_TIME, QUICK_TIME)])
         self.cycle: Cycle | None = None
         self.tension = np.full(m, math.nan)
@@ -133,7 +133,7 @@ class Evidence:
         self.faulted = self.tripped = False
 
     def _set_up_motors(self, robot: Robot) -> None:
-        """Factors from motor torque to cable tension, where drum and gear are known."""
+        """Factors from motor torque to cable tension, if drum and gear are known."""
         winch, m = robot.winches, robot.cable_count
         self._pull_of_torque: Array | None = None
         self._friction = np.zeros(m)
@@ -158,22 +158,22 @@ class Evidence:
         self._compare(cycle)
 
     def ignore_cells(self, cells: Flags) -> None:
-        """Ignore some cells from here on, shape (m,)."""
+        """Ignore some cells from now on, shape (m,)."""
         self.believed &= ~cells
         self._all_believed = False
 
     def stop(self) -> None:
-        """Note that a fault stops the motion: later faults are mostly its consequences, until the winches stand."""
+        """Store that a fault stops the motion: later faults are mostly its consequences until the winches stop."""
         self.stopped, self._still = True, 0
 
     def _wait(self, cycle: Cycle) -> None:
-        """Check whether the winches stand, by their set points; where none are sent, by new rates."""
+        """Check if the winches have stopped, by their set points; without set points, by new rates."""
         moves = cycle.moving if cycle.command is not None else largest(cycle.sample.rate * self.fresh) > MOVING
         self._still = 0 if moves else self._still + 1
         self.stopped = self._still <= self._settled
 
     def _read(self, cycle: Cycle) -> None:
-        """Take the readings, except of cells that are ignored."""
+        """Store the readings, except of cells that are ignored."""
         self.tension = tension = cycle.sample.tension
         self.least, self.most = extrema(tension)
         self.plain = self._all_believed and math.isfinite(self.least) and math.isfinite(self.most)
@@ -184,7 +184,7 @@ class Evidence:
 
     @property
     def fresh(self) -> Flags:
-        """Winches whose data are new in this cycle, shape (m,)."""
+        """Flags of winches with new data in this cycle, shape (m,)."""
         before = None if self.cycle is None else self.cycle.before
         if self.cycle is None or before is None:
             return np.ones(len(self.group_of), dtype=bool)
@@ -216,44 +216,44 @@ class Evidence:
         change[:] = error
         change -= self._filtered
         change *= self._shares
-        if (most := largest(change[1])) > MOST_CHANGE:  # as a whole, so that what is a load stays like a load
+        if (most := largest(change[1])) > MOST_CHANGE:  # scaled as a whole, so that a load looks like a load
             change[1] *= MOST_CHANGE / most
         if self.any_low:
             change[0] = 0.0
         self._filtered += change
 
     def pull(self, cycle: Cycle) -> Array:
-        """Cable tension by the motor torque [N], up to friction; NaN where drums are not known, shape (m,)."""
+        """Cable tension from the motor torque [N], up to friction; NaN if drums are unknown, shape (m,)."""
         torque = cycle.sample.torque
         return np.full(torque.shape, np.nan) if self._pull_of_torque is None else self._pull_of_torque * torque
 
     def pulling(self, cycle: Cycle) -> Flags:
-        """Cables under tension by the torque of their motors, shape (m,)."""
+        """Flags of cables under tension according to the torque of their motors, shape (m,)."""
         found: Flags = self.pull(cycle) > np.maximum(PULLING * cycle.tension, 2.0 * self._friction)
         return found
 
 
 class Reaction(IntEnum):
-    """Reaction to a fault; of several at a time the largest counts."""
+    """Reaction to a fault; among several faults, the largest counts."""
 
-    EVENT = 0  # it is reported and recorded
+    EVENT = 0  # reported and recorded
     DEGRADED = 1  # the tension loop keeps its correction; the motion continues
     STOPPING = 2  # the ramp, then FAULT
     EMERGENCY = 3  # drums locked, no motion offered
 
 
 class Fault(ABC):
-    """One rule. `faults_of` makes a fresh set without memory, for use after the operator has cleared a fault.
+    """One rule. `faults_of` makes a new set without memory, for use after the operator has acknowledged a fault.
 
     Attributes:
-        name: Of its events.
-        rule: Its condition, in words.
-        reaction: Of the controller.
-        within: Time until it is found, in words.
-        homing: Whether a length is in doubt, so that the robot must be homed again.
-        lasting: Whether it stays until a fresh set is made; each item is reported once.
+        name: Name of its events.
+        rule: Its condition as text.
+        reaction: Reaction of the controller.
+        within: Time until detection, as text.
+        homing: True if a length is unreliable, so that the robot must be homed again.
+        lasting: True if the fault remains until a new set of rules; each item is reported once.
         quiet: Time after a report in which repeats are only counted [s].
-        present: Whether its condition holds; during a stop by another fault only once the winches stand.
+        present: True if its condition holds; during a stop by another fault, only after the winches have stopped.
         seen: Evidence of the whole set.
     """
 
@@ -266,31 +266,32 @@ class Fault(ABC):
     quiet: ClassVar[float] = 0.0
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with nothing found.
+        """Begin without findings.
 
         Args:
-            seen: Shared by the whole set.
+            seen: Evidence shared by the whole set.
         """
         self.seen, self.present = seen, False
-        self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples, of rules that count them
-        self._since_report, self._suppressed = 10**9, 0  # cycles since the report, and repeats since
+        self._for = np.zeros(len(seen.group_of), dtype=np.int64)  # consecutive samples, for rules that count them
+        self._since_report, self._suppressed = 10**9, 0  # cycles since the last report, and suppressed repeats
 
     def look(self, cycle: Cycle) -> str | None:
-        """Look at a cycle; every cycle once, in order.
+        """Check a cycle; must be called once for every cycle, in order.
 
         Args:
             cycle: The cycle.
 
         Returns:
-            Where the fault begins a line for the operator: what, which item, value, limit, next step. None otherwise,
-            while it lasts, and while another fault stops the motion: it is reported when the winches stand.
+            Message for the operator when the fault begins: fault, item, value, limit, next step. None otherwise, while
+            the fault persists, and while another fault stops the motion: then it is reported when the winches have
+            stopped.
         """
-        if cycle is not self.seen.cycle:  # computed by the first rule for all others
+        if cycle is not self.seen.cycle:  # the first rule computes it for all others
             self.seen.at(cycle)
-        # a fault after a stop is mostly its consequence; one that makes a length unreliable is reported all the same
+        # a fault after a stop is mostly its consequence; one that makes a length unreliable is still reported
         stops, waits = self.reaction >= Reaction.STOPPING, False
         if self.seen.stopped and self.reaction is Reaction.STOPPING and not self.homing:
-            if self.lasting:  # it has each of its items once
+            if self.lasting:  # each item is reported once
                 return None
             waits = not self.present
         line = self.found(cycle)
@@ -320,7 +321,7 @@ class Fault(ABC):
 
     @abstractmethod
     def found(self, cycle: Cycle) -> str | None:
-        """The operator's line in every cycle in which the rule holds; of a lasting fault, where an item is new.
+        """Operator message in every cycle in which the rule holds; for a lasting fault, only for a new item.
 
         Args:
             cycle: Readings and set points of the cycle.

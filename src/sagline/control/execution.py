@@ -31,7 +31,7 @@ from sagline.robot.robot import Robot
 
 
 class ExecutionStatus(Status):
-    """End of the execution of a plan."""
+    """Status at the end of the execution of a plan."""
 
     DONE = 0, "the plan was executed to its end"
     PAUSED = 1, "the platform is on the path; resume() continues"
@@ -44,9 +44,9 @@ class ExecutionStatus(Status):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples(Result):
-    """N samples of a machine; names and units as of `Sample`.
+    """N samples of a machine; names and units as in `Sample`.
 
-    Where a cycle had no sample, floats are NaN and whole numbers 0.
+    In cycles without a sample, floats are NaN and integers 0.
 
     Attributes:
         time: Shape (N,).
@@ -57,7 +57,7 @@ class Samples(Result):
         echo: Shape (N, G).
         status: Shape (N, G).
         fault: Shape (N, G).
-        length: As read, before the zero of homing, shape (N, m).
+        length: Measured length, without the zero of homing, shape (N, m).
         rate: Shape (N, m).
         torque: Shape (N, m).
         tension: Shape (N, m).
@@ -91,13 +91,13 @@ class Samples(Result):
         return len(self.time)
 
     def at(self, index: int) -> Sample:
-        """One sample, with arrays of its own.
+        """One sample, with its own arrays.
 
         Args:
-            index: Number, from 0.
+            index: Index of the sample, from 0.
 
         Raises:
-            InvalidValueError: If there is none.
+            InvalidValueError: If the sample does not exist.
         """
         row = whole_number(index, "index", 0, len(self) - 1)
         return Sample(float(self.time[row]), *(getattr(self, name)[row].copy() for name in Sample._fields[1:]))
@@ -107,32 +107,32 @@ class Samples(Result):
 class Execution(Result, Saved):
     """Execution of a plan on a machine, in N cycles of m winches.
 
-    The command of a cycle is what was sent in it; the sample came back in the same cycle, so it does not contain
-    that command yet.
+    The command and the sample of a cycle were exchanged in that cycle, so the sample does not include the effect of the
+    command yet.
 
     Attributes:
-        robot: The robot as the controller knows it.
-        plan: The whole plan; None where nothing was planned, as of a jog.
-        status: At the end.
-        reason: One line on the end.
-        period: Of a cycle [s].
-        zero: Of homing, added to the lengths of samples [m], shape (m,).
-        events: During the motion.
-        time: On the link's clock [s], shape (N,).
-        answered: Cycles with a sample, shape (N,).
+        robot: Robot of the controller.
+        plan: Whole plan; None without a plan, as for a jog.
+        status: Status at the end.
+        reason: Reason for the end in one line.
+        period: Period of a cycle [s].
+        zero: Offset from homing, added to the lengths of samples [m], shape (m,).
+        events: Events during the motion.
+        time: Time on the link's clock [s], shape (N,).
+        answered: True for cycles with a sample, shape (N,).
         state: Codes of `State` at the end of each cycle, shape (N,).
-        late: Delay of the beginning of each cycle [s], shape (N,).
-        clock: Time on the plan from its start [s], shape (N,); NaN beside it.
-        samples: Of the machine.
-        position: Of the platform's origin, estimated from the encoders [m], shape (N, 3).
-        quaternion: Its rotation, platform -> world, scalar last, shape (N, 4).
-        estimate: Codes of `ForwardStatus` of these, -1 where there is none, shape (N,).
-        mode: Codes of `Mode` of the commands, -1 where none was sent, shape (N,).
+        late: Delay of the start of each cycle [s], shape (N,).
+        clock: Time on the plan from its start [s], shape (N,); NaN outside the plan.
+        samples: Samples of the machine.
+        position: Position of the platform's origin, estimated from the encoders [m], shape (N, 3).
+        quaternion: Rotation platform -> world, estimated from the encoders, scalar last, shape (N, 4).
+        estimate: Codes of `ForwardStatus` of these estimates, -1 if there is none, shape (N,).
+        mode: Codes of `Mode` of the commands, -1 if none was sent, shape (N,).
         set_length: Set points of the unstrained lengths, with the zero of homing [m], shape (N, m).
-        set_rate: Of their rates [m/s], shape (N, m).
-        set_tension: Of the tensions at the drums [N], shape (N, m).
-        planned_tension: T_A planned for the moment of each sample [N], shape (N, m); NaN where nothing is planned.
-        correction: Of the tension loop, in the set points [m], shape (N, m).
+        set_rate: Set points of their rates [m/s], shape (N, m).
+        set_tension: Set points of the tensions at the drums [N], shape (N, m).
+        planned_tension: T_A planned for the time of each sample [N], shape (N, m); NaN without a plan.
+        correction: Correction of the tension loop in the set points [m], shape (N, m).
     """
 
     robot: Robot
@@ -169,16 +169,16 @@ class Execution(Result, Saved):
 
     @property
     def tension(self) -> Array:
-        """T_A as the load cells read it [N], shape (N, m)."""
+        """T_A measured by the load cells [N], shape (N, m)."""
         return self.samples.tension
 
     @property
     def pose(self) -> Pose:
-        """Estimated from the encoders, a batch of N; NaN where there is none."""
+        """Poses estimated from the encoders, N of them; NaN if there is none."""
         return Pose._adopt(self.position, self.quaternion)
 
 
-_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # of a tape, under the same names
+_COLUMNS: Final = (*REAL_OWN, *(name for name, _ in PLACE), *ASKED)  # columns of a tape with the same names
 
 
 def execution_of(
@@ -191,7 +191,7 @@ def execution_of(
     zero: Array,
     events: tuple[Event, ...],
 ) -> Execution:
-    """The execution that a tape holds; period [s], zero [m] (m,)."""
+    """Execution from the data of a tape; period [s], zero [m] (m,)."""
     arrays: dict[str, Any] = {name: locked(tape.column(name)) for name in _COLUMNS}
     arrays |= {name: locked(tape.column(name).astype(np.int8)) for name in ("state", "estimate", "mode")}
     return Execution(
@@ -222,7 +222,7 @@ def planned_position(execution: Execution) -> Array:
         execution: N cycles.
 
     Returns:
-        Positions [m], shape (N, 3); NaN beside the plan.
+        Positions [m], shape (N, 3); NaN outside the plan.
 
     Examples:
         >>> import sagline as sl
@@ -241,13 +241,13 @@ def planned_position(execution: Execution) -> Array:
 
 
 def position_error(execution: Execution) -> Array:
-    """The estimated position of the platform's origin less the planned one.
+    """Estimated minus planned position of the platform's origin.
 
     Args:
         execution: N cycles.
 
     Returns:
-        Along the world's axes [m], shape (N, 3); NaN beside the plan and where there is no estimate.
+        Errors along the world axes [m], shape (N, 3); NaN outside the plan and without an estimate.
 
     Examples:
         >>> import sagline as sl
@@ -259,15 +259,15 @@ def position_error(execution: Execution) -> Array:
 
 
 def null_space_error(execution: Execution, filter_time: float | None = None) -> Array:
-    """Tension errors in the null space of the structure matrix, as the tension loop sees them.
+    """Tension errors in the null space of the structure matrix, as in the tension loop.
 
     Args:
         execution: N cycles.
-        filter_time: Of the filter in front [s]; None: that of the tension loop.
+        filter_time: Time constant of the input filter [s]; None for that of the tension loop.
 
     Returns:
-        e_N = K_A N_L G f with f the filtered T_A less the planned T_A [N], shape (N, m); NaN beside the plan, and of a
-        robot without redundancy.
+        e_N = K_A N_L G f with f the filtered T_A minus the planned T_A [N], shape (N, m); NaN outside the plan, and for
+        a robot without redundancy.
 
     Examples:
         >>> import sagline as sl

@@ -13,7 +13,7 @@ def finite(values: Array) -> bool:
 
 
 def extrema(values: Array) -> tuple[float, float]:
-    """Minimum and maximum; NaN where a value is not finite."""
+    """Minimum and maximum; NaN if a value is not finite."""
     numbers = values.tolist()
     if not isfinite(sum(numbers)):
         return float(values.min()), float(values.max())
@@ -22,6 +22,6 @@ def extrema(values: Array) -> tuple[float, float]:
 
 
 def largest(values: Array) -> float:
-    """Largest absolute value; NaN where a value is not finite."""
+    """Largest absolute value; NaN if a value is not finite."""
     least, most = extrema(values)
     return max(-least, most)

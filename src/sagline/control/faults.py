@@ -1,4 +1,4 @@
-"""Table of all faults, and a fresh set of rules for a robot."""
+"""Table of all faults, and a new set of rules for a robot."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sagline.robot.robot import Robot
 
 LARGEST_CORRECTION: Final = TensionSettings().largest  # m
 
-# in the order in which they look: a cell that is found dead is not taken for a cable that is slack
+# order of evaluation: a dead cell is found before its cable could count as slack
 FAULTS: Final[tuple[type[Fault], ...]] = (
     EmergencyStop,
     OwnerLost,
@@ -54,14 +54,14 @@ FAULTS: Final[tuple[type[Fault], ...]] = (
 
 
 class FaultRow(NamedTuple):
-    """One fault, as the documentation lists it.
+    """One fault, in the form of the documentation.
 
     Attributes:
-        name: Of its events.
-        rule: Its condition.
-        to: The reaction.
-        within: Time until it is found.
-        by: The part that finds it.
+        name: Name of its events.
+        rule: Condition of the fault.
+        to: Reaction of the controller.
+        within: Time until detection.
+        by: Part that detects it.
     """
 
     name: str
@@ -100,19 +100,19 @@ def faults_of(
     cell_bias: float | None = None,
     largest_correction: float = LARGEST_CORRECTION,
 ) -> tuple[Fault, ...]:
-    """A fresh set of rules without memory: one for each time that a controller leaves OFF, FAULT or homing.
+    """New set of rules without memory: one for each time that a controller leaves OFF, FAULT or homing.
 
     Args:
-        robot: As it is planned for.
-        period: Of a cycle [s], > 0.
-        groups: The winches of each group, as the link has them; None: two neighbors each.
-        cell_deviation: Standard deviation of a reading of a good load cell [N], > 0; None: as the robot's winches have
-            it, 1 N where they do not say.
-        cell_bias: Bias that a good one may have [N], >= 0; None: as they have it, 2 N at least.
-        largest_correction: Of a length by the tension loop [m], > 0.
+        robot: Robot for planning.
+        period: Period of a cycle [s], > 0.
+        groups: Winches of each group, as in the link; None for two neighbors each.
+        cell_deviation: Standard deviation of a good load cell [N], > 0; None for that of the robot's winches, or 1 N if
+            they have none.
+        cell_bias: Bias that a good load cell may have [N], >= 0; None for that of the winches, at least 2 N.
+        largest_correction: Largest correction of a length by the tension loop [m], > 0.
 
     Returns:
-        The rules, to be asked in this order, every one in every cycle.
+        The rules, to be evaluated in this order, every rule in every cycle.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind or out of its range.
@@ -140,7 +140,7 @@ def faults_of(
 
 
 def _check_groups(groups: object, cable_count: int) -> None:
-    """Refuse groups that do not have every winch once."""
+    """Reject groups that do not contain every winch exactly once."""
     try:
         winches = sorted(winch for group in groups for winch in group)  # type: ignore[attr-defined]
         fits = winches == list(range(cable_count))

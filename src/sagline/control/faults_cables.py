@@ -12,9 +12,9 @@ from sagline.control.extrema import largest
 from sagline.control.null_space import SIGMAS
 from sagline.core.arrays import Array
 
-NEAR: Final = 0.9  # of the upper limit; a plan that goes beyond would stop here
+NEAR: Final = 0.9  # share of the upper limit; a plan that exceeds it stops the motion
 NEAR_SAMPLES, SLACK_SAMPLES = 5, 3
-SUDDEN: Final = 0.5  # of the planned tension: what a cable had that broke, one sample before it was slack
+SUDDEN: Final = 0.5  # share of the planned tension: minimum tension one sample before a broken cable became slack
 
 
 class OverTension(Fault):
@@ -26,13 +26,13 @@ class OverTension(Fault):
     within = "10 to 50 ms"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with no cable tight."""
+        """Begin without a tight cable."""
         super().__init__(seen)
         self._near = NEAR * seen.limit
         self._least = float(self._near.min())
 
     def found(self, cycle: Cycle) -> str | None:
-        """The cable with the largest tension relative to its limit."""
+        """Cable with the largest tension relative to its limit."""
         seen, tension = self.seen, self.seen.tension
         if not seen.most > self._least:
             self._for.fill(0)
@@ -64,7 +64,7 @@ class CableBroken(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first cable that has just broken."""
+        """First cable that has just broken."""
         seen = self.seen
         if not (seen.any_low and seen.compared):
             return None
@@ -98,7 +98,7 @@ class Slack(Fault):
     within = "30 ms"
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first slack cable."""
+        """First slack cable."""
         seen = self.seen
         if not seen.any_low:
             return None
@@ -113,8 +113,8 @@ class Slack(Fault):
 
 
 STUCK_SAMPLES: Final = 50
-ODD_TIME: Final = 0.35  # s for which a cell must contradict the balance; ramps and swings of the platform are shorter
-DISPROVED: Final = 0.5  # of full scale: a motor that holds less disproves the reading
+ODD_TIME: Final = 0.35  # s: duration of the contradiction; ramps and oscillations of the platform are shorter
+DISPROVED: Final = 0.5  # share of full scale: a motor with less torque disproves the reading
 _STEP: Final = "The tension loop is off. Check cell, plug and amplifier when the platform stands, then acknowledge."
 
 
@@ -131,12 +131,12 @@ class CellDead(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with all cells alive."""
+        """Begin without dead cells."""
         super().__init__(seen)
         self._least, self._most = -SIGMAS * seen.sigma, float(seen.full_scale.min())
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first cell with a new impossible reading."""
+        """First cell with a new impossible reading."""
         seen, tension = self.seen, cycle.sample.tension
         if seen.plain and seen.least >= self._least and seen.most < self._most and not seen.any_low:
             return None
@@ -163,7 +163,7 @@ class CellStuck(Fault):
     lasting = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first cell that is newly stuck."""
+        """First cell that is newly stuck."""
         seen = self.seen
         if cycle.before is None:
             return None
@@ -175,7 +175,7 @@ class CellStuck(Fault):
             return None
         same = tension == before
         self._for = np.where(same, self._for + seen.fresh, 0)
-        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # so many after the first of them
+        stuck = (self._for >= STUCK_SAMPLES - 1) & seen.believed  # this many samples after the first one
         if not stuck.any():
             return None
         seen.ignore_cells(stuck)
@@ -194,13 +194,13 @@ class CellOff(Fault):
     lasting = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with no cell suspected."""
+        """Begin without suspected cells."""
         super().__init__(seen)
         self._samples = round(ODD_TIME / seen.period)
         self._quiet = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The wrong cell, once; with one cell in doubt the others cannot be compared."""
+        """Wrong cell, reported once; with one cell in doubt the others cannot be compared."""
         seen = self.seen
         error = self._error(cycle)
         limit = SIGMAS * seen.sigma
@@ -209,7 +209,7 @@ class CellOff(Fault):
                 self._for.fill(0)
                 self._quiet = True
             return None
-        # a swing of the platform goes through zero, and the filter slowly enough to be seen there
+        # oscillations of the platform change sign, and the filter is slow enough to show the sign changes
         self._for = np.where(np.abs(error) > limit, self._for + 1, 0)
         self._quiet = False
         cell = int(np.argmax(np.abs(error)))
@@ -224,7 +224,7 @@ class CellOff(Fault):
         )
 
     def _error(self, cycle: Cycle) -> Array | None:
-        """Error of each cell by parity [N], (m,); None where parity is not available."""
+        """Error of each cell from the parity matrix [N], (m,); None if parity is not available."""
         seen = self.seen
         if cycle.gains is None or not seen.compared or seen.any_low or not all(seen.believed.tolist()):
             return None

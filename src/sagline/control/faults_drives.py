@@ -13,20 +13,20 @@ from sagline.control.extrema import finite, largest
 from sagline.control.link import COUNTERS, Command, GroupStatus, Mode, Sample, WinchState, newer
 from sagline.core.arrays import Array
 
-JUMP: Final = 1e-3  # m a cycle
-OFF_BEAT: Final = 1.5  # cycles that a PLC's clock and the commands it took may differ by from sample to sample
-CATCHING_UP: Final = 10  # cycles, after they differed by more
+JUMP: Final = 1e-3  # m per cycle
+OFF_BEAT: Final = 1.5  # cycles: allowed difference of a PLC's clock and its accepted commands between samples
+CATCHING_UP: Final = 10  # cycles, after a larger difference
 FOLLOWING: Final = 5e-3  # m
 SATURATED: Final = 0.2  # s
-IDLE: Final = 3  # samples in which a group has to begin to follow
+IDLE: Final = 3  # samples within which a group must begin to follow
 _AT_LIMIT, _ENABLED = int(WinchState.SATURATED), int(WinchState.ENABLED)
 _FOLLOWING, _FOLLOW = int(GroupStatus.FOLLOWING), int(Mode.FOLLOW)
-REMEMBERED: Final = 32  # commands: more than may be on their way
-LONGEST: Final = 1.0  # s between two samples of a PLC; more is its clock that began again
+REMEMBERED: Final = 32  # commands: more than may be in transit
+LONGEST: Final = 1.0  # s between two samples of a PLC; a longer time means that its clock was reset
 
 
 class EncoderJump(Fault):
-    """Encoder whose length and rate do not agree."""
+    """Encoder with inconsistent length and rate."""
 
     name = "encoder jump"
     rule = (
@@ -39,13 +39,13 @@ class EncoderJump(Fault):
     homing = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with nothing read."""
+        """Begin without a sample."""
         super().__init__(seen)
-        self._numbers = False  # whether the sample before had numbers
+        self._numbers = False  # True if the previous sample had finite values
         self._regular = np.full(seen.group_of.max() + 1, CATCHING_UP)  # for how many cycles each group's commands were
 
     def found(self, cycle: Cycle) -> str | None:
-        """The largest jump, or a reading that is not finite."""
+        """Largest jump, or a reading that is not finite."""
         sample, before = cycle.sample, cycle.before
         known, self._numbers = self._numbers, finite(sample.length) and finite(sample.rate)
         if before is not None:
@@ -60,7 +60,7 @@ class EncoderJump(Fault):
         return self._jump(cycle, sample, before) if known and before is not None else None
 
     def _jump(self, cycle: Cycle, sample: Sample, before: Sample) -> str | None:
-        """The largest jump against the rate before it; the rate after it may contain the jump."""
+        """Largest jump relative to the rate before it; the rate after it may contain the jump."""
         passed = (sample.plc_time - before.plc_time)[self.seen.group_of]
         change = sample.length - before.length
         jump = change - before.rate * passed
@@ -69,12 +69,12 @@ class EncoderJump(Fault):
         jump = np.abs(jump)
         if cycle.command is not None:
             jump = np.minimum(jump, np.abs(change - cycle.command.rate * passed))
-        # a locked drum stops at once, and one whose drive is at its limit moves with the cable
+        # a locked drum stops immediately, and a drive at its limit moves with the cable
         free = (sample.state == _ENABLED) & (before.state == _ENABLED)
         free &= (passed >= 0.0) & (passed < LONGEST)
-        # a drive without commands for some cycles goes to the next one at its largest speed
+        # after some cycles without commands, a drive moves to the next one at its largest speed
         free &= (self._regular >= CATCHING_UP)[self.seen.group_of]
-        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # over a gap rates may have changed more
+        allowed = JUMP * np.maximum(1.0, passed / self.seen.period)  # during a gap rates may have changed more
         jumped = free & ~(jump <= allowed)
         if not jumped.any():
             return None
@@ -97,12 +97,12 @@ class FollowingError(Fault):
     homing = True
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with no command."""
+        """Begin without a command."""
         super().__init__(seen)
         self._sent: deque[Command] = deque(maxlen=REMEMBERED)
 
     def found(self, cycle: Cycle) -> str | None:
-        """The drum furthest from its set point."""
+        """Drum with the largest distance from its set point."""
         command, length = cycle.command, cycle.sample.length
         if command is None or command.mode != _FOLLOW:
             self._sent.clear()
@@ -111,7 +111,7 @@ class FollowingError(Fault):
         if largest(command.length - length) <= FOLLOWING:
             return None
         away = self._away(cycle)
-        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # jumps are reported already
+        far = ~(away <= FOLLOWING) & ~self.seen.jumped  # jumps are already reported
         if not far.any():
             return None
         winch = int(np.argmax(np.where(far, away, 0.0)))
@@ -121,16 +121,16 @@ class FollowingError(Fault):
         )
 
     def _away(self, cycle: Cycle) -> Array:
-        """Distance of each drum from the interval between the last two commands its PLC took [m], (m,).
+        """Distance of each drum from the interval between the last two commands accepted by its PLC [m], (m,).
 
-        A command that is still on its way does not count, nor do drives that may not move.
+        A command in transit does not count; neither do drives that may not move.
         """
         sent = {command.counter: k for k, command in enumerate(self._sent)}
         length = cycle.sample.length
         away = np.zeros(length.size)
         for g, echo in enumerate(cycle.sample.echo.tolist()):
             k = sent.get(echo, 0)
-            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # not known, or nothing before, or not followed
+            if k == 0 or not cycle.sample.status[g] & _FOLLOWING:  # unknown, no previous command, or not following
                 continue
             mine = self.seen.group_of == g
             last, first = self._sent[k], self._sent[k - 1]
@@ -142,7 +142,7 @@ class FollowingError(Fault):
 
 
 class NotFollowing(Fault):
-    """Group that takes no commands, or does not follow them."""
+    """Group that accepts no commands, or does not follow them."""
 
     name = "group does not follow"
     rule = (
@@ -153,13 +153,13 @@ class NotFollowing(Fault):
     within = "40 or 100 ms"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with no command."""
+        """Begin without a command."""
         super().__init__(seen)
         self._first: int | None = None  # counter of the first command to follow
-        self._idle: dict[int, int] = {}  # samples in a row of a group that took one, and does not
+        self._idle: dict[int, int] = {}  # consecutive samples of a group that accepted a command but does not follow
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first group."""
+        """First such group."""
         command, sample = cycle.command, cycle.sample
         if command is None or command.mode != _FOLLOW:
             self._first = None
@@ -187,7 +187,7 @@ class NotFollowing(Fault):
         return None
 
     def _idles(self, cycle: Cycle, group: int) -> int:
-        """Number of consecutive samples in which a group did not follow the commands it took."""
+        """Number of consecutive samples in which a group did not follow its accepted commands."""
         sample, before = cycle.sample, cycle.before
         assert self._first is not None
         echo = int(sample.echo[group])
@@ -207,7 +207,7 @@ class ServoSaturated(Fault):
     within = "0.2 s"
 
     def found(self, cycle: Cycle) -> str | None:
-        """The drive that has been at its limit longest."""
+        """Drive that has been at its limit for the longest time."""
         if _AT_LIMIT not in self.seen.states:
             self._for.fill(0)
             return None
@@ -223,7 +223,7 @@ class ServoSaturated(Fault):
 
 
 class CorrectionAtLimit(Fault):
-    """Correction of the tension loop larger than the error of any good encoder."""
+    """Correction of the tension loop that is larger than the error of any good encoder."""
 
     name = "correction at its limit"
     rule = "the tension loop has changed a length by as much as it may, 5 mm unless set otherwise"
@@ -232,7 +232,7 @@ class CorrectionAtLimit(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The length with the largest correction."""
+        """Length with the largest correction."""
         if largest(cycle.correction) < self.seen.largest * (1.0 - 1e-9):
             return None
         winch = int(np.argmax(np.abs(cycle.correction)))

@@ -12,12 +12,12 @@ from sagline.control.link import GroupFault, GroupStatus, Mode, WinchState, faul
 from sagline.core.arrays import Flags
 
 STALE, SILENT = 3, 10  # cycles
-WINDOW: Final = 100  # cycles that are looked back on
+WINDOW: Final = 100  # cycles in the evaluated window
 LATE, LATE_OFTEN, LOST = 0.02, 0.005, 0.1  # s
-OFTEN: Final = 3  # of a window
-ROUNDING: Final = 1e-6  # of an age
+OFTEN: Final = 3  # per window
+ROUNDING: Final = 1e-6  # share of an age
 
-# plain integers: an enumeration's member makes each operation on an array four times slower
+# plain integers: a member of an enumeration makes each array operation four times slower
 _LOCKED, _EMERGENCY, _PRESSED = int(GroupStatus.LOCKED), int(GroupStatus.EMERGENCY), int(GroupFault.EMERGENCY_STOP)
 _TRIPPED, _LEAVE = int(WinchState.FAULT), int(Mode.LEAVE)
 
@@ -25,13 +25,13 @@ _FREE: Final = "Free this computer of other work."
 
 
 class _Old(Fault):
-    """Newest sample of a group too many cycles old."""
+    """Group whose newest sample is too many cycles old."""
 
     cycles: int
     step: str
 
     def found(self, cycle: Cycle) -> str | None:
-        """The group with the oldest sample, and its age."""
+        """Group with the oldest sample, and its age."""
         worst, limit = self.seen.oldest, self.cycles * self.seen.period
         if worst < limit * (1.0 - ROUNDING):
             return None
@@ -64,7 +64,7 @@ class GroupSilent(_Old):
 
 
 class BlockDiscarded(Fault):
-    """Invalid blocks; where no valid ones arrive, the group becomes stale."""
+    """Invalid blocks; without valid ones, the group becomes stale."""
 
     name = "block discarded"
     rule = "torn or foreign, by counters at both ends, magic, version or size; repeated, or older than one before"
@@ -72,12 +72,12 @@ class BlockDiscarded(Fault):
     within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with nothing found."""
+        """Begin without findings."""
         super().__init__(seen)
         self._quiet, self._line = WINDOW, ""
 
     def found(self, cycle: Cycle) -> str | None:
-        """The group and the number of its discarded blocks; ends after a second without another."""
+        """Group and number of its discarded blocks; ends after one second without another."""
         sample, before = cycle.sample, cycle.before
         self._quiet += 1
         if before is not None and sample.discarded.tolist() != before.discarded.tolist():
@@ -99,7 +99,7 @@ class OwnerLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """The first group that is not ours."""
+        """First group whose grant belongs to another owner or to none."""
         command = cycle.command
         if command is None or command.mode == _LEAVE:
             return None
@@ -126,7 +126,7 @@ class GroupActs(Fault):
         self._reported: Flags = np.zeros(int(seen.group_of.max()) + 1, dtype=bool)
 
     def found(self, cycle: Cycle) -> str | None:
-        """The groups that are new, and the reason of the first."""
+        """New groups, and the reason of the first one."""
         seen, sample = self.seen, cycle.sample
         if not (seen.faulted or seen.tripped or seen.bits & _LOCKED):
             return None
@@ -135,7 +135,7 @@ class GroupActs(Fault):
         tripped = (sample.winch_fault != 0) | (sample.state == _TRIPPED)
         acting = (sample.fault != 0) | ((sample.status & _LOCKED) != 0)
         acting[seen.group_of[tripped]] = True
-        acting &= (sample.status & _EMERGENCY) == 0  # locked as required
+        acting &= (sample.status & _EMERGENCY) == 0  # the groups are locked as required
         acting &= sample.fault != _PRESSED
         new = acting & ~self._reported
         if not new.any():
@@ -154,7 +154,7 @@ class GroupActs(Fault):
 
 
 class EmergencyStop(Fault):
-    """Emergency stop of the hardware, as the PLC reports it."""
+    """Emergency stop of the hardware, reported by the PLC."""
 
     name = "emergency stop"
     rule = "a PLC reports that the emergency stop is pressed"
@@ -163,7 +163,7 @@ class EmergencyStop(Fault):
     homing = True
 
     def found(self, cycle: Cycle) -> str | None:
-        """The groups that report it."""
+        """Groups that report it."""
         if not (self.seen.faulted or self.seen.bits & _EMERGENCY):
             return None
         sample = cycle.sample
@@ -175,7 +175,7 @@ class EmergencyStop(Fault):
 
 
 class CycleLate(Fault):
-    """Cycle late: the computer is too busy."""
+    """Late cycle: the computer is too busy."""
 
     name = "cycle late"
     rule = f"> {1e3 * LATE:g} ms late, or {OFTEN} of {WINDOW} cycles > {1e3 * LATE_OFTEN:g} ms late"
@@ -183,13 +183,13 @@ class CycleLate(Fault):
     within = "1 cycle"
 
     def __init__(self, seen: Evidence) -> None:
-        """Begin with no cycle late."""
+        """Begin without late cycles."""
         super().__init__(seen)
         self._cycle = 0
-        self._late: deque[tuple[int, float]] = deque()  # of the window: when, and by how much
+        self._late: deque[tuple[int, float]] = deque()  # times and delays in the window
 
     def found(self, cycle: Cycle) -> str | None:
-        """The latest cycle of the last second, or the number of late ones."""
+        """Latest cycle of the last second, or the number of late ones."""
         self._cycle += 1
         late = self._late
         if LATE_OFTEN < cycle.late <= LOST:
@@ -218,7 +218,7 @@ class CycleLost(Fault):
     within = "1 cycle"
 
     def found(self, cycle: Cycle) -> str | None:
-        """By how much the cycle was late."""
+        """Delay of the cycle."""
         if cycle.late <= LOST:
             return None
         return (
@@ -236,7 +236,7 @@ class RecordingStopped(Fault):
     within = "1 s"
 
     def found(self, cycle: Cycle) -> str | None:
-        """The reason."""
+        """Reason why recording stopped."""
         if not cycle.recording:
             return None
         why = cycle.recording if len(cycle.recording) <= 120 else cycle.recording[:117] + "..."

@@ -19,22 +19,22 @@ from sagline.robot.robot import Robot
 from sagline.statics.stiffness import stiffness
 from sagline.tension.method import TensionMethod
 
-WINDOW: Final = 50  # samples whose mean is judged, all of them taken at rest
-MOST: Final = 1.2  # times the plan's tension: more ends a jog
+WINDOW: Final = 50  # number of samples for the mean, all of them at rest
+MOST: Final = 1.2  # ratio to the plan's tension: a larger tension ends a jog
 
 
 class Homing:
     """Plan at the named pose, and comparison of tensions with it.
 
     Attributes:
-        plan: The robot at that pose.
-        state: The same as an equilibrium.
-        standing: Constant set point there.
-        tension: T_A there [N], shape (m,).
-        sigma: Of the load cells [N], shape (m,).
-        off: Mean of the measured tensions minus these [N], shape (m,).
-        zero: To be added to the lengths of samples [m], shape (m,).
-        agrees: Whether every tension was within 5 sigma.
+        plan: Plan of the robot at that pose.
+        state: Equilibrium of the plan.
+        standing: Constant set point at the pose.
+        tension: T_A at the pose [N], shape (m,).
+        sigma: Standard deviation of the load cells [N], shape (m,).
+        off: Mean of the measured minus the planned tensions [N], shape (m,).
+        zero: Offset added to the lengths of samples [m], shape (m,).
+        agrees: True if every tension is within 5 sigma.
     """
 
     def __init__(self, robot: Robot, pose: Pose, model: CableModel, method: TensionMethod) -> None:
@@ -55,14 +55,14 @@ class Homing:
         self.off, self.zero, self.agrees = np.full(m, np.nan), np.zeros(m), False
 
     def rest(self) -> None:
-        """Discard the samples: a winch has moved."""
+        """Discard the samples after a winch has moved."""
         self._count = 0
         self._lengths[:] = self._tensions[:] = 0.0
 
     def look(self, sample: Sample) -> bool:
-        """Add a sample at rest; True where there are enough of them, and they agree with the plan."""
+        """Add a sample at rest; True if there are enough samples, and they agree with the plan."""
         if self._counter.size and bool((sample.counter == self._counter).any()):
-            return False  # a group says what it said before
+            return False  # a group repeats its previous sample
         self._counter = sample.counter
         self._count += 1
         self._lengths += sample.length
@@ -76,7 +76,7 @@ class Homing:
         return self.agrees
 
     def refusal(self) -> RefusedError:
-        """Error that names the deviating tensions, and a jog that reduces them."""
+        """Error with the deviating tensions, and a jog that reduces them."""
         off, beyond = self.off, np.abs(self.off) - SIGMAS * self.sigma
         named = ", ".join(f"{i} by {off[i]:+.1f} N" for i in np.argsort(-beyond)[:3] if beyond[i] > 0.0)
         allowed = f"{SIGMAS * float(self.sigma.max()):.3g} N"
@@ -118,5 +118,5 @@ class HomingJog:
 
 
 def jog_tension_limits(homing: Homing, sample: Sample) -> Array:
-    """Tension limits of a jog [N], shape (m,): 1.2 of the plan, or the present tension where that is larger."""
+    """Tension limits of a jog [N], shape (m,): 1.2 of the plan, or the present tension if that is larger."""
     return np.maximum(MOST * homing.tension, sample.tension + 3.0 * homing.sigma)

@@ -23,22 +23,22 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
-WINCH_SPEED: Final = 0.01  # m/s, of a winch that is jogged
+WINCH_SPEED: Final = 0.01  # m/s, for a jog of a winch
 PLATFORM_SPEED: Final = 0.02  # m/s
 PLATFORM_TURNING: Final = 0.05  # rad/s
-SHORTEST: Final = 0.4  # s, of a jog
-MOST_WINCH: Final = 0.1  # m at a time
-MOST_PLATFORM: Final = 0.2  # m, rad at a time
+SHORTEST: Final = 0.4  # s, for a jog
+MOST_WINCH: Final = 0.1  # m per jog
+MOST_PLATFORM: Final = 0.2  # m or rad per jog
 
 
 def checked_winch(robot: Robot, winch: int, by: float) -> tuple[int, float]:
-    """Checked number of a winch, and the change of its length [m], positive where cable is let out."""
+    """Checked index of a winch, and the change of its length [m], positive if cable is paid out."""
     chosen = whole_number(winch, "winch", 0, robot.cable_count - 1)
     return chosen, _at_most(number(by, "by", "m"), "m", MOST_WINCH)
 
 
 def winch_lengths(length: Array, winch: int, by: float, period: float) -> tuple[Array, Array]:
-    """Lengths and rates of a jog of one winch by a length [m] from rest, (N, m), one row a cycle; period [s]."""
+    """Lengths and rates of a jog of one winch by a length [m] from rest, (N, m), one row per cycle; period [s]."""
     count = ceil(max(SHORTEST, 1.5 * abs(by) / WINCH_SPEED) / period)
     share = np.arange(count + 1) / count
     lengths, rates = np.repeat(length[None], count + 1, axis=0), np.zeros((count + 1, len(length)))
@@ -114,7 +114,7 @@ class PlatformJog:
         self._fade = Fade(lead, period)
 
     def step(self) -> SetPoint:
-        """The set point of the next cycle; where the pose has no solution, the last one, and `failed` the reason."""
+        """Set point of the next cycle; if its pose has no solution, the last set point, and `failed` has the reason."""
         self._cycle = min(self._cycle + 1, self._count)
         share = self._cycle / self._count
         found = self._solver.step(*self._at(smooth(share)))
@@ -125,7 +125,7 @@ class PlatformJog:
         left = self._fade.step()
         length = found.unstrained_length if left is None else found.unstrained_length + left[0]
         rate = (length - self._point.length) / self._period
-        hanging = found.vertical_force - self._weight * found.unstrained_length  # pulleys and dead length left out
+        hanging = found.vertical_force - self._weight * found.unstrained_length  # without pulleys and dead length
         tension = np.hypot(found.horizontal_tension, hanging)
         done = self._cycle == self._count and left is None
         self._point = self._point._replace(
@@ -139,7 +139,7 @@ class PlatformJog:
         return self._point
 
     def _at(self, share: float) -> tuple[Array, Array]:
-        """Position and quaternion at a share of the way."""
+        """Position and quaternion at a share of the displacement."""
         by = share * self._by
         half = 0.5 * float(np.linalg.norm(by[3:]))
         x, y, z = 0.5 * np.sinc(half / np.pi) * by[3:]
@@ -157,7 +157,7 @@ class PlatformJog:
 
 
 def checked_displacement(by: ArrayLike) -> Array:
-    """Checked displacement of the platform with a rotation vector, zero where not given, shape (6,)."""
+    """Checked displacement of the platform with a rotation vector, zero if not given, shape (6,)."""
     given = checked(by, "by", "m or rad")
     if given.shape not in ((3,), (6,)):
         step = "Give a displacement, or that and a rotation vector."

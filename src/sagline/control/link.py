@@ -13,37 +13,37 @@ from sagline.core.status import Status
 
 Whole: TypeAlias = NDArray[np.int64]
 
-PERIOD: Final = 0.01  # s, of the controller's cycle: the article's 100 samples a second
-GROUP_SIZE: Final = 2  # winches behind one PLC
-COUNTERS: Final = 2**31 - 1  # of commands and blocks go from 1 to here, and begin again
+PERIOD: Final = 0.01  # s, of the controller's cycle: the article's 100 samples per second
+GROUP_SIZE: Final = 2  # winches per PLC
+COUNTERS: Final = 2**31 - 1  # counters of commands and blocks run from 1 to this value, then start at 1 again
 HEARTBEAT: Final = 0.1  # s without a change of the command counter, after which a PLC ramps its winches down and holds
-OWNER_TIMEOUT: Final = 0.5  # s without a change of it, after which another controller may have the grant
-RAMP: Final = 0.2  # s, in which rates go to zero, here and in a PLC
+OWNER_TIMEOUT: Final = 0.5  # s without a change of the command counter, after which another controller may take over
+RAMP: Final = 0.2  # s: time in which rates go to zero, here and in a PLC
 
 
 class Mode(IntEnum):
     """Task of the drives in a command."""
 
     LEAVE = 0  # brakes on; the grant is given back
-    HOLD = 1  # stay where you are
-    FOLLOW = 2  # go to the set points
-    LOCK = 3  # stop the drums at once, and stay so until the operator of the machine lets them go
+    HOLD = 1  # hold the present position
+    FOLLOW = 2  # follow the set points
+    LOCK = 3  # stop the drums immediately, and keep them locked until the operator of the machine releases them
 
 
 class GroupStatus(IntFlag):
     """Status bits of a group."""
 
-    READY = 1  # drives have no fault, and power
+    READY = 1  # drives have power and no fault
     BRAKED = 2
-    FOLLOWING = 4  # set points
-    RAMPING = 8  # slows down by itself
-    HOLDING = 16  # by itself: after a ramp, or at a limit
-    LOCKED = 32  # drums
-    EMERGENCY = 64  # stop, of the hardware
+    FOLLOWING = 4  # the drives follow set points
+    RAMPING = 8  # the group slows down without a command
+    HOLDING = 16  # the group holds without a command: after a ramp, or at a limit
+    LOCKED = 32  # drums are locked
+    EMERGENCY = 64  # emergency stop of the hardware
 
 
 class GroupFault(Status):
-    """Reason why a PLC has stopped its winches, in words `text`."""
+    """Reason why a PLC has stopped its winches; `text` describes it."""
 
     NONE = 0, "no fault"
     HEARTBEAT = 1, "no command came for 100 ms"  # the counter stood, or a command was valid no longer
@@ -67,7 +67,7 @@ class WinchState(IntEnum):
 
     BRAKED = 0
     ENABLED = 1
-    SATURATED = 2  # its drive gives all it can
+    SATURATED = 2  # its drive is at its force limit
     LOCKED = 3
     FAULT = 4
 
@@ -76,15 +76,15 @@ class Command(NamedTuple):
     """Command of a controller in one cycle.
 
     Attributes:
-        counter: Of commands, one more each cycle; wraps to 1 after 2^31 - 1.
+        counter: Counter of commands, incremented each cycle; wraps to 1 after 2^31 - 1.
         owner: The controller's random id, 1 to 2^31 - 1.
         mode: Task of the drives.
-        valid_for: Time for which a PLC may use it [s].
+        valid_for: Time for which a PLC may use the command [s].
         length: Set points of the unstrained lengths off the drums at the end of the cycle [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
-        tension: Expected at the drums, feedforward of the motors [N], shape (m,).
+        tension: Expected tensions at the drums, feedforward of the motors [N], shape (m,).
         enable: Drives that may move, shape (m,).
-        claims: Whether grants that are not ours are claimed; a command to leave never does so.
+        claims: True if the command claims grants of other owners; a command to leave never does so.
     """
 
     counter: int
@@ -99,25 +99,25 @@ class Command(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """Newest data of the machine, in arrays of the caller's own. G groups, m winches.
+    """Newest data of the machine, in the caller's own arrays. G groups, m winches.
 
     Attributes:
-        time: Of the request, on the link's clock [s].
+        time: Time of the request, on the link's clock [s].
         age: Time since the newest valid block of each group arrived [s], shape (G,).
-        counter: Of each group's blocks, shape (G,).
+        counter: Counter of each group's blocks, shape (G,).
         plc_time: Time of writing, on the clock of each PLC [s], shape (G,).
         owner: Owner of each grant, 0 for none, shape (G,).
-        echo: Counter of the last command each PLC took, shape (G,).
+        echo: Counter of the last command accepted by each PLC, shape (G,).
         status: Bits of `GroupStatus`, shape (G,).
         fault: Codes of `GroupFault`, shape (G,).
         length: Unstrained lengths off the drums, from the encoders [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
-        torque: Of the motors at their shafts, positive where it lets cable out [N m], shape (m,).
-        tension: T_A, at the frame ends, as the load cells read it [N], shape (m,).
-        filtered: The same after the PLC's filter [N], shape (m,).
-        counts: Of the encoders, shape (m,).
+        torque: Torque of the motors at their shafts, positive if it pays out cable [N m], shape (m,).
+        tension: T_A, tension at the frame ends measured by the load cells [N], shape (m,).
+        filtered: T_A after the PLC's filter [N], shape (m,).
+        counts: Encoder counts, shape (m,).
         state: Codes of `WinchState`, shape (m,).
-        winch_fault: The drives' own codes, 0 for none, shape (m,).
+        winch_fault: Fault codes of the drives, 0 for none, shape (m,).
         discarded: Number of invalid blocks of each group so far, shape (G,).
     """
 
@@ -144,9 +144,9 @@ class Missing(NamedTuple):
     """No sample, because some groups have never answered.
 
     Attributes:
-        time: Of the request, on the link's clock [s].
-        groups: Numbers of the silent groups, from 0.
-        reasons: One for each of them.
+        time: Time of the request, on the link's clock [s].
+        groups: Indices of the silent groups, from 0.
+        reasons: One reason per silent group.
     """
 
     time: float
@@ -157,25 +157,25 @@ class Missing(NamedTuple):
 class Link(Protocol):
     """Connection to a machine.
 
-    What it hands over is never older than what it handed over before: a block that is torn, foreign, repeated or out of
-    order is discarded, and the group's age increases.
+    A sample is never older than the previous one: a torn, foreign, repeated or out-of-order block is discarded, and the
+    group's age increases.
     """
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The winches of each group, from 0."""
+        """Winches of each group, from 0."""
 
     @property
     def period(self) -> float:
-        """Time between two commands, after which set points are reached [s]."""
+        """Time between two commands; set points are reached after it [s]."""
 
     def exchange(self, command: Command | None) -> Sample | Missing:
         """Send a command and return the newest sample, without waiting for an answer.
 
-        What each group is sent, `sent_to` says: the command only where its owner has the grant.
+        `sent_to` returns the message for each group: the command only if its owner has the grant.
 
         Args:
-            command: Command to send; None only reads.
+            command: Command to send; None to read only.
         """
 
     def close(self) -> None:
@@ -191,7 +191,7 @@ class Sent(Enum):
 
 
 def sent_to(owner: int, command: Command) -> Sent:
-    """Message to a group, by the owner of its grant; 0 for none."""
+    """Message to a group whose grant has an owner; 0 for no owner."""
     if owner == command.owner:
         return Sent.COMMAND
     return Sent.CLAIM if command.claims and command.mode != Mode.LEAVE else Sent.NOTHING
@@ -203,6 +203,6 @@ def newer(counter: int, known: int) -> bool:
 
 
 def groups_of(cable_count: int) -> tuple[tuple[int, ...], ...]:
-    """Winches of each group: two neighbors share a PLC, the last may be alone."""
+    """Winches of each group: two neighbors share a PLC, the last winch may be alone."""
     winches = range(cable_count)
     return tuple(tuple(winches[i : i + GROUP_SIZE]) for i in range(0, cable_count, GROUP_SIZE))

@@ -23,8 +23,8 @@ class Loop:
 
     Attributes:
         context: Shared by all states.
-        active: The state.
-        stop_requested: Whether the next cycle begins to stop the motion.
+        active: Active state.
+        stop_requested: True if the next cycle begins to stop the motion.
     """
 
     def __init__(self, context: Context) -> None:
@@ -33,7 +33,7 @@ class Loop:
         self.active: ActiveState = Off(context)
 
     def cycle(self) -> None:
-        """One cycle; any exception makes the drives hold, and is raised again."""
+        """One cycle; on any exception the drives hold, and the exception is raised again."""
         try:
             self._cycle()
         except BaseException as error:
@@ -89,7 +89,7 @@ class Loop:
         correction: Array,
         late: float,
     ) -> None:
-        """Estimate the pose, look for faults, and react."""
+        """Estimate the pose, check for faults, and react."""
         c = self.context
         if c.homed or c.shadow:
             lost = c.locate(sample, None if point is None else point.wrench)
@@ -111,13 +111,13 @@ class Loop:
             self.active = Emergency(self.active, line)
 
     def _recording_stopped(self) -> str:
-        """Reason why the recorder takes nothing more, "" while it does."""
+        """Reason why the recorder has stopped, "" while it runs."""
         found: list[str] = []
         self.context.tell(lambda record: found.append(record.stopped))
         return found[0] if found else ""
 
     def _break_off(self, error: BaseException) -> None:
-        """Make the PLCs lead the rates to zero, because the next cycle may never be called."""
+        """Command the PLCs to ramp the rates to zero, because the next cycle may never be called."""
         c = self.context
         c.garbage.go_on()
         line = f"a cycle ended with {type(error).__name__}: {' '.join(str(error).split())[:160]}. The drives hold."
@@ -135,12 +135,12 @@ class Loop:
                     c.enter(State.STOPPING, line)
                 self.active = Holding(c, State.FAULT, line)
             self.active.rest(Mode.HOLD, enabled=True)
-        with suppress(Exception):  # the link itself may be what raises
+        with suppress(Exception):  # the exception may come from the link itself
             c.link.exchange(c.sender.command)
 
 
 def _aged(known: Sample | None, missing: Missing) -> Sample | None:
-    """The sample before, older by now, where a link that had samples has none."""
+    """Previous sample with a larger age if a link that had samples has none; otherwise None."""
     if known is None:
         return None
     return known._replace(time=missing.time, age=known.age + (missing.time - known.time))

@@ -30,7 +30,7 @@ class Monitor:
 
     @property
     def robot(self) -> Robot:
-        """The robot as it is planned for."""
+        """Robot for planning."""
         return self._context.robot
 
     @property
@@ -40,7 +40,7 @@ class Monitor:
 
     @property
     def sample(self) -> Sample | None:
-        """The newest sample of the machine; None before the first."""
+        """Newest sample of the machine; None before the first."""
         return self._context.sample
 
     @property
@@ -55,7 +55,7 @@ class Monitor:
 
     @property
     def owner(self) -> int:
-        """The controller's id."""
+        """Id of the controller."""
         return self._context.owner
 
     @property
@@ -65,17 +65,17 @@ class Monitor:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """All events so far."""
+        """All events up to now."""
         return tuple(self._context.journal.events)
 
     def events_from(self, first: int) -> list[Event]:
-        """The events from one of them on.
+        """Events from a given index on.
 
         Args:
-            first: Number of events that are known already.
+            first: Number of events that are already known.
 
         Raises:
-            InvalidValueError: If it is no whole number, or not between 0 and the number of events.
+            InvalidValueError: If `first` is not a whole number between 0 and the number of events.
         """
         events = self._context.journal.events
         return events[whole_number(first, "first", 0, len(events)) :]
@@ -87,7 +87,7 @@ class Monitor:
 
     @property
     def clock(self) -> tuple[float, float] | None:
-        """Time on the path, and its duration [s]; None where no path is followed."""
+        """Time on the path, and its duration [s]; None if no path is followed."""
         source = self._loop.active.source
         if not isinstance(source, Along):
             return None
@@ -95,15 +95,15 @@ class Monitor:
 
     @property
     def execution(self) -> Execution | None:
-        """The last motion, or its cycles so far; None before the first."""
+        """Last motion, or its cycles up to now; None before the first."""
         return self._context.execution()
 
     @property
     def estimate(self) -> Pose:
-        """Pose of the platform by the encoders.
+        """Pose of the platform from the encoders.
 
         Raises:
-            RefusedError: If it is not known.
+            RefusedError: If the pose is unknown.
         """
         pose = self._context.estimator.pose
         if pose is None:

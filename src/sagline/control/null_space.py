@@ -18,20 +18,20 @@ from sagline.robot.robot import Robot
 from sagline.statics.slopes import cable_slopes, on_platform, tension_slopes
 from sagline.statics.stiffness import stiffness
 
-SIGMAS: Final = 5.0  # tolerance of a reading
-OWN_DEVIATION: Final = 1.0  # N, of a cell that does not say
-BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
+SIGMAS: Final = 5.0  # tolerance of a reading, in standard deviations
+OWN_DEVIATION: Final = 1.0  # N, for a load cell without data
+BIAS: Final = 2.0  # N, 0.1 % of a load cell of 2 kN
 _LIFT: Final = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-_HIDDEN: Final = 1e-6  # of an error: what is less visible is not visible
+_HIDDEN: Final = 1e-6  # share of an error: with a smaller visible part, an error counts as invisible
 
 
 def cell_sigma(robot: Robot) -> Array:
-    """Standard deviation of what the load cells read, bias included [N], shape (m,)."""
+    """Standard deviation of the load cell readings, bias included [N], shape (m,)."""
     return np.hypot(*cell_errors(robot))
 
 
 def cell_errors(robot: Robot) -> tuple[Array, Array]:
-    """Standard deviations of what good load cells read, and the biases they may have [N], both of shape (m,)."""
+    """Standard deviations of good load cells, and the biases they may have [N], both of shape (m,)."""
     winches, none = robot.winches, np.zeros(robot.cable_count)
     own, bias = (none, none) if winches is None else (winches.load_cell_deviation, np.abs(winches.load_cell_bias))
     return np.where(own > 0.0, own, OWN_DEVIATION), np.maximum(bias, BIAS)
@@ -41,27 +41,27 @@ def balance_slope(state: Equilibrium) -> Array:
     """Free components of d(wrench)/d(tension) at the frame ends, platform held, (..., n, m) [N/N, N m/N]."""
     slopes = cable_slopes(state)
     wrench = on_platform(slopes.by_length, slopes.levers) / tension_slopes(state, slopes).by_length[..., None, :]
-    found: Array = -first_of(state.robot).freedom @ wrench  # the slopes are of the force on the cable
+    found: Array = -first_of(state.robot).freedom @ wrench  # the slopes refer to the force on the cable
     return found
 
 
 def parity(state: Equilibrium) -> Array:
     """Parity matrix for fault detection of load cells, independent of the weight of the load.
 
-    Where the platform rests, tension errors must not change the wrench, except for a load that is not the
-    planned one. With V the projection on all that they must not do, less the direction of the load, row i is
-    V_i/sqrt(V_ii): times the tensions less the plan it is the error of cell i alone that is most like what is seen, as
-    far as it is visible. The cell with the largest is named. Without the load's direction taken out, a load of another
-    weight would be taken for a cell.
+    At rest, tension errors must not change the wrench, except for a load that differs from the planned one. V is the
+    projection on all changes that are excluded, without the direction of the load. Row i is V_i/sqrt(V_ii). Its product
+    with the tensions minus the plan is the error of cell i that fits the observation best, as far as it is visible. The
+    cell with the largest product is reported. If the load's direction were not removed, a load of another weight would
+    look like a wrong cell.
 
     Args:
         state: An equilibrium, single or N of them.
 
     Returns:
-        Shape (..., m, m); zero rows for cells whose errors are not visible, NaN where the state has no lengths.
+        Shape (..., m, m); zero rows for cells whose errors are not visible, NaN if the state has no lengths.
 
     Raises:
-        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (for a plan: plan.state).
 
     Examples:
         >>> import sagline as sl
@@ -91,10 +91,11 @@ class NullSpace(NamedTuple):
     """Null-space and parity matrices at a pose; N_L = `null_lengths`, K_A = `tension_sensitivity`.
 
     Attributes:
-        projection: Pi = N_L N_L^T, of lengths on those that do not move the platform, shape (..., m, m).
-        visible: K_A N_L G, of tensions on those that such lengths change, shape (..., m, m); G = (K_A N_L)^+.
-        correction: N_L G, lengths that make up such tensions, shape (..., m, m) [m/N].
-        parity: Of the load cells, shape (..., m, m): see `parity`.
+        projection: Pi = N_L N_L^T, projection of lengths on those that do not move the platform, shape (..., m, m).
+        visible: K_A N_L G, projection of tensions on those that such lengths change, shape (..., m, m); G = (K_A
+            N_L)^+.
+        correction: N_L G, lengths that compensate such tensions, shape (..., m, m) [m/N].
+        parity: Parity matrix of the load cells, shape (..., m, m): see `parity`.
     """
 
     projection: Array
@@ -106,17 +107,17 @@ class NullSpace(NamedTuple):
 def null_space(state: Equilibrium) -> NullSpace:
     """Changes of length that do not move the platform, to first order, and their effect on the tensions.
 
-    Six of the eight directions of a tension error are a wrench that the plan does not know, a payload or a load cell's
-    own error; lengths that would hide it would move the platform. They are not among these.
+    Six of the eight directions of a tension error are a wrench that is not in the plan, such as a payload or a load
+    cell's own error. Lengths that compensate such an error would move the platform. They are excluded.
 
     Args:
         state: An equilibrium of a robot with more cables than free motions, single or N of them.
 
     Returns:
-        The matrices, single or N of them; NaN where the state has no lengths or its stiffness is singular.
+        Matrices, single or N of them; NaN if the state has no lengths or its stiffness is singular.
 
     Raises:
-        InvalidValueError: If the state is no Equilibrium (of a plan: plan.state).
+        InvalidValueError: If the state is not an Equilibrium (for a plan: plan.state).
 
     Examples:
         >>> import sagline as sl
@@ -145,7 +146,7 @@ class Gains:
     """Matrices of the tension loop at some poses of a plan.
 
     Attributes:
-        time: Of the R poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
+        time: Times of the R poses [s], strictly increasing, shape (R,); 0 for a plan of a single pose.
         rows: Matrices at these poses.
     """
 
@@ -166,14 +167,14 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
     """Gains of the tension loop along a plan.
 
     Args:
-        plan: Along a path, or of a single pose; feasible.
-        every: Time between two rows [s], > 0; the plan's samples nearest to these times are taken.
+        plan: Plan along a path, or of a single pose; feasible.
+        every: Time between two rows [s], > 0; the plan's samples nearest to these times are used.
 
     Returns:
         The table; None for a robot without redundancy, which has no tension loop: its tensions follow from the load.
 
     Raises:
-        InvalidValueError: If the plan is of poses without a path, or has one without lengths.
+        InvalidValueError: If the plan is of poses without a path, or has a pose without lengths.
 
     Examples:
         >>> import sagline as sl
@@ -210,7 +211,7 @@ def gains_along(plan: Plan, every: float = EVERY) -> Gains | None:
 
 
 def _nearest(time: Array, step: float) -> np.ndarray:
-    """Samples nearest to the first time and every step from there on, the last sample too; no sample twice."""
+    """Indices of the samples nearest to the first time and to every later step, and of the last sample."""
     wanted = time[0] + step * np.arange(int((time[-1] - time[0]) / step) + 1)
     after = np.clip(np.searchsorted(time, wanted), 1, max(time.size - 1, 1))
     if time.size == 1:

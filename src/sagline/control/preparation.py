@@ -1,4 +1,4 @@
-"""Requests beside motions: connecting, homing, stopping, acknowledging faults, and switching off."""
+"""Requests other than motions: connecting, homing, stopping, acknowledging faults, and switching off."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from sagline.core.arguments import instance
 from sagline.robot.pose import Pose
 
 T = TypeVar("T")
-SETTLING: Final = 3.0  # s, at most, in which homing compares tensions
+SETTLING: Final = 3.0  # s, longest time in which homing compares tensions
 
 
 class Preparation(Monitor):
     """Connecting, homing, stopping, acknowledging and switching off; base of `Controller`."""
 
     def cycle(self) -> None:
-        """Do one cycle: send and take, estimate, look for faults, and prepare the next command.
+        """Run one cycle: exchange data, estimate the pose, check for faults, and prepare the next command.
 
-        An exception within stops the winches: it becomes an event, a command to hold is sent, and it is raised again.
+        An exception in the cycle stops the winches: it becomes an event, a hold command is sent, and it is raised
+            again.
         """
         self._loop.cycle()
 
@@ -36,7 +37,7 @@ class Preparation(Monitor):
         """Begin to connect.
 
         Raises:
-            RefusedError: If it is connected already, or reads only.
+            RefusedError: If the controller is already connected, or only reads.
         """
         if self._context.shadow:
             raise RefusedError("connecting", "this controller only reads", "Make one without shadow.")
@@ -47,7 +48,7 @@ class Preparation(Monitor):
         """Connect, and wait until all groups agree.
 
         Raises:
-            RefusedError: If they do not; with the reason.
+            RefusedError: If the groups do not agree; with the reason.
         """
         self.claim()
         connecting = self._loop.active
@@ -88,7 +89,7 @@ class Preparation(Monitor):
             pose: A single pose.
 
         Raises:
-            RefusedError: If they do not: the state stays HOMING, and the message names a jog.
+            RefusedError: If the tensions do not agree: the state remains HOMING, and the message names a jog.
         """
         self.begin_homing(pose)
         last = self._context.number + round(SETTLING / self.period)
@@ -100,16 +101,16 @@ class Preparation(Monitor):
             raise RefusedError("homing", reason, "Read the events.")
 
     def stop(self) -> None:
-        """Lead all rates to zero, from the next cycle on; where nothing moves, nothing happens."""
+        """Ramp all rates to zero, from the next cycle on; no effect if nothing moves."""
         self._loop.request_stop()
 
     def acknowledge(self) -> None:
-        """Confirm that a fault is repaired: from FAULT to READY, and to IDLE where the place is still known.
+        """Confirm that a fault is repaired: from FAULT to READY, and to IDLE if the pose is still known.
 
         If the robot is idle and degraded, the load cells are used again.
 
         Raises:
-            RefusedError: If the state is another one, or not all groups agree yet; with the reason.
+            RefusedError: In any other state, or if not all groups agree yet; with the reason.
         """
         c, what = self._context, "acknowledging"
         if self.state is State.IDLE and self.degraded:
@@ -129,10 +130,10 @@ class Preparation(Monitor):
             self._loop.active = idle_at(c, found, "the pose is still known") or self._loop.active
 
     def off(self) -> None:
-        """Give all grants back, and wait until they are; the brakes fall.
+        """Give all grants back, and wait until this is done; the brakes engage.
 
         Raises:
-            RefusedError: If something moves.
+            RefusedError: If the robot moves.
         """
         if self.state is not State.OFF:
             check_transition(self.state, State.OFF, "switching off")
@@ -147,7 +148,7 @@ class Preparation(Monitor):
         return self.state is State.OFF and self._context.sender.command is not None
 
     def _run_while(self, condition: Callable[[], bool]) -> None:
-        """Do cycles while a condition holds; Ctrl-C stops the motion first."""
+        """Run cycles while a condition holds; Ctrl-C stops the motion first."""
         try:
             with interrupt_calls(self.stop):
                 while condition():
@@ -156,13 +157,13 @@ class Preparation(Monitor):
             self._context.garbage.go_on()
 
     def _wait_for(self, begun: Future[T]) -> T:
-        """Do cycles until a result is there."""
+        """Run cycles until a result is available."""
         while not begun.done():
             self.cycle()
         return begun.result()
 
     def _result_of(self, work: Callable[[], T]) -> T:
-        """Result of long work; in real time cycles go on meanwhile, or the PLCs would hold."""
+        """Result of long work; in real time cycles continue meanwhile, otherwise the PLCs would hold."""
         if self.pace is None or self.state is State.OFF:
             return work()
         with interrupt_calls(self.stop):

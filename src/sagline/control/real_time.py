@@ -29,7 +29,7 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import TensionMethod
 
 BIN: Final = 1e-4  # s
-BINS: Final = 1000  # and one for all that is longer
+BINS: Final = 1000  # and one bin for all longer durations
 
 
 class Histogram:
@@ -37,31 +37,31 @@ class Histogram:
 
     def __init__(self) -> None:
         """Begin empty."""
-        self._counts = [0] * (BINS + 1)  # a list counts quicker than an array
+        self._counts = [0] * (BINS + 1)  # a list counts faster than an array
         self.longest = 0.0
 
     def add(self, duration: float) -> None:
-        """Count one.
+        """Count one duration.
 
         Args:
-            duration: [s], >= 0.
+            duration: Duration [s], >= 0.
         """
         self._counts[min(int(duration / BIN), BINS)] += 1
         self.longest = max(self.longest, duration)
 
     @property
     def counts(self) -> Indices:
-        """Number of durations in each bin, shape (1001,); the last has all from 100 ms on."""
+        """Number of durations in each bin, shape (1001,); the last bin has all from 100 ms on."""
         return locked(np.array(self._counts))
 
     def quantile(self, share: float) -> float:
-        """Quantile of the durations, rounded up to the end of its bin [s]; 0 where there are none.
+        """Quantile of the durations, rounded up to the end of its bin [s]; 0 without durations.
 
         Args:
-            share: Of all, 0 to 1.
+            share: Share of all durations, 0 to 1.
 
         Raises:
-            InvalidValueError: If it is no such number.
+            InvalidValueError: If `share` is not a number in this range.
         """
         if not number(share, "share", "", low=0.0) <= 1.0:
             raise InvalidValueError("share", f"{share:g}", "0 to 1", "Give 0.999 for what 999 of 1000 do not exceed.")
@@ -73,24 +73,24 @@ class Histogram:
 
 
 class Pace:
-    """Waits for the next tick of a clock that does not drift: ticks are a period apart, whatever a cycle takes.
+    """Wait for the next tick of a clock without drift: ticks are one period apart, whatever a cycle takes.
 
-    It sleeps and does not spin: threads of the link need the time. Where a cycle is late by more than a period, the
-    ticks start again there: set points that were missed are not sent in a burst.
+    It sleeps and does not spin, because threads of the link need the time. If a cycle is late by more than a period,
+    the ticks start again at that time: missed set points are not sent in a burst.
     """
 
     def __init__(self, period: float = PERIOD) -> None:
         """Begin at the first wait.
 
         Args:
-            period: Between two ticks [s], > 0.
+            period: Time between two ticks [s], > 0.
 
         Raises:
-            InvalidValueError: If it is no such number.
+            InvalidValueError: If `period` is not such a number.
         """
         self.period = number(period, "period", "s", above=0.0)
         self.lateness = Histogram()
-        self.periods = Histogram()  # from the beginning of a cycle to that of the next
+        self.periods = Histogram()  # from the start of a cycle to the start of the next
         self._next: float | None = None
         self._began = 0.0
 
@@ -98,7 +98,7 @@ class Pace:
         """Wait for the next tick.
 
         Returns:
-            By how much the cycle begins too late [s], >= 0.
+            Delay of the start of the cycle [s], >= 0.
         """
         now = time.perf_counter()
         if self._next is None:
@@ -118,7 +118,7 @@ T = TypeVar("T")
 
 
 def in_background(work: Callable[[], T], threaded: bool) -> Future[T]:
-    """Begin work in a thread of its own; without threads, as on a lockstep clock, complete it at once."""
+    """Run work in its own thread; without threads, as on a lockstep clock, complete it immediately."""
     if threaded:
         pool = ThreadPoolExecutor(1, "sagline planning")
         begun = pool.submit(work)
@@ -133,7 +133,7 @@ def in_background(work: Callable[[], T], threaded: bool) -> Future[T]:
 
 
 class Garbage:
-    """Garbage collection, which is off during motion, as it takes longer than a cycle."""
+    """Garbage collection, which is off during motion because it takes longer than a cycle."""
 
     def __init__(self) -> None:
         """Begin without change."""
@@ -179,7 +179,7 @@ def interrupt_calls(stop: Callable[[], object]) -> Iterator[None]:
 
 
 MOVE = 0.01  # m
-HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # below the frame's anchors, in widths of the frame
+HEIGHTS = (0.25, 0.5, 0.1, 0.75)  # below the frame anchors, as shares of the frame width
 
 
 def load_kernels(robot: Robot, period: float, model: CableModel, method: TensionMethod) -> None:
@@ -202,7 +202,7 @@ def load_kernels(robot: Robot, period: float, model: CableModel, method: Tension
 
 
 def _first_feasible(robot: Robot, model: CableModel, method: TensionMethod) -> tuple[Pose, Homing | None]:
-    """The first place with tensions within the limits; else the middle, and None."""
+    """First position with tensions within the limits; otherwise the middle, and None."""
     for place in _probable_positions(robot):
         pose = Pose.from_euler(place, 0.0, 0.0, 0.0)
         with suppress(SaglineError):

@@ -20,20 +20,20 @@ from sagline.kinematics.plan import Plan
 class EventKind(StrEnum):
     """Kind of an event."""
 
-    STATE = "state"  # it changed
+    STATE = "state"  # change of state
     FAULT = "fault"
-    NOTE = "note"  # for the operator; nothing follows from it
+    NOTE = "note"  # for the operator; without consequences
 
 
 class Event(NamedTuple):
     """Change of state, fault or note.
 
     Attributes:
-        time: On the link's clock [s].
-        cycle: Number of the controller's cycle, from 0.
+        time: Time on the link's clock [s].
+        cycle: Index of the controller's cycle, from 0.
         kind: State, fault or note.
         name: The state that was entered, or the fault.
-        state: Of the controller after it.
+        state: State of the controller after the event.
         text: One line for the operator.
     """
 
@@ -57,22 +57,22 @@ WHOLE_OF_WINCHES: Final = ("counts", "state", "winch_fault")
 
 
 class Recorded(NamedTuple):
-    """Record of one cycle. Its arrays are not written to again.
+    """Record of one cycle. Its arrays are not modified later.
 
     Attributes:
-        number: Of the cycle, from 0.
-        state: Of the controller at its end.
-        degraded: Whether a cell is ignored, and the tension loop rests.
-        late: Delay of its beginning [s]; 0 on a lockstep clock.
-        clock: Time on the plan from its start [s]; NaN where there is none.
-        command: Sent in it; None: nothing was sent.
-        answer: Of the link.
-        position: Of the platform's origin, from the encoders [m], shape (3,); NaN before homing.
+        number: Index of the cycle, from 0.
+        state: State of the controller at the end of the cycle.
+        degraded: True if a cell is ignored, and the tension loop keeps its correction.
+        late: Delay of the start of the cycle [s]; 0 on a lockstep clock.
+        clock: Time on the plan from its start [s]; NaN without a plan.
+        command: Command sent in the cycle; None if nothing was sent.
+        answer: Answer of the link.
+        position: Position of the platform's origin, from the encoders [m], shape (3,); NaN before homing.
         quaternion: Rotation platform -> world from the encoders, scalar last, shape (4,).
-        estimate: Code of its `ForwardStatus`; -1 where there is none.
-        zero: Of homing, added to lengths of samples and subtracted from set points [m], shape (m,).
-        planned_tension: T_A planned for the moment of the answer [N], shape (m,); NaN where there is no plan.
-        correction: Of the tension loop, in the set points that were sent [m], shape (m,).
+        estimate: Code of the `ForwardStatus`; -1 if there is none.
+        zero: Offset from homing, added to lengths of samples and subtracted from set points [m], shape (m,).
+        planned_tension: T_A planned for the time of the answer [N], shape (m,); NaN without a plan.
+        correction: Correction of the tension loop in the set points that were sent [m], shape (m,).
     """
 
     number: int
@@ -95,7 +95,7 @@ class Recorder(Protocol):
 
     @property
     def stopped(self) -> str:
-        """Reason why it takes nothing more, "" while it does: `Cycle.recording` of the fault rules."""
+        """Reason why the recorder has stopped, "" while it runs: `Cycle.recording` of the fault rules."""
 
     def begins(self, plan: Plan) -> None:
         """Receive a plan before its first cycle.
@@ -152,7 +152,7 @@ class Tape:
         return self._count
 
     def add(self, cycle: Recorded) -> None:
-        """Keep a cycle."""
+        """Add a cycle."""
         k = self._count
         if k == len(self._numbers):
             self._numbers, self._codes = (np.concatenate((old, np.empty_like(old))) for old in self._tables)
@@ -170,7 +170,7 @@ class Tape:
         own = (answer.time, cycle.late, cycle.clock)
         sight = (cycle.position, cycle.quaternion)
         np.concatenate((own, *sight, *read, *asked, cycle.planned_tension, cycle.correction), out=self._numbers[k])
-        # plain integers, which numpy takes ten times as fast as members of an enumeration
+        # plain integers: numpy takes them ten times as fast as members of an enumeration
         about = (int(answer.__class__ is Sample), int(cycle.state), cycle.estimate, int(mode))
         np.concatenate((about, *codes), out=self._codes[k])
         self._count = k + 1
@@ -201,7 +201,7 @@ class Journal:
     """List of events, and the recorder.
 
     Attributes:
-        events: So far.
+        events: Events up to now.
     """
 
     def __init__(self, record: Recorder | None) -> None:
@@ -215,12 +215,12 @@ class Journal:
         return self._record is not None
 
     def add(self, event: Event) -> str:
-        """Add an event; the message of `tell`."""
+        """Add an event; return the message of `tell`."""
         self.events.append(event)
         return self.tell(lambda record: record.event(event))
 
     def tell(self, what: Callable[[Recorder], object]) -> str:
-        """Call a method of the recorder; where it raises, drop it and return a message, else ""."""
+        """Call a method of the recorder; if it raises, remove it and return a message, else ""."""
         if self._record is None:
             return ""
         try:

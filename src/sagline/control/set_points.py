@@ -1,4 +1,4 @@
-"""Sources of set points: standing, along a plan, and slowing down."""
+"""Sources of set points: constant, along a plan, and slowing down."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-LEAD_SPEED: Final = 0.01  # m/s: so fast at most goes what a plan's first lengths are off those that are held
-WHOLE: Final = 1e-9  # of a row
+LEAD_SPEED: Final = 0.01  # m/s: largest rate of the transition from the lengths at rest to a plan's first lengths
+WHOLE: Final = 1e-9  # share of a row
 
 
 class SetPoint(NamedTuple):
@@ -29,14 +29,14 @@ class SetPoint(NamedTuple):
     Attributes:
         length: Unstrained lengths off the drums, of the model [m], shape (m,).
         rate: Their rates [m/s], shape (m,).
-        tension: T_A planned there [N], shape (m,); NaN where nothing is known.
-        drum_tension: Expected at the drums [N], shape (m,).
-        wrench: External plus inertial, on the platform [N, N m], shape (6,); None for none.
-        row: Matrices of the tension loop there; None where there are none.
-        clock: On the plan [s]; NaN beside one.
-        done: Whether the source ends here.
+        tension: T_A planned for the set point [N], shape (m,); NaN if unknown.
+        drum_tension: Expected tension at the drums [N], shape (m,).
+        wrench: External plus inertial wrench on the platform [N, N m], shape (6,); None for none.
+        row: Matrices of the tension loop at the set point; None if there are none.
+        clock: Time on the plan [s]; NaN outside a plan.
+        done: True if the source ends here.
         enable: Drives that may move, shape (m,); None for all.
-        leading: Whether the lengths at rest still change to those of a plan: tensions are not the plan's yet.
+        leading: True while the lengths at rest still change to those of a plan: tensions are not yet the planned ones.
     """
 
     length: Array
@@ -55,7 +55,7 @@ class SetPointSource(Protocol):
     """Source of one set point in each cycle."""
 
     def step(self) -> SetPoint:
-        """The next set point; beyond the end the last one again, with rates of zero."""
+        """Next set point; beyond the end the last one again, with rates of zero."""
 
 
 class Standing:
@@ -93,7 +93,7 @@ class Standing:
 
 
 def standing_at(robot: Robot, length: Array, start: Pose | None, model: CableModel) -> Standing | ForwardStatus:
-    """Constant set point at lengths [m] (m,), with the pose found by forward kinematics; or why there is none."""
+    """Constant set point at lengths [m] (m,), with the pose from forward kinematics; or the status without one."""
     found = forward(robot, length, start, model)
     return Standing.at(found.state) if found.status in STABLE else ForwardStatus(int(found.status))
 
@@ -113,7 +113,7 @@ class Fade:
         return self._cycle >= self._cycles
 
     def step(self) -> tuple[Array, Array] | None:
-        """Remaining difference at the end of the next cycle [m] and its rate [m/s], (m,); None where it is zero."""
+        """Remaining difference at the end of the next cycle [m] and its rate [m/s], (m,); None if it is zero."""
         self._cycle += 1
         if self.done:
             return None
@@ -123,10 +123,10 @@ class Fade:
 
 
 class Along:
-    """Set points along a motion, on a clock that can slow down and go on."""
+    """Set points along a motion, on a clock that can slow down and continue."""
 
     def __init__(self, motion: Motion, period: float, lead: Array) -> None:
-        """Begin at the first row, off by lead [m] (m,), which fades away; period [s]."""
+        """Begin at the first row with an offset lead [m] (m,), which decreases to zero; period [s]."""
         self.motion = motion
         self._period, self._last = period, len(motion) - 1
         self._row = 0.0
@@ -150,11 +150,11 @@ class Along:
         return self._row >= self._last and self._fade.done
 
     def pause(self) -> None:
-        """Slow the clock down, in the time of a ramp."""
+        """Slow the clock down within the time of a ramp."""
         self._wanted = 0.0
 
     def resume(self) -> None:
-        """Let it go on, in the time of a ramp."""
+        """Let the clock continue, within the time of a ramp."""
         self._wanted = 1.0
 
     def step(self) -> SetPoint:
@@ -218,10 +218,10 @@ _Real = TypeVar("_Real", float, Array)
 
 
 def smooth(share: _Real) -> _Real:
-    """Cubic from 0 to 1 with slopes of zero at both ends, 1.5 at most."""
+    """Cubic from 0 to 1 with zero slopes at both ends, largest slope 1.5."""
     return share * share * (3.0 - 2.0 * share)
 
 
 def smooth_slope(share: _Real) -> _Real:
-    """The slope of `smooth`."""
+    """Derivative of `smooth`."""
     return 6.0 * share * (1.0 - share)

@@ -89,10 +89,10 @@ class RefusedError(SaglineError):
     """Rejected request with the reason; nothing was sent.
 
     Attributes:
-        what: The request.
-        reason: Of the refusal.
-        next_step: For the reader.
-        item: The same as `what`, under the name that all errors have.
+        what: Rejected request.
+        reason: Reason of the rejection.
+        next_step: Next step for the reader.
+        item: Equal to `what`; the name that all errors have.
     """
 
     def __init__(self, what: str, reason: str, next_step: str) -> None:
@@ -111,7 +111,7 @@ class RefusedError(SaglineError):
 
 
 def check_transition(state: State, to: State, what: str) -> None:
-    """Refuse a transition that is not in the table."""
+    """Reject a transition that is not in the table."""
     _, exits = TABLE[state]
     if to in exits:
         return

@@ -16,7 +16,7 @@ from sagline.core.errors import InvalidValueError
 from sagline.core.fields import NumberFields, rule
 
 MOST_CABLES: Final = 10**6
-MOST_GAIN: Final = 0.1  # a cycle: a loop with five cycles of delay is unstable from 0.17 on
+MOST_GAIN: Final = 0.1  # per cycle: a loop with five cycles of delay is unstable from 0.17 on
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +24,10 @@ class TensionSettings(NumberFields):
     """Settings of the tension loop; the defaults have 24 dB and 62 degrees at a delay of five cycles.
 
     Attributes:
-        filter_time: Time constant of the filter in front of it [s], > 0.
-        gain: Share of the error that it corrects in each cycle, >= 0, at most 0.1; 0 for a loop that is off.
-        act_above: Largest tension error in the null space above which it begins to act [N].
-        rest_below: Largest tension error below which it rests again [N], >= 0, less than `act_above`.
+        filter_time: Time constant of the input filter [s], > 0.
+        gain: Share of the error that is corrected in each cycle, >= 0, at most 0.1; 0 switches the loop off.
+        act_above: Largest tension error in the null space above which the loop begins to act [N].
+        rest_below: Largest tension error below which the loop stops acting [N], >= 0, less than `act_above`.
         largest: Limit of the correction of a length [m], > 0.
 
     Raises:
@@ -54,11 +54,12 @@ class TensionSettings(NumberFields):
 class TensionLoop:
     """Correction of lengths that brings the tensions back to the plan; it lasts for a session, as length errors do.
 
-    f <- f + h/(tau + h) (T - T_plan - f), and while it acts delta <- delta - k N_L G f; docs/model.md, section 12.
+    f <- f + h/(tau + h) (T - T_plan - f), and while the loop acts delta <- delta - k N_L G f; docs/model.md, section
+    12.
 
     Attributes:
         settings: Gain, filter and limits.
-        acting: Whether it acts.
+        acting: True while the loop acts.
     """
 
     def __init__(self, cable_count: int, settings: TensionSettings | None = None, period: float = PERIOD) -> None:
@@ -66,8 +67,8 @@ class TensionLoop:
 
         Args:
             cable_count: Number of cables m.
-            settings: Settings of the loop; by default those of the docs.
-            period: Of a cycle [s], > 0.
+            settings: Settings of the loop; the defaults are those of the docs.
+            period: Period of a cycle [s], > 0.
 
         Raises:
             InvalidValueError: If an argument is of the wrong kind or out of its range.
@@ -95,14 +96,14 @@ class TensionLoop:
         """Correction for the next cycle.
 
         Args:
-            tension: T_A, as the load cells read it [N], shape (m,).
-            planned: The plan's, at the same time [N], shape (m,).
-            row: Of the plan's gains at this time.
-            frozen: Whether the tensions are old or doubtful: they are then not used. What was added is
-                still fitted to the pose.
+            tension: T_A, tension measured by the load cells [N], shape (m,).
+            planned: Planned tension at the same time [N], shape (m,).
+            row: Row of the plan's gains at this time.
+            frozen: True if the tensions are old or doubtful: they are then not used. The present correction is still
+                adapted to the pose.
 
         Returns:
-            What to add to the lengths of the plan [m], shape (m,), the caller's own.
+            Correction of the lengths of the plan [m], shape (m,), an array owned by the caller.
         """
         if row is not self._row:  # lengths in the null space at one pose move the platform at the next
             if self._row is not None:
@@ -110,12 +111,12 @@ class TensionLoop:
                 self._correction[:] = self._change
             self._row = row
         np.subtract(tension, planned, out=self._error)
-        if not frozen and finite(self._error):  # NaN would stay in the filter for ever
+        if not frozen and finite(self._error):  # NaN would remain in the filter forever
             self._learn(row)
         return self._correction.copy()
 
     def _learn(self, row: NullSpace) -> None:
-        """Filter the error, and change the correction where it is large."""
+        """Filter the error, and change the correction if the error is large."""
         settings, change = self.settings, self._change
         self._error -= self._filtered
         self._error *= self._share
@@ -128,4 +129,4 @@ class TensionLoop:
         change *= settings.gain
         self._correction -= change
         if (most := largest(self._correction)) > settings.largest:  # a fault reports it
-            self._correction *= settings.largest / most  # as a whole: each for itself would move the platform
+            self._correction *= settings.largest / most  # scaled as a whole: separate limits would move the platform

@@ -26,16 +26,16 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 
-BLOCK = 1024  # poses
+BLOCK = 1024  # poses per block
 
 
 class _Distances(NamedTuple):
     """Distances of P pairs at N poses.
 
     Attributes:
-        value: _Distances less radii [m], shape (N, P); NaN where a cable has no tension.
+        value: Distances minus radii [m], shape (N, P); NaN if a cable has no tension.
         low: Proved lower bounds [m], shape (N, P).
-        nearest: Nearest points, on the middle lines of cables and rods [m], shape (N, P, 2, 3).
+        nearest: Nearest points, on the center lines of cables and rods [m], shape (N, P, 2, 3).
     """
 
     value: Array
@@ -44,10 +44,10 @@ class _Distances(NamedTuple):
 
 
 class ClearanceRows:
-    """Distances at batches of poses, with everything but the poses prepared once.
+    """Distances at batches of poses, with all pose-independent data prepared once.
 
     Attributes:
-        pairs: Names, numbers and what is left out.
+        pairs: Names and indices of the pairs, and the omitted pairs.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class ClearanceRows:
         platform: Box | Mesh | None = None,
         from_anchor: float | None = None,
     ) -> None:
-        """Prepare; the arguments are those of `clearance`, checked."""
+        """Prepare the measurement; the arguments are those of `clearance`, checked."""
         self._precision = precision
         self._radius = cable_radius
         self._from_anchor = 0.0 if from_anchor is None else from_anchor
@@ -70,12 +70,12 @@ class ClearanceRows:
         self._still = locked(np.array(still).reshape(-1, shapes.COLUMNS))
         self._meshed = None
         if len(self.pairs.with_mesh):
-            from sagline.interference.meshed import Meshed  # which needs python-fcl
+            from sagline.interference.meshed import Meshed  # needs python-fcl
 
             self._meshed = Meshed(self.pairs, (self._platform, *obstacles), precision)
 
     def distances(self, state: Equilibrium, *, together: bool = False) -> _Distances:
-        """Least distance of every pair at every pose; with `together` only the least of all pairs is exact."""
+        """Least distance of every pair at every pose; with `together`, only the least of all pairs is exact."""
         single = not state.pose.shape
         count, several = 1 if single else len(state), len(self.pairs.names)
         out = _Distances(np.empty((count, several)), np.empty((count, several)), np.empty((count, several, 2, 3)))
@@ -118,12 +118,12 @@ class ClearanceRows:
 
 
 def _box_row(one: Box | Mesh) -> Array:
-    """Row of a box; of a mesh a placeholder, so that obstacles keep their numbers."""
+    """Row of a box; a placeholder for a mesh, so that obstacles keep their indices."""
     return box_rows(one if isinstance(one, Box) else Box(np.ones(3)))
 
 
 def _platform_of(robot: Robots) -> Box | None:
-    """Platform as a box of its size around its anchors; None without a size, refused if robots differ."""
+    """Platform as a box of its size around its anchors; None without a size; an error if robots differ."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
         if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
@@ -141,9 +141,9 @@ def _alike(one: Array | None, other: Array | None) -> bool:
 
 NO_TENSIONS = "no tensions are known, so the cables have no shape: take a feasible pose"
 NOTHING = "nothing is measured"
-_SHOWN = 8  # pairs of a pose that are printed, and lines of what is left out
-_TOO_LARGE = 100.0  # times the robot: a mesh in millimeters
-_NUMBERS = 9  # kept of a pair and pose: distance, bound and two points
+_SHOWN = 8  # number of printed pairs per pose, and of lines about omitted pairs
+_TOO_LARGE = 100.0  # times the size of the robot: a mesh in millimeters
+_NUMBERS = 9  # values per pair and pose: distance, bound and two points
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -152,13 +152,13 @@ class Clearances(Result):
 
     Attributes:
         pairs: P pairs of names of measured bodies.
-        pair_distance: Least distance of each [m], cable diameters taken off where they are known, shape (P,) or (N, P);
-            0 or less where they touch (how deep is not measured), NaN where a pose has no tensions.
-        pair_low: Proved: no distance is below it [m], of the same shape.
-        nearest: Points between which it is measured, on the middle lines of cables and rods [m], shape (P, 2, 3) or
-            (N, P, 2, 3).
-        left_out: Pairs that are not measured, with the reason.
-        precision: Largest difference of the proved bound from the distance [m].
+        pair_distance: Least distance of each pair [m], minus cable radii if they are known, shape (P,) or (N, P); 0 or
+            less for contact (the depth is not measured), NaN if a pose has no tensions.
+        pair_low: Proved lower bound of each distance [m], with this shape.
+        nearest: Nearest points of each pair, on the center lines of cables and rods [m], shape (P, 2, 3) or (N, P, 2,
+            3).
+        left_out: Omitted pairs, with the reason.
+        precision: Largest difference between distance and proved bound [m].
     """
 
     pairs: tuple[tuple[str, str], ...]
@@ -170,7 +170,7 @@ class Clearances(Result):
 
     @property
     def distance(self) -> Array:
-        """Least distance of all pairs [m], shape () or (N,); infinite where nothing is measured."""
+        """Least distance of all pairs [m], shape () or (N,); infinite without measured pairs."""
         return self._least(self.pair_distance)
 
     @property
@@ -180,7 +180,7 @@ class Clearances(Result):
 
     @property
     def between(self) -> Any:
-        """Nearest pair: two names, or N times two for N poses; a sentence where nothing is known."""
+        """Nearest pair: two names, or N times two for N poses; a sentence if there is none."""
         return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
 
     def __str__(self) -> str:
@@ -233,28 +233,28 @@ def clearance(
 ) -> Clearances:
     """Least distances between cables with their sag, the platform and obstacles.
 
-    Cables have the shape of their model, such as a catenary, and begin at the exit point of their pulley.
-    Distances are those of the nearest points, found to about 1e-12 m (with meshes 1e-7 m); and it is proved that no
-    other points are nearer by more than the precision.
+    Cables have the shape of their model, such as a catenary, and begin at the exit point of their pulley. The distances
+    are those of the nearest points, with an accuracy of about 1e-12 m (with meshes 1e-7 m). It is proved that no other
+    points are closer by more than the precision.
 
     Args:
-        state: An equilibrium, single or N of them: of a plan, plan.state.
-        obstacles: Obstacles: Box, Capsule, Sphere and Mesh, one or several. Solid: what is inside touches.
-        precision: Largest difference of the proved bound from a distance [m], > 0.
-        cable_radius: Half the cables' diameters [m], one for all or one a cable, >= 0; None: as the robot's cables
-            know, else 0.
-        platform: The platform's form in its own frame; None: a box of the robot's platform_size around its anchors,
-            where that is known.
-        from_anchor: Length of cable next to its anchor that is left out [m], > 0: at the anchor that two cables share,
-            at the platform, and at the frame against what stands around. None: pairs that share an anchor, and
-            cables with the platform, are left out as a whole; `left_out` names them.
+        state: An equilibrium, single or N of them; for a plan, plan.state.
+        obstacles: One or several obstacles: Box, Capsule, Sphere and Mesh. They are solid: a body inside is in contact.
+        precision: Largest difference between a distance and its proved bound [m], > 0.
+        cable_radius: Radius of the cables [m], one for all or one per cable, >= 0; None for the radius of the robot's
+            cables if known, else 0.
+        platform: Shape of the platform in its own frame; None for a box of the robot's platform_size around its
+            anchors, if that is known.
+        from_anchor: Length of cable next to an anchor that is not measured [m], > 0: at an anchor shared by two cables,
+            at the platform, and at the frame against obstacles around it. None omits pairs that share an anchor, and
+            cables with the platform, completely; `left_out` lists them.
 
     Returns:
         Clearances.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, or a mesh is 100 times as large as the robot.
-        SaglineError: If a mesh is among them and python-fcl is missing.
+        SaglineError: If an obstacle is a mesh and python-fcl is missing.
 
     Examples:
         >>> import numpy as np
@@ -284,7 +284,7 @@ def clearance(
 
 
 def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
-    """Obstacles as a tuple, checked; a mesh 100 times as large as the robot is refused."""
+    """Checked obstacles as a tuple; a mesh 100 times as large as the robot is rejected."""
     found = obstacles_of(given, "obstacles")
     for one in found:
         if isinstance(one, Mesh):
@@ -293,7 +293,7 @@ def check_obstacles(given: Any, robot: Robot) -> tuple[Obstacle, ...]:
 
 
 def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
-    """One obstacle or several, checked, as a tuple."""
+    """One or several obstacles, checked, as a tuple."""
     some = (given,) if isinstance(given, Obstacle) else given
     several = isinstance(some, Sequence) and not isinstance(some, str)
     wrong = [one for one in some if not isinstance(one, Obstacle)] if several else [given]
@@ -304,7 +304,7 @@ def obstacles_of(given: Any, item: str) -> tuple[Obstacle, ...]:
 
 
 def _check_size(mesh: Mesh, robot: Robot) -> None:
-    """Refuse a mesh so large that its unit must be another."""
+    """Reject a mesh that is so large that its unit must be wrong."""
     own, size = np.ptp(mesh.bounds, axis=0).max(), np.subtract(*reversed(bounds(robot))).max()
     if own > _TOO_LARGE * size:
         value = f"{extent_text(mesh.bounds)} large, and the robot {size:.4g} m"

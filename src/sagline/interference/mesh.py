@@ -1,4 +1,4 @@
-"""A solid of any form, given by the triangles of its surface."""
+"""A solid of any shape, given by the triangles of its surface."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ def _as_faces(value: ArrayLike) -> Indices:
 
 @frozen(eq=False, repr=False, weakref_slot=False)
 class Mesh(Result):
-    """A closed surface of triangles, at rest in the world; as a platform, in the platform frame.
+    """A closed surface of triangles, at rest in the world; for a platform, in the platform frame.
 
-    What it encloses is solid. Where all triangles are turned to face inward it is a room instead, and what is within it
-    is free.
+    The enclosed volume is solid. If all triangles face inward, the enclosed volume is free and everything outside is
+    solid.
 
     Attributes:
         vertices: Corners [m], shape (V, 3).
-        faces: Triangles as numbers of their corners, counter-clockwise seen from outside the solid, shape (F, 3).
+        faces: Triangles as indices of their corners, counter-clockwise seen from outside the solid, shape (F, 3).
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If a face names no corner, there are fewer than 4 or more than a million faces, or the
-            surface is not closed; the message gives its extent.
+        InvalidValueError: If a face has an invalid corner index, there are fewer than 4 or more than a million faces,
+            or the surface is not closed; the message gives its extent.
 
     Examples:
         >>> import sagline as sl
@@ -72,7 +72,7 @@ class Mesh(Result):
     __reduce__ = reduced
 
     def __str__(self) -> str:
-        """Its name, its triangles and its extent."""
+        """Name, number of triangles and extent."""
         return f"{self.name}: {counted(len(self.faces), 'triangle')}, {extent_text(self.vertices)}"
 
     @property
@@ -83,12 +83,12 @@ class Mesh(Result):
 
     @property
     def volume(self) -> float:
-        """Enclosed volume [m^3]; negative for a room."""
+        """Enclosed volume [m^3]; negative if the triangles face inward."""
         a, b, c = np.moveaxis(self.vertices[self.faces] - self.bounds.mean(axis=0), 1, 0)
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
     def placed(self, pose: Pose) -> Mesh:
-        """The same mesh somewhere else.
+        """Copy of the mesh at a pose.
 
         Args:
             pose: A single pose of its frame.
@@ -97,7 +97,7 @@ class Mesh(Result):
             Mesh.
 
         Raises:
-            InvalidValueError: If pose is no single Pose.
+            InvalidValueError: If `pose` is not a single Pose.
         """
         if instance(pose, Pose, "pose").shape:
             raise InvalidValueError("pose", f"a batch of {len(pose)}", "a single pose", "Take one of them: pose[0].")
@@ -106,13 +106,13 @@ class Mesh(Result):
     def encloses(self, points: ArrayLike) -> Flags:
         """True for points in the solid.
 
-        By how often the surface winds around them, which is right on edges and corners' shadows too.
+        Computed from the winding number of the surface, which is correct on edges and in the shadows of corners too.
 
         Args:
-            points: In the frame of the mesh [m], shape (..., 3).
+            points: Points in the frame of the mesh [m], shape (..., 3).
 
         Returns:
-            Shape (...).
+            Flags, shape (...).
 
         Raises:
             InvalidValueError: If a coordinate is not finite.

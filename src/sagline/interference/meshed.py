@@ -1,8 +1,8 @@
 """Least distances from meshes, through python-fcl: cables by branch and bound on the chords of their pieces.
 
-fcl knows the distance of a segment or of triangles from triangles to the last digits; a piece of a cable lies within
-its bulge of its chord. Boxes take part as twelve triangles, balls as segments without length: fcl's own boxes and
-capsules would be right to 1e-7 only.
+fcl computes the distance between triangles, or a segment and triangles, to the last digits; a cable piece is within its
+bulge of its chord. Boxes are treated as twelve triangles, balls as segments of zero length, because fcl's own boxes and
+capsules are accurate to 1e-7 only.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from sagline.robot.pose import Pose
 
 Form = Box | Capsule | Sphere | Mesh
 MISSING: Final = 'Meshes need python-fcl, which is not installed. Run: pip install "sagline[workspace]"'
-ROUNDING: Final = 1e-12  # of the sizes at hand: what rounding may take off a lower bound
-_PIECES: Final = 4000  # of a cable that are looked at for one distance
-_SEARCHES: Final = 60  # of the nearest point of a cable, to the last digits
+ROUNDING: Final = 1e-12  # share of the present sizes: margin of a lower bound for rounding
+_PIECES: Final = 4000  # largest number of cable pieces that are examined for one distance
+_SEARCHES: Final = 60  # iterations for the nearest point of a cable, to the last digits
 _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))  # of a box's corners, and its triangles
 _FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
 
 
 class _Solid(NamedTuple):
-    """A body as fcl has it.
+    """A body in the form of fcl.
 
     Attributes:
-        geometry: Its form.
+        geometry: Geometry of the body.
         radius: Radius that is subtracted from distances [m].
-        mesh: Its triangles; None for rods and balls.
-        inner: A point of it [m].
-        place: Rotation and position, of what stands still.
+        mesh: Triangles of the body; None for rods and balls.
+        inner: A point inside the body [m].
+        place: Rotation and position of a body at rest.
     """
 
     geometry: Any
@@ -62,10 +62,10 @@ class _Nearest(NamedTuple):
 
 
 class Meshed:
-    """The pairs of which at least one is a mesh, prepared once."""
+    """Pairs with at least one mesh, prepared once."""
 
     def __init__(self, pairs: Pairs, forms: tuple[Form | None, ...], precision: float) -> None:
-        """Prepare the forms, which are the platform, or None, and the obstacles in the order of their numbers."""
+        """Prepare the bodies: the platform, or None, and the obstacles in the order of their indices."""
         self._fcl = package()
         self._pairs, self._precision, self._parts = pairs, precision, len(pairs.parts)
         taking_part = {int(number) for number in pairs.with_mesh.ravel() if number >= self._parts}
@@ -111,7 +111,7 @@ class Meshed:
         return self._fcl.CollisionObject(solid.geometry, self._fcl.Transform(*at.get(number, solid.place)))
 
     def _apart(self, one: Any, other: Any) -> tuple[float, Array, Array]:
-        """Distance of two bodies [m], 0 where they touch, and their nearest points: the mesh's before a segment's."""
+        """Distance of two bodies [m], 0 for contact, and their nearest points, that of a mesh first."""
         request, result = self._fcl.DistanceRequest(True), self._fcl.DistanceResult()
         distance = max(float(self._fcl.distance(one, other, request, result)), 0.0)
         return distance, *result.nearest_points
@@ -125,7 +125,7 @@ class Meshed:
         return _Nearest(distance - radii, _proved(distance, distance, a) - radii, a, b)
 
     def _within(self, point: Array, of: int, number: int, at: dict[int, tuple[Array, Array]]) -> bool:
-        """True if a point of a body, in its own frame, lies in another's solid."""
+        """True if a point of a body, in its own frame, is inside the solid of another body."""
         mesh = self._solids[number].mesh
         if mesh is None:
             return False
@@ -133,7 +133,7 @@ class Meshed:
             point = at[of][0] @ point + at[of][1]
         if number in at:
             point = at[number][0].T @ (point - at[number][1])
-        key = number, point.tobytes()  # frame ends of cables are where they were
+        key = number, point.tobytes()  # frame ends of cables do not move
         if key not in self._known:
             if len(self._known) > 1000:
                 self._known.clear()
@@ -144,7 +144,7 @@ class Meshed:
         """Distance of a cable, by branch and bound over its pieces."""
         body, radius = self._object(number, at), float(row[shapes.RADIUS])
         enough += radius
-        nearest = (inf, 0.0, np.zeros(3), np.zeros(3))  # of the cable's own points
+        nearest = (inf, 0.0, np.zeros(3), np.zeros(3))  # points of the cable itself
         waiting: list[tuple[float, int, float, float, float]] = []
         proved, looked = inf, 0
 

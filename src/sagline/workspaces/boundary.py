@@ -30,7 +30,7 @@ from sagline.workspaces.surface import Components, Surface, components_of, norma
 MOST_CELLS: Final = 128  # along an axis
 MOST_HALVED: Final = 256  # along an axis: 17 million nodes, half a gigabyte
 MOST_HALVINGS: Final = 3
-AT_NODE: Final = 1e-10  # of an edge of the grid: a vertex so near to its node is at it
+AT_NODE: Final = 1e-10  # share of a grid edge: a closer vertex counts as at the node
 FACES: Final = ("x low", "x high", "y low", "y high", "z low", "z high")
 
 
@@ -39,15 +39,16 @@ class Boundary(Result):
     """Result of `boundary`.
 
     Attributes:
-        surface: The boundary, closed along the faces of the box; its vertices that are not on those are on the
-            boundary to 1e-10 of a cell.
-        volume: Of the set within the box [m^3]: that of the surface, and of what bulges between its vertices.
-        volume_error: By how much the volume can be wrong [m^3], except for parts of the set, and gaps in it, that are
+        surface: The boundary, closed along the faces of the box; vertices off these faces are on the boundary to 1e-10
+            of a cell.
+        volume: Volume of the set within the box [m^3]: that of the surface plus that of the bulges between its
+            vertices.
+        volume_error: Error bound of the volume [m^3]. Not included are parts of the set, and gaps in it, that are
             thinner than two cells of the finest grid.
         grid: The function at the nodes of the grid, before cells were halved.
         components: The separate pieces of the set.
-        open_faces: Faces of the box that the set reaches, "x low" for instance: it may go on beyond them.
-        evaluations: At how many positions the function was evaluated.
+        open_faces: Faces of the box that the set reaches, for example "x low"; the set may continue beyond them.
+        evaluations: Number of positions at which the function was evaluated.
     """
 
     surface: Surface
@@ -80,10 +81,10 @@ def boundary(
 ) -> Boundary:
     """Boundary of the set where a function of positions (N, 3) [m] is not negative, within a box [m].
 
-    The function may jump and be infinite, but not NaN. It is evaluated at the nodes of a grid with `cells` along the
-    longest side, or along each axis; then at half the step in cells that the boundary crosses, as often as `refine`
-    says. Marching cubes on the signs gives a closed net of triangles whose vertices are found on the edges of the
-    grid. The distances of the triangles' middles from the boundary give the volume between, and its error bar.
+    The function may have jumps and infinite values, but not NaN. It is evaluated at the nodes of a grid with `cells`
+    along the longest side, or along each axis. Cells that the boundary crosses are then halved `refine` times. Marching
+    cubes on the signs gives a closed net of triangles with vertices on the edges of the grid. The distances of the
+    triangles' centers from the boundary give the remaining volume and its error bound.
     """
     corners = exactly(low, "low", "m", (3,)), exactly(high, "high", "m", (3,))
     for name, a, b in zip("xyz", *corners, strict=True):
@@ -125,7 +126,7 @@ def _cells_of(cells: int | tuple[int, int, int], size: Array) -> tuple[int, int,
 def _place_vertices(
     net: Net, grid: Grid, level: Level, *, precision: float = 1e-10, narrow: float = 1e-12
 ) -> tuple[Net, Array, Array]:
-    """Net, vertices on the exact boundary (V, 3) [m], and fall of the function along their edges (V,) [1/m]."""
+    """Net, vertices on the exact boundary (V, 3) [m], and decrease of the function along their edges (V,) [1/m]."""
     inner, outer = grid.positions(net.inner), grid.positions(net.outer)
     at_inner, at_outer = grid.values[tuple(net.inner.T)], grid.values[tuple(net.outer.T)]
     k = np.flatnonzero((net.inner != net.outer).any(axis=1))
@@ -138,13 +139,13 @@ def _place_vertices(
         return net, vertices, slope
     one = merge_vertices(net.inner, np.where(at_node[:, None], net.inner, net.outer), net.faces, grid.values.shape)
     kept = Surface(vertices[one.first], one.faces)
-    if not kept.closed:  # a sheet without thickness: its two sides stay apart
+    if not kept.closed:  # a sheet without thickness: its two sides remain separate
         return net, vertices, slope
     return one, kept.vertices, np.where(at_node, np.nan, slope)[one.first]
 
 
 def _slopes(vertices: Array, faces: Indices, net: Net, slope: Array) -> Array:
-    """Fall of the function along the normal of each triangle [1/m], by least squares from its vertices' edges."""
+    """Decrease of the function along the normal of each triangle [1/m], by least squares from its vertices' edges."""
     normals = normals_of(vertices, faces)
     with np.errstate(invalid="ignore", divide="ignore"):
         normals = np.abs(normals) / np.linalg.norm(normals, axis=1)[:, None]
@@ -162,9 +163,9 @@ def _faces_on_box(surface: Surface, grid: Grid) -> list[NDArray[np.bool_]]:
     return [(corners[:, :, k] == axis[end]).all(axis=1) for k, axis in enumerate(grid.axes) for end in (0, -1)]
 
 
-MEAN: Final = 3.0 / 4.0  # of the distance at a curved triangle's middle
-MISSED: Final = 5.0 / 12.0  # of it at most
-FLAT: Final = 1e-6  # of the reach: a distance that adds nothing
+MEAN: Final = 3.0 / 4.0  # share of the distance at the center of a curved triangle
+MISSED: Final = 5.0 / 12.0  # largest share of this distance
+FLAT: Final = 1e-6  # share of the reach: a smaller distance adds nothing
 
 
 def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, grid: Grid) -> tuple[Array, Array]:
@@ -184,7 +185,7 @@ def _bulge_volumes(level: Level, vertices: Array, faces: Indices, slope: Array, 
 def _distances_to_boundary(
     level: Level, points: Array, normals: Array, slope: Array, outward: Array, inward: Array
 ) -> Array:
-    """Distances of points (N, 3) from the boundary along normals [m], (N,), to some percent; NaN beyond reach."""
+    """Distances of points (N, 3) from the boundary along normals [m], (N,), to a few percent; NaN beyond reach."""
     at_points = level_values(level, points)
     reach = np.where(at_points >= 0.0, outward, inward)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -201,7 +202,7 @@ def _distances_to_boundary(
 
 
 def _between(level: Level, ends: Brackets) -> Array:
-    """Position of the sign change in brackets: by their chord, or by iteration where an end is infinite."""
+    """Position of the sign change in brackets: by their chord, or by iteration if an end is infinite."""
     inner, outer, at_inner, at_outer = (part[ends.k] for part in ends[:4])
     with np.errstate(invalid="ignore"):
         share = at_inner / (at_inner - at_outer)
@@ -219,12 +220,12 @@ class Outline(Result):
 
     Attributes:
         surface: The boundary, closed along the faces of the box.
-        margin: At its vertices [N], shape (V,).
-        cable: The cable that limits at each vertex, -1 where none does, shape (V,).
+        margin: Margin at the vertices [N], shape (V,).
+        cable: Limiting cable at each vertex, -1 for none, shape (V,).
         on_box: True for triangles on a face of the box, shape (F,).
-        open_faces: Faces of the robot's box that it reaches, "x low" for instance.
+        open_faces: Faces of the robot's box that the workspace reaches, for example "x low".
         volume: Volume [m^3], or area of a plane [m^2], without the volume between flat triangles and the boundary.
-        parts: In how many pieces it is.
+        parts: Number of separate pieces.
         grid: The level at the nodes.
     """
 
@@ -239,7 +240,7 @@ class Outline(Result):
 
     @property
     def shares(self) -> dict[int, float]:
-        """Share of the boundary within the box that each cable limits, the largest first; a third at each corner."""
+        """Share of the boundary within the box per limiting cable, largest first; each corner counts for a third."""
         areas = vertex_areas(self.surface.vertices, self.surface.faces[~self.on_box])
         k = np.flatnonzero(areas > 0.0)
         cables, place = np.unique(self.cable[k], return_inverse=True)
@@ -249,7 +250,7 @@ class Outline(Result):
 
 def outline(levels: Levels, region: Region) -> Outline:
     """Boundary of the set of positions whose level is not negative, from the nodes of the region's grid."""
-    from scipy.ndimage import label  # a third of a second to load
+    from scipy.ndimage import label  # the import takes a third of a second
 
     grid = sample_grid(levels, region.low, region.high, region.cells)
     net, vertices, _ = _place_vertices(triangulate(grid.inside), grid, levels, precision=PRECISE, narrow=PRECISE)

@@ -1,6 +1,6 @@
 """Criteria of a workspace: margin, sag, position error, stiffness, frequency, clearance and frame.
 
-Where a criterion depends on tensions, these balance the middle load of the wrench set.
+If a criterion depends on tensions, they balance the middle load of the wrench set.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import compliance_of, modes
 from sagline.workspaces.criterion import NOT_NEGATIVE, POSITIVE, Criterion, Given, Judged
 
-_PRECISION: Final = 1e-6  # m: largest jump of the clearance's level from pose to pose
+_PRECISION: Final = 1e-6  # m: largest jump of the clearance function from pose to pose
 _CABLE: Final = re.compile(r"cable (\d+)")
 _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 
@@ -35,7 +35,7 @@ _CORNERS: Final = 0.5 * np.array(list(product((-1.0, 1.0), repeat=3)))
 class LeastMargin(Criterion):
     """The cables balance every wrench of the set with a reserve in any direction.
 
-    Every workspace has it with no reserve: `workspace` puts it first.
+    Every workspace includes it with zero reserve: `workspace` puts it first.
 
     Attributes:
         limit: Reserve [N], >= 0.
@@ -49,7 +49,7 @@ class LeastMargin(Criterion):
 
     @property
     def always(self) -> bool:
-        """True without a reserve: every workspace has it."""
+        """True for zero reserve: every workspace includes it."""
         return self.limit == 0.0
 
     def judge(self, given: Given) -> Judged:
@@ -57,7 +57,7 @@ class LeastMargin(Criterion):
         return Judged(locked(given.margin - self.limit), given.cable)
 
     def scale(self, robot: Robot) -> float:
-        """The platform's weight; without gravity the largest tension of a cable [N]."""
+        """Weight of the platform; without gravity the largest tension of a cable [N]."""
         weight = robot.mass * robot.gravity
         if weight > 0.0:
             return weight
@@ -67,7 +67,7 @@ class LeastMargin(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaximumSag(Criterion):
-    """The sag of every cable below its chord stays within a limit, under the middle load of the set.
+    """The sag of every cable below its chord is within a limit, under the middle load of the set.
 
     Attributes:
         limit: Largest sag [m], > 0.
@@ -81,21 +81,21 @@ class MaximumSag(Criterion):
     limit: float
 
     def judge(self, given: Given) -> Judged:
-        """Limit minus largest sag [m], and the cable that sags most."""
+        """Limit minus largest sag [m], and the cable with the largest sag."""
         sag = given.state.cables.sag
         return Judged(given.spread(self.limit - sag.max(axis=1)), given.spread_cables(sag.argmax(axis=1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PositionError(Criterion):
-    """The position error of a simpler cable model stays within a limit.
+    """The position error of a simpler cable model is within a limit.
 
-    The lengths are those of the model, with its tensions, under the middle load of the set; the platform then rests
-    where exact cables of these lengths balance it, as by `confirm`.
+    The lengths are those of the simpler model, with its tensions, under the middle load of the set. The platform then
+    rests at the equilibrium of exact cables of these lengths, as in `confirm`.
 
     Attributes:
-        model: The cable model, `Straight()` for instance.
-        limit: Largest distance between the platform origin and where it was planned [m], > 0.
+        model: Cable model, for example `Straight()`.
+        limit: Largest distance between the actual and the planned platform origin [m], > 0.
     """
 
     title = "position error"
@@ -107,7 +107,7 @@ class PositionError(Criterion):
     limit: float
 
     def __post_init__(self) -> None:
-        """Check both."""
+        """Check both fields."""
         instance(self.model, CableModel, "PositionError: model")
         super(PositionError, self).__post_init__()
 
@@ -116,7 +116,7 @@ class PositionError(Criterion):
         return f"{super(PositionError, self).__str__()} with {type(self.model).__name__}"
 
     def judge(self, given: Given) -> Judged:
-        """Limit minus position error [m]; NaN where the model has no lengths, or no equilibrium at its lengths."""
+        """Limit minus position error [m]; NaN if the model has no lengths, or no equilibrium at its lengths."""
         found = confirm(given.planned(self.model))
         error = np.where(found.held, np.linalg.norm(found.position_error, axis=1), np.nan)
         return Judged(given.spread(self.limit - error))
@@ -124,13 +124,13 @@ class PositionError(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastStiffness(Criterion):
-    """The stiffness against a force on the center of mass stays above a limit in any direction.
+    """The stiffness against a force on the center of mass is above a limit in any direction.
 
-    The stiffness of the softest direction, with lengths held and the platform free to turn as it gives way; 0 where
-    the platform is in no stable equilibrium. Under the middle load of the set.
+    It is the stiffness in the softest direction, with fixed lengths and a platform that is free to rotate; 0 without a
+    stable equilibrium. The load is the middle load of the set.
 
     Attributes:
-        limit: Least stiffness [N/m], > 0.
+        limit: Smallest stiffness [N/m], > 0.
     """
 
     title = "stiffness"
@@ -141,19 +141,19 @@ class LeastStiffness(Criterion):
     limit: float
 
     def judge(self, given: Given) -> Judged:
-        """Stiffness of the softest direction above the limit [N/m]."""
+        """Stiffness in the softest direction minus the limit [N/m]."""
         found = _least_stiffness(given.robot.freedom, cable_slopes(given.state).matrix)
         return Judged(given.spread(found - self.limit))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LeastFrequency(Criterion):
-    """The lowest natural frequency of the platform on massless cables, as by `modes`, stays above a limit.
+    """The lowest natural frequency of the platform on massless cables, as by `modes`, is above a limit.
 
-    Under the middle load of the set; 0 Hz where it is in no stable equilibrium.
+    The load is the middle load of the set; 0 Hz without a stable equilibrium.
 
     Attributes:
-        limit: Least natural frequency [Hz], > 0.
+        limit: Smallest natural frequency [Hz], > 0.
     """
 
     title = "frequency"
@@ -164,7 +164,7 @@ class LeastFrequency(Criterion):
     limit: float
 
     def judge(self, given: Given) -> Judged:
-        """Lowest natural frequency above the limit [Hz]."""
+        """Lowest natural frequency minus the limit [Hz]."""
         lowest = modes(given.state).frequency[:, 0]
         unstable = np.isnan(lowest) & given.plan.feasible
         return Judged(given.spread(np.where(unstable, 0.0, lowest) - self.limit))
@@ -172,12 +172,12 @@ class LeastFrequency(Criterion):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clearance(Criterion):
-    """The distances between cables, platform and obstacles stay above a limit.
+    """The distances between cables, platform and obstacles are above a limit.
 
-    Cables with their sag, under the middle load of the set; the measured pairs are those of `clearance`.
+    Cables have their sag under the middle load of the set; the measured pairs are those of `clearance`.
 
     Attributes:
-        limit: Least distance [m], > 0.
+        limit: Smallest distance [m], > 0.
         obstacles: Obstacles, Box, Capsule, Sphere and Mesh, one or several.
     """
 
@@ -190,7 +190,7 @@ class Clearance(Criterion):
     obstacles: Obstacle | Sequence[Obstacle] = ()
 
     def __post_init__(self) -> None:
-        """Check both."""
+        """Check both fields."""
         super(Clearance, self).__post_init__()
         given: Any = self.obstacles
         listed = isinstance(given, Obstacle | list | tuple)
@@ -198,7 +198,7 @@ class Clearance(Criterion):
         object.__setattr__(self, "obstacles", found)
 
     def judge(self, given: Given) -> Judged:
-        """Least distance above the limit [m], and the cable, or the first of two, of the nearest pair."""
+        """Least distance minus the limit [m], and the cable (the first of two) of the nearest pair."""
         rows = _clearance_rows(given.robot, self.obstacles)
         value, pair = rows.least(given.state)
         cables = np.array([*map(_cable_of, rows.pairs.names), -1])
@@ -209,10 +209,11 @@ class Clearance(Criterion):
 class InFrame(Criterion):
     """The platform's box and anchors keep a distance from the faces of the frame.
 
-    The frame is the robot's frame_size, or what its anchors span down to the floor. Of a planar robot its plane counts.
+    The frame is the robot's frame_size, or the box of its anchors down to the floor. For a planar robot, its plane
+    counts.
 
     Attributes:
-        limit: Least distance from the faces [m], >= 0.
+        limit: Smallest distance from the faces [m], >= 0.
     """
 
     title = "frame"
@@ -222,7 +223,7 @@ class InFrame(Criterion):
     limit: float = 0.0
 
     def judge(self, given: Given) -> Judged:
-        """Least distance of a corner from the faces, above the limit [m]."""
+        """Least distance of a corner from the faces, minus the limit [m]."""
         robot = given.robot
         low, high = bounds(robot)
         axes = np.arange(3) if robot.plane_normal is None else np.flatnonzero(np.abs(robot.plane_normal) < 0.5)
@@ -234,7 +235,7 @@ class InFrame(Criterion):
         return Judged(locked(distance - self.limit))
 
     def scale(self, robot: Robot) -> float:
-        """A tenth of the frame's least edge that is not flat [m]."""
+        """A tenth of the frame's shortest edge of nonzero length [m]."""
         low, high = bounds(robot)
         edges = (high - low)[high > low]
         return 0.1 * float(edges.min(initial=np.inf)) if edges.size else 1.0
@@ -247,7 +248,7 @@ def _clearance_rows(robot: Robot, obstacles: Obstacle | Sequence[Obstacle]) -> C
 
 
 def _cable_of(pair: tuple[str, str]) -> int:
-    """The first cable of a pair of names; -1 where there is none."""
+    """First cable of a pair of names; -1 if there is none."""
     return next((int(found[1]) for name in pair if (found := _CABLE.fullmatch(name))), -1)
 
 
@@ -261,7 +262,7 @@ def _least_stiffness(freedom: Array, matrix: Array) -> Array:
     own = 0.5 * (own + np.swapaxes(own, 1, 2))
     size = np.sqrt(np.abs(np.einsum("kii->ki", own)))
     size[size == 0.0] = 1.0
-    balanced = own / (size[:, :, None] * size[:, None, :])  # newtons and newton meters alike
+    balanced = own / (size[:, :, None] * size[:, None, :])  # scaled, so that forces and moments are comparable
     stable = np.linalg.eigvalsh(balanced)[:, 0] > 0.0
     compliance = compliance_of(freedom, matrix)[:, :3, :3]
     known = np.asarray(stable & ~np.isnan(compliance).any(axis=(1, 2)))

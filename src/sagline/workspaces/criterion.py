@@ -1,4 +1,4 @@
-"""Interface of the criteria of a workspace, and the poses that criteria judge."""
+"""Interface of the criteria of a workspace, and the poses at which criteria are evaluated."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ CONTINUOUS: Final = "MinimumNorm, QuadraticProgram, PNorm, AnalyticCenter, Centr
 
 @dataclass(eq=False)
 class Given:
-    """Poses of a robot that criteria judge, N of them.
+    """N poses of a robot at which criteria are evaluated.
 
-    Tensions are computed on first use, for the K poses whose margin is not negative; they balance one wrench, the
-    middle of the wrench set of the margin.
+    Tensions are computed on first use, for the K poses with a nonnegative margin. They balance one wrench, the middle
+    of the wrench set of the margin.
 
     Attributes:
         robot: The robot.
@@ -40,7 +40,7 @@ class Given:
         tension: Tension distribution method.
         wrench: Middle of the wrench set, shape (6,).
         rows: Positions [m] and quaternions, shape (N, 7).
-        margin: Margins of the poses [N], shape (N,), < 0 where the cables cannot hold the platform.
+        margin: Margins of the poses [N], shape (N,), < 0 if the cables cannot hold the platform.
         cable: Cables that limit the margins, -1 for none, shape (N,).
     """
 
@@ -97,8 +97,9 @@ class Judged(NamedTuple):
     """Values of a criterion at N poses.
 
     Attributes:
-        value: Distance to the limit in the criterion's unit, >= 0 where it is met; NaN without tensions, shape (N,).
-        cable: Cable that decides, -1 for none, shape (N,); None where no single cable does at any pose.
+        value: Distance to the limit in the criterion's unit, >= 0 if the criterion is met; NaN without tensions, shape
+            (N,).
+        cable: Limiting cable, -1 for none, shape (N,); None if no pose has a single limiting cable.
     """
 
     value: Array
@@ -107,14 +108,14 @@ class Judged(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Criterion:
-    """A condition on poses: a function of the pose that is >= 0 where it is met, and continuous.
+    """A condition on poses: a continuous function of the pose that is >= 0 if the condition is met.
 
     Attributes:
         title: Name in tables and figures.
         unit: Unit of its values.
-        needs_tensions: True if it depends on the tensions.
-        sense: "≤" or "≥" of its limit; "" where it has none.
-        _limit_range: Range of its field `limit`, as of `number`; empty where that is not checked.
+        needs_tensions: True if the criterion depends on the tensions.
+        sense: "≤" or "≥" of the limit; "" without a limit.
+        _limit_range: Range of the field `limit`, as in `number`; empty if it is not checked.
     """
 
     title: ClassVar[str]
@@ -124,7 +125,7 @@ class Criterion:
     _limit_range: ClassVar[Mapping[str, float]] = MappingProxyType({})
 
     def __post_init__(self) -> None:
-        """Check the limit, and refuse the interface itself."""
+        """Check the limit, and reject an instance of the interface itself."""
         if type(self) is Criterion:
             step = "Choose one of the criteria, MaximumSag(0.05) for instance."
             raise InvalidValueError("Criterion()", "the interface alone", "a criterion", step)
@@ -139,12 +140,12 @@ class Criterion:
             given: The poses.
 
         Returns:
-            Values in the criterion's unit, and the cables that decide.
+            Values in the criterion's unit, and the limiting cables.
         """
         raise NotImplementedError
 
     def scale(self, robot: Robot) -> float:
-        """Size that counts as one, so that criteria of different units compare; by default the limit.
+        """Unit size for the comparison of criteria with different units; by default the limit.
 
         Args:
             robot: The robot.
@@ -158,18 +159,18 @@ class Criterion:
         return limit
 
     def check(self, robot: Robot) -> None:
-        """Refuse robots that the criterion cannot judge.
+        """Reject robots for which the criterion cannot be evaluated.
 
         Args:
             robot: The robot.
 
         Raises:
-            InvalidValueError: If it cannot.
+            InvalidValueError: If the robot is not suitable.
         """
 
     @property
     def always(self) -> bool:
-        """True if every workspace has it, so that no report names it."""
+        """True if every workspace includes the criterion, so that reports omit it."""
         return False
 
     def __str__(self) -> str:
@@ -190,7 +191,7 @@ class Criterion:
 
 
 def check_continuous(method: TensionMethod, criteria: Sequence[Criterion]) -> None:
-    """Refuse criteria on tensions that jump from pose to pose, or that depend on the pose before."""
+    """Reject criteria on tensions that jump from pose to pose, or that depend on the previous pose."""
     jumps = not method.continuous or (isinstance(method, PolygonWalk) and method.optimum == "1-norm")
     first = next((one for one in criteria if one.needs_tensions), None)
     if first is None or not (jumps or isinstance(method, Closest)):

@@ -1,4 +1,4 @@
-"""Sign changes of a function of positions along many lines at once."""
+"""Sign changes of a function of positions along many lines together."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 from sagline.core.arrays import Array, Indices
 from sagline.workspaces.grid import Level, level_values
 
-TRIAL = 3  # steps of regula falsi, after which a bracket is to be an eighth
-ITERATIONS = 100  # a jump takes some 45, by halving; what is continuous ends after 5 to 8
+TRIAL = 3  # steps of regula falsi, after which a bracket must have shrunk to an eighth
+ITERATIONS = 100  # a jump takes some 45 by bisection; continuous functions end after 5 to 8
 
 
 class Brackets(NamedTuple):
     """Pairs of positions on N rays between which a function changes its sign.
 
     Attributes:
-        inner: The one inside [m], shape (N, 3).
-        outer: The other [m].
-        at_inner: The function there, shape (N,).
-        at_outer: The same at the other.
-        found: True where it changes its sign within the limit, shape (N,).
+        inner: Position inside [m], shape (N, 3).
+        outer: Position outside [m].
+        at_inner: Function at `inner`, shape (N,).
+        at_outer: Function at `outer`.
+        found: True if the function changes its sign within the limit, shape (N,).
     """
 
     inner: Array
@@ -41,7 +41,7 @@ class Brackets(NamedTuple):
 def brackets(
     level: Level, points: Array, outward: Array, at_points: Array, step: Array, outer_limit: Array, inner_limit: Array
 ) -> Brackets:
-    """Search from points (N, 3) [m] outward where they are inside, else inward, in steps that triple up to a limit."""
+    """Search from points (N, 3) [m], outward if they are inside, else inward, in steps that triple up to a limit."""
     is_inside = at_points >= 0.0
     limit = np.where(is_inside, outer_limit, inner_limit)
     away = np.where(is_inside, 1.0, -1.0)[:, None] * outward
@@ -89,11 +89,12 @@ def crossings_of(
     precision: float = 1e-10,
     narrow: float = 1e-12,
 ) -> Array:
-    """Share of each of V lines that is inside, (V,), by regula falsi with reduced weight of an end that stays.
+    """Share of each of V lines that is inside, (V,), by regula falsi with reduced weight of an end that does not move.
 
-    `values` gives the functions of lines, by their indices, at as many positions. A bracket is bisected where an end is
-    infinite, and several times where regula falsi is slower than bisection, as at jumps. `precision` is relative to the
-    smaller end value, `narrow` to the line. Weights: Anderson & Björck 1973 (the Illinois method's are 1/2).
+    `values` evaluates the functions of lines, given their indices, at one position each. A bracket is bisected if an
+    end is infinite, and several times if regula falsi is slower than bisection, for example at jumps. `precision` is
+    relative to the smaller end value, `narrow` to the line. Weights: Anderson & Björck 1973 (the Illinois method's are
+    1/2).
     """
     low, high = np.zeros(len(inner)), np.ones(len(inner))
     at_low, at_high = at_inner.copy(), at_outer.copy()
@@ -129,12 +130,12 @@ class _BisectionSchedule:
     """Bisection steps due for each bracket, doubled each time a trial of regula falsi is slower than bisection."""
 
     def __init__(self, count: int) -> None:
-        self._width = np.ones(count)  # at the beginning of a trial
+        self._width = np.ones(count)  # at the start of a trial
         self._steps, self._due = np.zeros((2, count), dtype=np.int64)
         self._next = np.ones(count, dtype=np.int64)
 
     def due(self, k: Indices) -> NDArray[np.bool_]:
-        """True for brackets k that are to be bisected next."""
+        """True for brackets k whose next step is a bisection."""
         return np.asarray(self._due[k] > 0)
 
     def update(self, k: Indices, halved: NDArray[np.bool_], width: Array) -> None:
