@@ -46,32 +46,32 @@ def design(
     folder: Path | str | None = None,
     progress: Progress | None = None,
 ) -> Front:
-    """Search for a robot that is better than one, or for a front of them.
+    """Search for a better robot than the given one, or for a front of such robots.
 
-    The search begins with the robot itself and with a seeded sample; the same seed gives the same robots bit for bit.
+    The search begins with the robot itself and a seeded sample; results for one seed are identical bit for bit.
 
     Args:
-        robot: The robot to begin with.
+        robot: Initial robot of the search.
         free: Design variables: `FreeAnchors`, `FreeCable`, `FreeLimit`.
         goals: Goals, or their names. "cma" and "differential_evolution" add them up by
             their weights; "nsga2" finds robots of which none is better than another in every goal.
-        wrenches: Set of loads at every pose, a `WrenchBox` for instance; None for its weight alone.
+        wrenches: Set of loads at every pose, for example a `WrenchBox`; None for the weight alone.
         poses: Poses; None for a grid of level poses in a box.
-        box: The box of that grid; None for the robot's test box, level.
-        grid: Poses of it along x, y and z.
-        inner: Anchors that the machine itself moves from pose to pose: `FreeAnchors`, at each pose shifted to where
-            the margin is largest.
-        robust: Errors of the anchors that a robot is rated with.
+        box: Box of the grid; None for the robot's test box, level.
+        grid: Number of poses of the grid along x, y and z.
+        inner: Anchors that the machine itself moves from pose to pose: `FreeAnchors`, shifted at each pose to the
+            largest margin.
+        robust: Errors of the anchors for the rating of a robot.
         model: Cable model.
         optimizer: "cma", "differential_evolution" or "nsga2".
         evaluations: Largest number of robots that are rated.
-        seed: Of all that is random.
+        seed: Seed of all random numbers.
         folder: Folder of the rated robots: an interrupted search continues from there, and so does one that is asked
             for more evaluations too. None: nowhere.
-        progress: Called after each generation: how many robots are rated, of how many.
+        progress: Called after each generation with the number of rated robots and the largest number.
 
     Returns:
-        Front; where no robot is better it says so, and holds the first one.
+        Front; if no robot is better, it reports so and contains the first one.
 
     Raises:
         InvalidValueError: If an argument is of the wrong kind, a part is free beyond what the robot has or allows, or
@@ -102,7 +102,7 @@ def design(
     if count < 2 * population:
         allowed = f">= {2 * population:,}, two generations of {optimizer} for {dimensions} free numbers"
         raise InvalidValueError("evaluations", f"{count:,}", allowed, "Allow more, or free less.")
-    ledger = Ledger(request, candidates, count, progress)  # refuses before anything is written
+    ledger = Ledger(request, candidates, count, progress)  # raises errors before any file is written
     sample = latin_hypercube(population - 1, dimensions, request.seed)
     first = np.concatenate((candidates.units(candidates.start[None]), sample))
     with nullcontext() if folder is None else open_record(folder, request) as ledger.record:

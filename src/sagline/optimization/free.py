@@ -25,10 +25,10 @@ class DesignVariable(NamedTuple):
 
     Attributes:
         name: Name in messages and tables.
-        unit: Its unit; "" for the number of a choice.
-        low: Least [unit].
-        high: Largest [unit].
-        start: Value of the robot [unit], between the two.
+        unit: Unit of the variable; "" for the index of a choice.
+        low: Lower bound [unit].
+        high: Upper bound [unit].
+        start: Value of the initial robot [unit], within the bounds.
         choices: Number of choices 0, 1, ...; 0 for a continuous variable.
     """
 
@@ -44,8 +44,8 @@ class Bound(NamedTuple):
     """Design variables of a given robot.
 
     Attributes:
-        parts: The K numbers that may change.
-        write: Changes cable tables (N, m, CABLE_COLUMNS) in place, by the parts' values (N, K).
+        parts: The K design variables.
+        write: Function that changes cable tables (N, m, CABLE_COLUMNS) in place, from the variables' values (N, K).
     """
 
     parts: tuple[DesignVariable, ...]
@@ -68,13 +68,13 @@ class Free(ByFields):
             Design variables and the function that writes them.
 
         Raises:
-            InvalidValueError: If the robot does not have it, or not within the bounds.
+            InvalidValueError: If the robot lacks the variable, or its value is outside the bounds.
         """
         raise NotImplementedError
 
 
 def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -> None:
-    """Refuse bounds that are crossed, or with `strictly` equal, shape (K,)."""
+    """Reject bounds with low above high, or with `strictly` equal bounds, shape (K,)."""
     for k in np.flatnonzero(low >= high if strictly else low > high):
         where = f"[{k}]" if len(low) > 1 else ""
         allowed = f"< high{where}, {high[k]:g} {unit}" if strictly else f"<= high{where}, {high[k]:g} {unit}"
@@ -82,7 +82,7 @@ def check_order(low: Array, high: Array, unit: str, *, strictly: bool = False) -
 
 
 def cable_numbers(cables: Any) -> tuple[int, ...]:
-    """Checked cable numbers, each once; empty for None, all cables."""
+    """Checked cable indices without repetitions; empty for None, all cables."""
     if cables is None:
         return ()
     given = list(cables) if isinstance(cables, Sequence | np.ndarray) and not isinstance(cables, str) else []
@@ -107,11 +107,11 @@ def whose_text(cables: Indices, count: int) -> str:
     return "" if len(cables) == count else f"[{' '.join(map(str, cables))}]"
 
 
-SAME: Final = 1e-9  # relative: to which a robot's cable is one of a catalogue
+SAME: Final = 1e-9  # relative tolerance for a match of a robot's cable with one of a catalogue
 
 
 def _one_cable(value: Any, item: str) -> Cable:
-    """Material of one cable, checked: numbers and no arrays."""
+    """Checked material of one cable, with numbers instead of arrays."""
     cable = instance(value, Cable, item)
     if cable.linear_density.shape != ():
         shape = f"of shape {cable.linear_density.shape}"
@@ -127,9 +127,9 @@ class CableChoice:
 
     Attributes:
         name: Name in messages and files.
-        cable: Its material, numbers and no arrays.
-        cost: Of a meter of it, in any currency, >= 0; None where no goal asks.
-        tension_max: Upper tension limit [N], > 0; None: the robot's limits stay.
+        cable: Material of the cable, with numbers instead of arrays.
+        cost: Cost per meter, in any currency, >= 0; None if no goal needs it.
+        tension_max: Upper tension limit [N], > 0; None to keep the robot's limits.
 
     Raises:
         InvalidValueError: If the material is that of several cables, or an argument is of the wrong kind.
@@ -148,7 +148,7 @@ class CableChoice:
 class FreeCable(Free):
     """The material of all cables, from a catalogue.
 
-    Attributes:
+    catalogue: The cables, preferably sorted by weight, because neighbors are tried one after the other.
         catalogue: The cables, best in the order of their weight: neighbors are tried after each other.
     """
 
@@ -158,10 +158,10 @@ class FreeCable(Free):
         """Check the catalogue.
 
         Args:
-            catalogue: Two cables or more; the robot's own is among them.
+            catalogue: Two or more cables, including the robot's own.
 
         Raises:
-            InvalidValueError: If it is none.
+            InvalidValueError: If `catalogue` is not such a catalogue.
         """
         given: Any = catalogue
         if not isinstance(given, Sequence) or isinstance(given, str) or len(given) < 2:
@@ -189,7 +189,7 @@ class FreeCable(Free):
 
 
 def _write_cables(catalogue: tuple[CableChoice, ...], cables: Array, values: Array) -> None:
-    """Set material and tension limit by the place in the catalogue."""
+    """Set material and tension limit from the index in the catalogue."""
     which = values[:, 0].astype(np.int64)
     for name, column in (("linear_density", tables.DENSITY), ("axial_stiffness", tables.STIFFNESS)):
         cables[:, :, column] = np.array([getattr(one.cable, name) for one in catalogue])[which, None]
@@ -203,13 +203,13 @@ LIMITS: Final = {"tension_min": tables.TENSION_MIN, "tension_max": tables.TENSIO
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FreeLimit(Free):
-    """A tension limit that may change, the same for all cables of it.
+    """A variable tension limit, one value for all its cables.
 
     Attributes:
         which: "tension_min" or "tension_max".
-        low: Least [N], >= 0.
-        high: Largest [N].
-        cables: Whose limit, numbers from 0; empty for all.
+        low: Lower bound [N], >= 0.
+        high: Upper bound [N].
+        cables: Indices of the cables, from 0; empty for all.
     """
 
     which: str
@@ -222,9 +222,9 @@ class FreeLimit(Free):
 
         Args:
             which: "tension_min" or "tension_max".
-            low: Least [N], >= 0.
-            high: Largest [N].
-            cables: Whose, numbers from 0; None for all.
+            low: Lower bound [N], >= 0.
+            high: Upper bound [N].
+            cables: Indices of the cables, from 0; None for all.
 
         Raises:
             InvalidValueError: If low is not below high, or an argument is of the wrong kind.

@@ -19,11 +19,11 @@ class Measured(NamedTuple):
     """Quantities of candidates, each with S samples of its anchors (one where these are exact) at G poses.
 
     Attributes:
-        margin: Of the wrench set [N], shape (N, S, G); -inf where a pose is singular or a cable has no length.
-        tension: Largest of the cables [N], shape (N, S, G), NaN where there are no tensions; None if not needed.
-        sag: Largest of the cables [m], of the same shape, or None.
-        stiffness: Against the force that meets the least [N/m], of the same shape, or None.
-        cost: Of the cables, shape (N, S), or None.
+        margin: Margin of the wrench set [N], shape (N, S, G); -inf if a pose is singular or a cable has no length.
+        tension: Largest cable tension [N], shape (N, S, G), NaN without tensions; None if not needed.
+        sag: Largest cable sag [m], of this shape, or None.
+        stiffness: Stiffness in the softest direction [N/m], of this shape, or None.
+        cost: Cost of the cables, shape (N, S), or None.
     """
 
     margin: Array
@@ -39,8 +39,8 @@ class _Kind(NamedTuple):
     Attributes:
         unit: Its unit; "" for a share or a currency.
         larger_is_better: True if it is maximized by default.
-        needs: The field of `Measured`.
-        over_poses: Its value from that field, over the last axis.
+        needs: Field of `Measured` that it uses.
+        over_poses: Function from that field to the goal's value, over the last axis.
         text: Description.
     """
 
@@ -83,12 +83,12 @@ KINDS: Final = MappingProxyType(
         "cable_cost": _Kind("", False, "cost", lambda cost: cost, "cost of the cables"),
     }
 )
-AT_POSES: Final = ("tension", "sag", "stiffness")  # which need a tension distribution
+AT_POSES: Final = ("tension", "sag", "stiffness")  # goals that need a tension distribution
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A quantity to be made larger or smaller.
+    """A quantity to maximize or minimize.
 
     Tensions, sag and stiffness are those of the platform's weight and the middle of the wrench set, shared by
     `MinimumNorm`; they are taken over the feasible poses of the initial robot, and a robot for which one of these is
@@ -99,8 +99,8 @@ class Goal:
             [N], "largest_tension" [N], "largest_sag" [m], "least_stiffness" [N/m] (against a force, whatever its
             direction) or "cable_cost" (each cable as long as the longest chord it spans, by the catalogue's costs).
         maximize: True to maximize, False to minimize.
-        weight: Weight beside other goals, > 0.
-        scale: Size that counts as one, in its unit; None: the first robot's value, or 1 where that is 0.
+        weight: Weight relative to other goals, > 0.
+        scale: Unit size of the goal, in its unit; None for the first robot's value, or 1 if that is 0.
     """
 
     kind: str
@@ -116,11 +116,11 @@ class Goal:
         Args:
             kind: One of the seven.
             maximize: True to maximize, False to minimize; None: by its kind.
-            weight: Weight beside other goals, > 0.
-            scale: Size that counts as one, > 0, or None.
+            weight: Weight relative to other goals, > 0.
+            scale: Unit size of the goal, > 0, or None.
 
         Raises:
-            InvalidValueError: If there is no such goal, or an argument is of the wrong kind.
+            InvalidValueError: If the goal does not exist, or an argument is of the wrong kind.
 
         Examples:
             >>> import sagline as sl
@@ -155,7 +155,7 @@ class Goal:
             measured: Quantities of the candidates.
             worst: True to take the worst of a sample of anchors, False for the mean.
 
-        Returns:
+        Values in the goal's unit, shape (N,).
             In the goal's unit, shape (N,).
         """
         samples = KINDS[self.kind].over_poses(getattr(measured, self.needs))

@@ -1,4 +1,4 @@
-"""Moving anchors: at each pose placed for the largest margin."""
+"""Moving anchors: placed at each pose for the largest margin."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 from sagline.workspaces.wrench_sets import WrenchSet
 
-BLOCK: Final = 1 << 11  # poses at once: a tenth of a second, after which an interrupt is heard
+BLOCK: Final = 1 << 11  # poses per block: a tenth of a second, the delay of an interrupt
 _CATENARY: Final = Catenary()
 
 
@@ -34,12 +34,12 @@ class MovingAnchors(Result):
     """Result of `moving_anchors` at G poses.
 
     Attributes:
-        robot: The robot with its anchors where it has them.
+        robot: The robot with its anchors at their original positions.
         pose: The poses, a batch of G.
         parts: The q moving coordinates.
-        moved: Their values at each pose, shape (G, q).
-        margin: With moved anchors [N], shape (G,).
-        fixed_margin: Without [N], shape (G,).
+        moved: Values of these coordinates at each pose, shape (G, q).
+        margin: Margin with moved anchors [N], shape (G,).
+        fixed_margin: Margin without moved anchors [N], shape (G,).
         moving: Moving anchors as given.
     """
 
@@ -58,7 +58,7 @@ class MovingAnchors(Result):
 
     @property
     def robots(self) -> tuple[Robot, ...]:
-        """Robot at each pose, for `inverse` and other functions that take one robot a pose."""
+        """Robot at each pose, for `inverse` and other functions that accept one robot per pose."""
         names = [self.robot.name] * len(self.moved)
         return Candidates(self.robot, self.moving, "moving").robots(self.moved, names)
 
@@ -74,19 +74,19 @@ def moving_anchors(
     model: CableModel = _CATENARY,
     progress: Progress | None = None,
 ) -> MovingAnchors:
-    """Move anchors of a robot at each pose to where its margin is largest.
+    """Move anchors of a robot at each pose to the positions of largest margin.
 
-    Largest among a sample and then in its surroundings, by steps along one number after another.
+    The best of a sample is improved by steps along one coordinate after another.
 
     Args:
         robot: The robot.
         moving: Moving anchors: `FreeAnchors`.
-        wrenches: Set of loads, a `WrenchBox` for instance; None for its weight alone.
+        wrenches: Set of loads, for example a `WrenchBox`; None for the weight alone.
         poses: Poses; None for a grid of level poses in a box.
-        box: The box of that grid; None for the robot's test box, level.
-        grid: Poses of it along x, y and z.
+        box: Box of the grid; None for the robot's test box, level.
+        grid: Number of poses of the grid along x, y and z.
         model: Cable model.
-        progress: Called after some poses: how many are done, of how many.
+        progress: Called after some poses with the number of finished poses and the number of all poses.
 
     Returns:
         MovingAnchors.

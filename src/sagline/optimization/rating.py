@@ -1,4 +1,4 @@
-"""Ratings of candidates: goals of whole generations at once, from cable tables."""
+"""Ratings of candidates: goals of whole generations together, from cable tables."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from sagline.workspaces.levels import middle_wrench
 from sagline.workspaces.margin_rows import MarginRows, mean_arms
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
-BLOCK = 1 << 12  # poses at once: a tenth of a second, after which an interrupt is heard
+BLOCK = 1 << 12  # poses per block: a tenth of a second, the delay of an interrupt
 
 
 def distribute(
@@ -39,8 +39,8 @@ def distribute(
 ) -> tuple[Array, Array, Array | None]:
     """Largest tension [N], largest sag [m] and, if asked for, least stiffness [N/m], by the minimum norm, each (N,).
 
-    NaN where there are no tensions. Tables (N, m, CABLE_COLUMNS), one a pose row; the stiffness is that of the softest
-    direction of a force on the center of mass.
+    NaN without tensions. Tables (N, m, CABLE_COLUMNS), one per pose row; the stiffness is that of the softest direction
+    of a force on the center of mass.
     """
     method = MinimumNorm()
     options = kernel_options(robot, model, method.alone)
@@ -99,8 +99,8 @@ def _stiffness(
 
 Margins: TypeAlias = Callable[[Array, Array], Array]  # of tables (R, m, CABLE_COLUMNS) and pose rows (R, POSE_COLUMNS)
 
-SPREAD: Final = 4  # points a number that are tried first
-STEP: Final = 0.25  # of the bounds' distance, at first
+SPREAD: Final = 4  # sample points per coordinate
+STEP: Final = 0.25  # share of the bounds' distance: initial step
 ITERATIONS: Final = 14  # each halves the step
 
 
@@ -139,7 +139,7 @@ def move_anchors(inner: Candidates, margins: Margins, cables: Array, poses: Arra
     return inner.values(best), found
 
 
-ROWS: Final = 1 << 14  # poses of candidates at once: a tenth of a second, and little memory
+ROWS: Final = 1 << 14  # pose rows per block: a tenth of a second, and little memory
 
 
 class Rating:
@@ -155,12 +155,12 @@ class Rating:
         robust: AnchorErrors | None,
         inner: Candidates | None,
     ) -> None:
-        """Prepare; refused if a cost is missing, or the first robot holds no pose where a goal needs tensions."""
+        """Prepare; an error if a cost is missing, or the first robot has no feasible pose for a goal on tensions."""
         self._candidates, self._goals, self._robust, self._inner = candidates, tuple(goals), robust, inner
         self._model, self._poses, self.rows = model, poses, pose_rows(poses)
         self._wrench = np.zeros(6) if wrenches is None else middle_wrench(wrenches)
         self._wrenches = NO_LOAD if wrenches is None else wrenches
-        # the first robot's, so that margins of candidates compare
+        # lever arm of the first robot, so that margins of candidates are comparable
         self._arm = float(mean_arms(cable_table(candidates.robot), body_table(candidates.robot))[0])
         self._needs = {goal.needs for goal in self._goals}
         self._solid = PlatformBox(candidates.robot, poses)

@@ -23,7 +23,7 @@ Level = Callable[[Array], Array]
 Mask = NDArray[np.bool_]
 
 _CELL = tuple(product((0, 1), repeat=3))  # the corners of a cell
-_HALVED = tuple(product((0, 1, 2), repeat=3))  # the nodes of a cell of which each edge is halved
+_HALVED = tuple(product((0, 1, 2), repeat=3))  # nodes of a cell with halved edges
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,8 +35,8 @@ class Grid(Result):
         y: The same along y, shape (ny,).
         z: The same along z, shape (nz,).
         values: The function, >= 0 inside, shape (nx, ny, nz).
-        evaluated: True where the function was evaluated, shape (nx, ny, nz); elsewhere the sign alone holds, and
-            the value is that of a neighbor.
+        evaluated: True if the function was evaluated, shape (nx, ny, nz); elsewhere only the sign is valid, and the
+            value is that of a neighbor.
     """
 
     x: Array
@@ -66,7 +66,7 @@ class Grid(Result):
 
 
 def level_values(level: Level, positions: Array) -> Array:
-    """Values (N,) of a level function at positions (N, 3) [m]; refused if NaN or of another shape."""
+    """Values (N,) of a level function at positions (N, 3) [m]; an error if NaN or of another shape."""
     if not len(positions):
         return np.zeros(0)
     values = np.asarray(level(locked(np.ascontiguousarray(positions))), dtype=np.float64)
@@ -110,7 +110,7 @@ def refine_grid(grid: Grid, level: Level) -> Grid:
 
 
 def _crossed_cells(inside: Mask, nodes: tuple[tuple[int, ...], ...] = _CELL, stride: int = 1) -> Mask:
-    """Mask of the cells that the boundary crosses: some of their nodes are inside, and some are not."""
+    """Mask of the cells that the boundary crosses: with nodes inside and nodes outside."""
     parts = list(_views(inside, nodes, stride))
     return np.asarray(np.logical_or.reduce(parts) & ~np.logical_and.reduce(parts))
 
@@ -131,12 +131,12 @@ def _grid(axes: list[Array], values: Array, evaluated: Mask, *, lock: bool = Tru
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Net:
-    """Triangles whose vertices lie each on an edge of the grid, or at a node on the border of the grid.
+    """Triangles with each vertex on an edge of the grid, or at a node on the border of the grid.
 
     Attributes:
-        inner: The node inside, of the edge of each vertex, shape (V, 3).
-        outer: The node outside, shape (V, 3); the same as inner at the border.
-        faces: The vertices of each triangle, counterclockwise as seen from outside, shape (F, 3).
+        inner: Inside node of the edge of each vertex, shape (V, 3).
+        outer: Outside node, shape (V, 3); equal to `inner` at the border.
+        faces: Vertices of each triangle, counterclockwise as seen from outside, shape (F, 3).
         first: Index of each vertex before merging, shape (V,).
     """
 
@@ -156,7 +156,7 @@ def triangulate(inside: Mask) -> Net:
     except ModuleNotFoundError:
         raise FileError.not_installed("scikit-image", "Workspaces need it", "workspace") from None
     padded = np.pad(np.where(inside, np.float32(1.0), np.float32(-1.0)), 1, constant_values=-1.0)
-    # the older table has only signs, and vertices on edges alone
+    # the older table has only signs, and vertices only on edges
     middle, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
         padded, 0.0, method="lorensen", gradient_direction="ascent"
     )
@@ -169,7 +169,7 @@ def triangulate(inside: Mask) -> Net:
 
 
 def merge_vertices(inner: Indices, outer: Indices, faces: Indices, shape: tuple[int, ...]) -> Net:
-    """Net with one vertex for each edge or node of the grid, without the triangles that this makes degenerate."""
+    """Net with one vertex for each edge or node of the grid, without triangles that become degenerate."""
     node = np.ravel_multi_index(tuple(np.minimum(inner, outer).T), shape)
     direction = np.abs(outer - inner) @ np.array([1, 2, 3])
     _, first, place = np.unique(4 * node.astype(np.int64) + direction, return_index=True, return_inverse=True)

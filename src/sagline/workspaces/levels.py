@@ -18,18 +18,18 @@ from sagline.workspaces.margin_rows import MarginRows
 from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.wrench_sets import WrenchSet
 
-BLOCK: Final = 1 << 12  # poses at once: a tenth of a second, after which an interrupt is heard
+BLOCK: Final = 1 << 12  # poses per block: a tenth of a second, the delay of an interrupt
 
 
 class Details(NamedTuple):
-    """Level and deciding criterion at N positions.
+    """Level and limiting criterion at N positions.
 
     Attributes:
         level: >= 0 inside, shape (N,).
-        margin: Of the loads, in the rotation that decides [N], shape (N,).
-        criterion: Index of the deciding criterion, shape (N,).
-        cable: Deciding cable, -1 for none, shape (N,).
-        rotation: Index of the deciding rotation, shape (N,).
+        margin: Margin of the loads, in the limiting rotation [N], shape (N,).
+        criterion: Index of the limiting criterion, shape (N,).
+        cable: Limiting cable, -1 for none, shape (N,).
+        rotation: Index of the limiting rotation, shape (N,).
     """
 
     level: Array
@@ -41,10 +41,10 @@ class Details(NamedTuple):
 
 @dataclass(eq=False)
 class Levels:
-    """Least value of all criteria, each over its scale, at positions of the platform: >= 0 inside.
+    """Smallest value of all criteria, each divided by its scale, at positions of the platform: >= 0 inside.
 
-    A negative margin decides alone: other criteria have no tensions there. Over rotations the least level counts,
-    or the greatest where any of them will do.
+    A negative margin is the level itself: other criteria have no tensions there. Among the rotations the smallest level
+    counts, or the largest if any rotation is sufficient.
 
     Attributes:
         robot: The robot.
@@ -53,7 +53,7 @@ class Levels:
         criteria: The criteria, the margin first.
         model: Cable model.
         tension: Tension distribution method.
-        moment_arm: As of `margin` [m].
+        moment_arm: Lever arm as in `margin` [m].
         held: Axis along which all positions are the same, and their coordinate [m]; None for none.
         on_block: Called after each block with its number of poses.
         middle: Middle of the wrench set, which the tensions balance, shape (6,).
@@ -76,11 +76,11 @@ class Levels:
         self._scales = [one.scale(self.robot) for one in self.criteria]
 
     def __call__(self, positions: Array) -> Array:
-        """Levels at positions (N, 3) of the platform origin [m], shape (N,); -inf where no distance is known."""
+        """Levels at positions (N, 3) of the platform origin [m], shape (N,); -inf if no distance is known."""
         return self.details(positions).level
 
     def details(self, positions: Array) -> Details:
-        """Levels, and deciding criterion, cable and rotation, at positions (N, 3) of the platform origin [m]."""
+        """Levels, and limiting criterion, cable and rotation, at positions (N, 3) of the platform origin [m]."""
         count = len(positions)
         found = Details(*np.empty((2, count)), *np.full((3, count), -1))
         for part in blocks(count, BLOCK):
@@ -92,7 +92,7 @@ class Levels:
         return Details(*map(locked, found))
 
     def _in_plane(self, positions: Array) -> Array:
-        """Positions (N, 3) [m]; of a planar workspace their projections into the plane."""
+        """Positions (N, 3) [m]; for a planar workspace their projections into the plane."""
         if self.held is None:
             return positions
         axis, where = self.held
@@ -115,7 +115,7 @@ class Levels:
         return found
 
     def _in_rotation(self, positions: Array, rotation: int) -> Details:
-        """Details in one of the rotations."""
+        """Details in one rotation."""
         rows = self.orientations.at(positions, rotation)
         bracket = self._margins.rows(rows)
         given = Given(self.robot, self.model, self.tension, self.middle, rows, bracket.value, bracket.cable)
@@ -129,14 +129,14 @@ class Levels:
             # be held, and beyond, the margin decides.
             lost = np.isnan(judged.value) & (bracket.low >= 0.0)
             value = np.where(lost, -np.inf, judged.value / scale)
-            least = value < level  # NaN is not
+            least = value < level  # NaN compares false
             level[least], criterion[least] = value[least], index
             cable[least] = -1 if judged.cable is None else judged.cable[least]
         return Details(level, bracket.value, criterion, cable, np.full(len(rows), rotation, dtype=np.int64))
 
 
 def middle_wrench(wrenches: WrenchSet) -> Array:
-    """Middle of a wrench set, of polytopes the mean of the corners: force [N], moment [N m], shape (6,)."""
+    """Middle of a wrench set, for polytopes the mean of the corners: force [N], moment [N m], shape (6,)."""
     ends = np.cumsum(wrenches.sizes)
     means = [wrenches.corners[end - size : end].mean(axis=0) for end, size in zip(ends, wrenches.sizes, strict=True)]
     return locked(wrenches.center + sum(means, start=np.zeros(6)))

@@ -1,4 +1,4 @@
-"""Signed margin of a wrench set: the further load that a pose can bear; above zero inside the workspace."""
+"""Signed margin of a wrench set: the additional load that a pose can support; above zero inside the workspace."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class MarginStatus(Status):
 
 
 _CATENARY = Catenary()
-_POSE_BYTES = 200.0  # memory of a pose, its rows and results
+_POSE_BYTES = 200.0  # memory per pose, with rows and results
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -65,7 +65,7 @@ class Margin(Result):
     """Result of `margin` at a single pose or N of them.
 
     Attributes:
-        robot: The robot, or one a pose.
+        robot: The robot, or one per pose.
         pose: The poses.
         wrenches: The set of loads.
         moment_arm: Lever arm by which moments count [m]; None for each robot's mean lever arm.
@@ -118,7 +118,7 @@ class Margin(Result):
 
 
 def _newtons(value: ArrayLike) -> str:
-    """Text of a margin, infinite ones included."""
+    """Text of a margin, including infinite ones."""
     number = float(np.asarray(value))
     return n(number, unit="N") if np.isfinite(number) else f"{number:g} N".replace("-", "−")
 
@@ -134,20 +134,20 @@ def margin(
 ) -> Margin:
     """Signed margin of a set of loads at each pose, with a bracket for the cables' sag.
 
-    Works where no tensions balance the platform too. With sag the bracket is proved, whatever the tensions:
-    low >= 0 means that every load of the set can be balanced within the limits, high < 0 that one cannot.
-    Sagging cables are looked at up to where they hang in a curve fifteen times as long as their chord, and where they
-    have no upper limit up to twice their own length: a least tension of zero has no largest pull.
+    Also valid at poses without a tension distribution. With sag the bracket is proved for all tensions: low >= 0 means
+    that every load of the set can be balanced within the limits, high < 0 that at least one load cannot. Sagging cables
+    are included up to a length of fifteen times their chord. Without an upper limit they are included up to twice their
+    own length, because a lower limit of zero has no largest sag force.
 
     Args:
-        robot: The robot, or a sequence of N robots, one a pose.
+        robot: The robot, or a sequence of N robots, one per pose.
         pose: A single pose or N.
         wrenches: The set of loads; None for the weight alone.
         model: Cable model; with `Straight()` both ends of the bracket are the value.
         moment_arm: Lever arm at which a moment counts like a force [m], >= 0. None: the mean distance of the platform
             anchors from the center of mass. 0: forces alone, the capacity margin of `capacity_margin`; where a moment
             alone fails the value is then -infinite.
-        progress: Called after every few thousand poses: how many are done, of how many.
+        progress: Called after every few thousand poses with the number of finished poses and the number of all poses.
 
     Returns:
         Margin.

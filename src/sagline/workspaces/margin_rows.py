@@ -23,18 +23,18 @@ from sagline.statics.tables import robot_terms
 from sagline.tension.method import LIMITS_OF
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
-BLOCK = 1 << 13  # poses at once: a tenth of a second, after which an interrupt is heard
+BLOCK = 1 << 13  # poses per block: a tenth of a second, the delay of an interrupt
 _CATENARY = Catenary()
 
 
 class Bracket(NamedTuple):
-    """Margins of N poses; `Margin` has the same with robot and poses.
+    """Margins of N poses; `Margin` has these fields with robot and poses.
 
     Attributes:
-        value: Continuous, between the other two [N], (N,).
-        low: Of what the cables' sag leaves open, the lower end [N], (N,).
-        high: The upper end [N], (N,).
-        cable: Whose limit moves the value fastest, -1 for none, (N,).
+        value: Continuous margin between `low` and `high` [N], (N,).
+        low: Lower end of the bracket that the cables' sag leaves [N], (N,).
+        high: Upper end [N], (N,).
+        cable: Cable whose limit changes the value most, -1 for none, (N,).
         status: Codes of `MarginStatus`, (N,).
         direction: Normal of the facet of the value, (N, 6).
     """
@@ -50,8 +50,8 @@ class Bracket(NamedTuple):
 class MarginRows:
     """Margins of rows of poses, for one robot or for many that share motion pattern, gravity and number of cables.
 
-    Everything but the poses is prepared once; `rows` then costs a few microseconds a call and a few a pose. It may be
-    called from several threads at once.
+    All pose-independent data are prepared once; `rows` then costs a few microseconds per call and a few per pose.
+    Several threads may call it at the same time.
     """
 
     __slots__ = ("_given", "cable_count", "robot_count")
@@ -92,7 +92,7 @@ class MarginRows:
         )
 
     def about(self, wrench: Array) -> MarginRows:
-        """Margins of the set of loads moved by a wrench [N, N m], shape (6,), unchecked; all else is shared."""
+        """Margins of the wrench set shifted by a wrench [N, N m], shape (6,), unchecked; all other data are shared."""
         model, limits, terms, (center, half, others, ellipsoids, corners, sizes, rates, inertias), arms = self._given
         there = _locked(center + wrench)
         moved = object.__new__(MarginRows)
@@ -141,7 +141,7 @@ def _arms(table: Array, bodies: Array, moment_arm: float | None) -> tuple[Array,
 
 
 def _set_terms(wrenches: WrenchSet, inertias: Array) -> SetTerms:
-    """Wrench set as the kernel takes it: segments along one axis become a box."""
+    """Wrench set in the form of the kernel: segments along one axis become a box."""
     segments = np.abs(wrenches.segments)
     straight = np.count_nonzero(segments, axis=1) <= 1
     half = segments[straight].sum(axis=0)
@@ -155,7 +155,7 @@ def _locked(array: Array) -> Array:
 
 
 def check_cable_count(robot: Robot) -> None:
-    """Refuse a robot with fewer cables than degrees of freedom."""
+    """Reject a robot with fewer cables than degrees of freedom."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     if m < n:
         step = "Add cables, or choose a motion pattern with fewer freedoms."

@@ -17,11 +17,11 @@ from sagline.workspaces.grid import Grid
 from sagline.workspaces.levels import Details, Levels
 from sagline.workspaces.wrench_sets import NO_LOAD, WrenchSet
 
-_STARTS: Final = 3  # best points of the grid that the search begins from
-_STEP: Final = 0.1  # of the box, with which it begins
-_EVALUATIONS: Final = 300  # at most, from each start
+_STARTS: Final = 3  # number of best grid points from which the search starts
+_STEP: Final = 0.1  # share of the box: initial step
+_EVALUATIONS: Final = 300  # largest number from each start
 _PRECISION: Final = 1e-4  # m
-_FAR: Final = 1e6  # a level as low as minus infinity, to a search that needs numbers
+_FAR: Final = 1e6  # replaces infinite levels, because the search needs finite numbers
 _UNHELD: Final = 1e3  # reduction of the levels at infeasible poses
 
 
@@ -31,11 +31,11 @@ class Nearest(Result):
 
     Attributes:
         pose: A single pose.
-        level: Of it: < 0, or not below where a region smaller than a cell of the grid was found.
-        margin: Of the loads there [N].
-        criterion: Index of the criterion that is missed most.
-        cables: Indices of the cables that oppose it.
-        reason: In a sentence.
+        level: Level of the pose: < 0, or >= 0 if a region smaller than a grid cell was found.
+        margin: Margin of the loads at the pose [N].
+        criterion: Index of the most violated criterion.
+        cables: Indices of the cables that violate it.
+        reason: Reason as a sentence.
     """
 
     pose: Pose
@@ -51,7 +51,7 @@ class Nearest(Result):
 
 
 def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
-    """Pose of greatest level: the best nodes of a grid, then a simplex search in the box from low to high [m], (3,)."""
+    """Pose of largest level: the best nodes of a grid, then a simplex search in the box from low to high [m], (3,)."""
     nodes = np.stack(np.unravel_index(np.arange(grid.values.size), grid.values.shape), axis=1)
     positions = np.clip(grid.positions(nodes), low, high)
     values = _merit(levels, positions)
@@ -70,7 +70,7 @@ def nearest_to(levels: Levels, grid: Grid, low: Array, high: Array) -> Nearest:
 
 
 def _merit(levels: Levels, positions: Array) -> Array:
-    """Finite merit of positions: levels, and the feasible fraction of the load where not all of it is.
+    """Finite merit of positions: levels, and the feasible fraction of the load if the full load is not feasible.
 
     Margins alone would lead to singular poses, at which all of them are small.
     """
@@ -85,13 +85,13 @@ def _merit(levels: Levels, positions: Array) -> Array:
 
 
 def _share(bare: Array, margin: Array) -> Array:
-    """Certainly feasible fraction of the load, where the weight alone is feasible: margins are concave in the load."""
+    """Proved feasible fraction of the load if the weight alone is feasible: margins are concave in the load."""
     return np.asarray(bare / (bare - margin))
 
 
 def _simplex_search(levels: Levels, start: Array, low: Array, high: Array) -> tuple[Array, float]:
     """Position of a local maximum of the merit, by simplex search, and the merit."""
-    from scipy.optimize import minimize  # a quarter of a second to load
+    from scipy.optimize import minimize  # the import takes a quarter of a second
 
     free = np.flatnonzero(high > low)
     step = _STEP * (high - low)[free]

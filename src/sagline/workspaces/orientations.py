@@ -24,20 +24,20 @@ if TYPE_CHECKING:
 
 Need = Literal["all", "any"]
 _NEEDS: Final = ("all", "any")
-_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # of the angle, by which a planar platform is turned
+_SHARES: Final = np.array([-1.0, -0.5, 0.5, 1.0])  # shares of the angle by which a planar platform is rotated
 _CORNERS: Final = np.array([one for one in product((-1.0, 0.0, 1.0), repeat=3) if any(one)])
 _AXES: Final = _CORNERS / np.linalg.norm(_CORNERS, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Orientations:
-    """Rotations of the platform, of which a position needs all, or any, to count.
+    """Rotations of the platform, all or any of which must be feasible at a position.
 
-    A continuous set of rotations is sampled at those listed.
+    A continuous set of rotations is represented by the listed samples.
 
     Attributes:
         quaternion: Rotations from platform to world as unit quaternions (x, y, z, w), shape (K, 4).
-        need: "all" where a position counts if the platform can be held there in each of them, "any" if in one.
+        need: "all" if the platform must be feasible in each rotation, "any" if one is sufficient.
     """
 
     quaternion: Array
@@ -51,7 +51,7 @@ class Orientations:
             need: "all" or "any".
 
         Raises:
-            InvalidValueError: If a matrix is no rotation, there is none, or the need is another word.
+            InvalidValueError: If a matrix is not a rotation, there is no rotation, or `need` is another word.
 
         Examples:
             >>> import numpy as np
@@ -77,7 +77,7 @@ class Orientations:
         return len(self.quaternion)
 
     def __str__(self) -> str:
-        """Description in a line."""
+        """Description in one line."""
         if len(self) > 1:
             most = 2.0 * np.arctan2(np.linalg.norm(self.quaternion[:, :3], axis=1), np.abs(self.quaternion[:, 3])).max()
             return f"{self.need} of {len(self)} sampled rotations, by up to {n(np.degrees(most), unit='°')}"
@@ -87,14 +87,14 @@ class Orientations:
         return f"turned by {turn_in_words(turn * np.copysign(1.0, self.quaternion[0, 3]))}"
 
     def __reduce__(self) -> tuple[Any, tuple[Array, Need]]:
-        """Pickle bit for bit."""
+        """Exact pickling."""
         return Orientations._of, (self.quaternion, self.need)
 
     def at(self, positions: Array, index: int) -> Array:
         """Pose rows of the platform at positions, in one of the rotations.
 
         Args:
-            positions: Of the platform origin [m], shape (N, 3).
+            positions: Positions of the platform origin [m], shape (N, 3).
             index: Index of the rotation.
 
         Returns:
@@ -107,10 +107,10 @@ class Orientations:
 
 @dataclass(frozen=True, slots=True)
 class Tilts:
-    """Rotations about any axis by up to an angle, all of which a position needs.
+    """Rotations about any axis by up to an angle; all of them must be feasible at a position.
 
-    They are sampled: level, and the whole angle about 26 axes spread over all directions; of a planar robot the angle
-    and its half, both ways.
+    The samples are the level orientation, and the full angle about 26 axes spread over all directions; for a planar
+    robot, the angle and its half in both directions.
 
     Attributes:
         angle: Largest angle of rotation [rad], 0 to pi.
@@ -130,13 +130,13 @@ class Tilts:
         """Rotations that sample all tilts up to the angle.
 
         Args:
-            robot: The robot, whose pattern says about which axes its platform turns.
+            robot: The robot; its motion pattern gives the axes of rotation of the platform.
 
         Returns:
-            Level first, then the others.
+            Level orientation first, then the tilted ones.
 
         Raises:
-            InvalidValueError: If the platform does not turn.
+            InvalidValueError: If the platform cannot rotate.
         """
         if self.angle == 0.0:
             return _level()
@@ -155,7 +155,7 @@ def _level() -> Orientations:
 
 
 def check_tilt(robot: Robot, angle: float, item: str) -> None:
-    """Refuse to tilt a platform by an angle [rad] if its motion pattern has no rotation; `item` is for messages."""
+    """Reject a tilt by an angle [rad] if the platform's motion pattern has no rotation; `item` is for messages."""
     if angle > 0.0 and robot.motion_pattern not in ROTATING:
         value, step = f"{np.degrees(angle):.4g} deg", "Leave the tilt out."
         allowed = f"none, by motion_pattern {robot.motion_pattern}: its platform does not turn"
@@ -180,7 +180,7 @@ def orientations_of(robot: Robot, given: Any, tilt: float) -> Orientations:
 
 
 def _check_turns(robot: Robot, given: Orientations) -> None:
-    """Refuse rotations, counted from level, that the robot's motion pattern does not have."""
+    """Reject rotations, relative to level, that the robot's motion pattern does not have."""
     turns = forbidden_turn(robot, Pose.from_quaternion(np.zeros(3), given.quaternion), LEVEL)
     wrong = np.flatnonzero(np.linalg.norm(turns, axis=1) > ROUNDING)
     if wrong.size:
