@@ -21,10 +21,10 @@ RETRY: Final = 0.2  # s between attempts to connect
 
 
 class _Newest(NamedTuple):
-    """The newest good block of a group.
+    """Newest valid block of a group.
 
     Attributes:
-        values: By name of the row.
+        values: Values by name of the row.
         arrived: Time of arrival, on the link's clock [s].
         round_trip: Time since the request or the command [s].
     """
@@ -35,10 +35,10 @@ class _Newest(NamedTuple):
 
 
 class _Outgoing(NamedTuple):
-    """Block to be written next.
+    """Next block to write.
 
     Attributes:
-        block: To be written.
+        block: Block to write.
         data: Bytes of the block.
         since: Time at which it was queued [s].
     """
@@ -49,13 +49,13 @@ class _Outgoing(NamedTuple):
 
 
 class GroupThread(Thread):
-    """The exchange with one PLC.
+    """Data exchange with one PLC.
 
     Attributes:
-        number: Of the group, from 0.
+        number: Index of the group, from 0.
         newest: Its newest valid block; None before the first.
         discarded: Number of invalid blocks.
-        trouble: The last error; None where there is none.
+        trouble: Last error; None without an error.
         settled: Set when the PLC has answered, validly or not.
     """
 
@@ -71,7 +71,7 @@ class GroupThread(Thread):
         self._wire = wire
         self._clock = clock
         self._kick = Event()
-        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # the newest takes the place of one not yet written
+        self._outgoing: deque[_Outgoing] = deque(maxlen=1)  # a new block replaces one that is not yet written
         self._ending = Event()
 
     def hand_over(self, block: Block, data: bytes) -> None:
@@ -80,7 +80,7 @@ class GroupThread(Thread):
         self._kick.set()
 
     def ask(self) -> None:
-        """Read the PLC's block, and write nothing."""
+        """Read the PLC's block without writing."""
         self._outgoing.clear()
         self._kick.set()
 
@@ -90,7 +90,7 @@ class GroupThread(Thread):
         self._kick.set()
 
     def abort(self) -> None:
-        """Stop at once."""
+        """Stop immediately."""
         self._wire.abort()
 
     def silence(self, waited: float) -> Refusal:
@@ -102,12 +102,12 @@ class GroupThread(Thread):
         )
 
     def run(self) -> None:
-        """Exchange blocks until the end; connect again after each failure."""
+        """Exchange blocks until the end; reconnect after each failure."""
         while not self._ending.is_set():
             try:
                 self._wire.open()
                 self._serve()
-            except Exception as error:  # of any kind: only this thread connects again
+            except Exception as error:  # any exception: only this thread can reconnect
                 self.trouble = error.refusal if isinstance(error, WireError) else _unexpected(error)
                 self.settled.set()
             finally:
@@ -140,8 +140,8 @@ class GroupThread(Thread):
         self.settled.set()
 
     def _mismatch(self, values: dict[str, Any]) -> Refusal | None:
-        """Reason why a valid block is not of the expected PLC; None where it is."""
-        group = values["group"] - 1  # in a block it is one more
+        """Reason why a valid block is not from the expected PLC; None if it is."""
+        group = values["group"] - 1  # block values start at 1
         if group != self.number:
             who = f"is group {group}" if group >= 0 else "has no group number"
             step = "Give the addresses in the groups' order, and each PLC its number"
@@ -168,14 +168,14 @@ def _unexpected(error: Exception) -> Refusal:
     return Refusal(f"the exchange failed with {type(error).__name__} ({text})", "Report it, if it happens again")
 
 
-LONGEST: Final = 3600.0  # s, that a PLC may take to answer first
+LONGEST: Final = 3600.0  # s, upper limit for the timeout of the first answers
 
 
 class BlockLink:
     """Link (`sagline.control.link.Link`) over one wire for each group; base of `S7Link` and `ModbusLink`."""
 
     def __init__(self, addresses: Sequence[Address], robot: Robot | int, wires: Sequence[Wire], timeout: float) -> None:
-        """Connect to all groups at once; timeout of the first answers [s]."""
+        """Connect to all groups together; timeout of the first answers [s]."""
         patience = number(timeout, "timeout", "s", above=0.0)
         if patience > LONGEST:
             raise InvalidValueError(
@@ -199,7 +199,7 @@ class BlockLink:
 
     @property
     def period(self) -> float:
-        """Time between two commands, as the program in the PLCs has it [s]."""
+        """Time between two commands, as in the program of the PLCs [s]."""
         return PERIOD
 
     @property
@@ -213,7 +213,7 @@ class BlockLink:
         A group that `command.owner` does not control receives its claim, if the command has one, and no command.
 
         Args:
-            command: Set points of all winches; None reads only.
+            command: Set points of all winches; None to read only.
 
         Returns:
             The newest sample of all groups, or the groups whose data are missing.
@@ -270,7 +270,7 @@ class BlockLink:
         return group.trouble or group.silence(waited)
 
     def _wait(self, timeout: float) -> None:
-        """Wait until every group has answered; close the link where one has not."""
+        """Wait until every group has answered; close the link if one has not."""
         for group in self._exchanges:
             group.settled.wait(max(0.0, timeout - self._clock()))
         silent = [i for i, group in enumerate(self._exchanges) if group.newest is None]

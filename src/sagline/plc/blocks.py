@@ -1,4 +1,4 @@
-"""Data blocks that a PLC and a controller share: one table for packing, servers and SCL."""
+"""Data blocks shared by a PLC and a controller: one table for packing, servers and SCL."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from sagline.control.link import GROUP_SIZE, Command, Sample, Whole, groups_of
 from sagline.core.arrays import Array
 
-LAYOUT: Final = 1  # version of the blocks; one more whenever anything below moves
+LAYOUT: Final = 1  # version of the blocks; incremented whenever anything below changes its offset
 TYPES: Final = {  # of SCL, as `struct` has them; big-endian and without gaps, as the PLC has them
     "DInt": "i",
     "DWord": "I",
@@ -29,9 +29,9 @@ class Field(NamedTuple):
     """One row of a block.
 
     Attributes:
-        name: As packing and SCL have it.
+        name: Name in packing and SCL.
         type: One of `TYPES`; or the rows of a structure that is there once a winch, in an array from 1.
-        offset: From the beginning of the block, or of the structure [bytes].
+        offset: Offset from the start of the block, or of the structure [bytes].
         meaning: Meaning and unit.
     """
 
@@ -45,8 +45,8 @@ class Refusal(NamedTuple):
     """Reason why a block, or a PLC, cannot be used.
 
     Attributes:
-        reason: In words.
-        next_step: For the reader.
+        reason: Reason as text.
+        next_step: Next step for the reader.
     """
 
     reason: str
@@ -58,12 +58,12 @@ class Block:
     """Data block with standard (not optimized) access: every byte has the offset in the table.
 
     Attributes:
-        number: Of the data block in the PLC.
-        name: Of it, in SCL.
+        number: Number of the data block in the PLC.
+        name: Name of the block in SCL.
         magic: Value of its row `magic`.
         register: First Modbus holding register of its copy.
-        size: Of the whole [bytes].
-        fields: Its rows.
+        size: Size of the whole block [bytes].
+        fields: Rows of the block.
     """
 
     number: int
@@ -93,7 +93,7 @@ class Block:
 
     @cached_property
     def packer(self) -> struct.Struct:
-        """The block as `struct` packs it, every row at its offset."""
+        """Format of the block for `struct`, with every row at its offset."""
         text, at = ">", 0
         for _, kind, offset in self.rows:
             text += "x" * (offset - at) + TYPES[kind]
@@ -106,7 +106,7 @@ class Block:
         return self.packer.pack(*[known.get(name, 0) for name in self.names])
 
     def read(self, data: bytes) -> dict[str, Any] | Refusal:
-        """Values by name of the row; or the reason why bytes are not this block."""
+        """Values by name of the row; or the reason why the bytes are not this block."""
         block = f"DB{self.number}"
         if len(data) != self.size:
             return Refusal(f"{block} has {len(data)} bytes instead of {self.size}", LOAD)
@@ -123,7 +123,7 @@ class Block:
 
 
 def winch_row(index: int, name: str) -> str:
-    """Name of a value of a winch, as SCL has it."""
+    """Name of a value of a winch in SCL."""
     return f"winch[{index + 1}].{name}"
 
 
@@ -215,12 +215,12 @@ BLOCKS: Final = (FROM_PLC, TO_PLC, CLAIM)
 
 
 def claim_block(owner: int) -> bytes:
-    """The block by which a controller asks for a grant."""
+    """Block of a controller that requests a grant."""
     return CLAIM.pack({"owner": owner})
 
 
 def command_blocks(command: Command) -> list[bytes]:
-    """Blocks of a command, one for each group; zeros for a winch that the last group does not have."""
+    """Blocks of a command, one per group; zeros for a winch that the last group does not have."""
     head = {
         "counter": command.counter,
         "mode": int(command.mode),

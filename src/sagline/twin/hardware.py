@@ -13,8 +13,8 @@ from sagline.robot.drum import drum_lever
 from sagline.robot.robot import Robot
 from sagline.twin.start import Start
 
-FILTER: Final = 0.05  # s, of the PLCs' filters of load cells
-LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # rows of what is read
+FILTER: Final = 0.05  # s, time constant of the PLCs' filters of load cells
+LENGTH, RATE, TORQUE, CELL, FILTERED = range(5)  # rows of the readings
 
 
 class Hardware:
@@ -40,7 +40,7 @@ class Hardware:
         self._wrong: dict[int, tuple[float, float]] = {}  # faulty load cells: factor of the reading, and offset [N]
         self._powered, self._torque_of_force = [False] * m, np.zeros(m)
         self._periods, self._shares = np.full(m, period), np.full(m, period / (FILTER + period))
-        self._load_changed = True  # whether the simulator needs the new load
+        self._load_changed = True  # True if the simulator needs the new load
         self.read = np.zeros((5, m))
         self._rows = tuple(self.read)
         self.read[FILTERED] = reading.load_cell
@@ -53,7 +53,7 @@ class Hardware:
         return self._simulator.reading
 
     def simulate_period(self, length: list[float], tension: list[float], powered: list[bool]) -> None:
-        """Simulate a period in which the set points go linearly to new ones: length [m], tension [N]."""
+        """Simulate a period in which the set points change linearly to new ones: length [m], tension [N]."""
         if powered != self._powered:
             self._switch(powered)
         counts = np.rint(self._nominal.counts(np.array(length)))

@@ -89,7 +89,7 @@ class Machine:
             start: Pose at which the encoders were set; None for the middle of the nominal robot's test_box. The
                 platform is where the nominal lengths at this pose put it; the lengths on pulleys and the dead
                 lengths that the true robot adds are not counted.
-            surveyed: Whether the true platform was at this pose when the encoders were set.
+            surveyed: True if the true platform was at this pose when the encoders were set.
             seed: Seed of noise, clocks and the network.
             period: Period of controller and PLCs [s], a whole multiple of the step.
             step: Step of the simulation of the plant [s].
@@ -97,7 +97,7 @@ class Machine:
             jitter: Largest additional delay, uniformly distributed [s].
             loss: Share of the messages that are lost.
             damping: Damping of the cables; None for a loss time of 1 ms, and air.
-            faults: One or several faults, as texts that `fault` reads, or as its results.
+            faults: One or several faults, as texts for `fault`, or as its results.
 
         Raises:
             InvalidValueError: If data are missing, the step is too coarse for the robot's modes, the robot does not
@@ -162,7 +162,8 @@ class Machine:
         """Link to the machine for a controller in this process.
 
         Args:
-            moves: Whether its exchanges advance the machine by a period each. Of several links, only one should.
+            moves: True if its exchanges advance the machine by a period each. Among several links, only one should do
+                so.
 
         Returns:
             The link: a `sagline.control.link.Link`.
@@ -175,11 +176,11 @@ class Machine:
         """Request the grant of a PLC.
 
         Args:
-            group: Number of the group, from 0.
+            group: Index of the group, from 0.
             owner: Id of the controller; 0 for none.
 
         Raises:
-            InvalidValueError: If there is no such group, or the id is not a whole number of 32 bits.
+            InvalidValueError: If the group does not exist, or the id is not a whole number of 32 bits.
         """
         self.deliver(self._group(group), whole_number(owner, "owner", 0, LARGEST_ID))
 
@@ -187,11 +188,11 @@ class Machine:
         """Send a command to a PLC, which checks its counter and its owner.
 
         Args:
-            group: Number of the group, from 0.
+            group: Index of the group, from 0.
             command: Command whose arrays are of the group's winches only.
 
         Raises:
-            InvalidValueError: If there is no such group, or the command is of another type or of other winches.
+            InvalidValueError: If the group does not exist, or the command is of another type or for other winches.
         """
         chosen = self._group(group)
         count = len(self.groups[chosen])
@@ -209,7 +210,7 @@ class Machine:
         """Deliver a claim or a command to a PLC, unless a fault prevents it.
 
         Args:
-            group: Number of the group, from 0.
+            group: Index of the group, from 0.
             message: Id of the owner for a claim, or a command.
         """
         if self._schedule.waiting:
@@ -224,7 +225,7 @@ class Machine:
             self._programs[group].take(message)
 
     def advance(self) -> None:
-        """Simulate one period: faults that are due, scans of the PLCs, drives and plant, and readings at its end."""
+        """Simulate one period: due faults, scans of the PLCs, drives and plant, and readings at its end."""
         now = self.time
         if self._schedule.waiting:
             self._apply_due_faults()
@@ -277,13 +278,13 @@ class Machine:
         """Present block of a group.
 
         Args:
-            group: Number of the group, from 0.
+            group: Index of the group, from 0.
 
         Returns:
-            The block; None where a fault keeps the block before.
+            The block; None if a fault keeps the previous block.
 
         Raises:
-            InvalidValueError: If there is no such group.
+            InvalidValueError: If the group does not exist.
         """
         group = self._group(group)
         how = self._spoiled.get(group, "")
@@ -300,10 +301,10 @@ class Machine:
         """Inject a fault.
 
         Args:
-            what: Text that `fault` reads, or its result. A fault whose time has passed begins at once.
+            what: Text for `fault`, or its result. A fault whose time has passed begins immediately.
 
         Raises:
-            InvalidValueError: If there is no such fault, or the machine has no such part.
+            InvalidValueError: If the fault does not exist, or the machine has no such part.
         """
         found = what if isinstance(what, Injected) else fault(what)
         kind = KINDS[choice(found.kind, "fault: kind", KINDS)]

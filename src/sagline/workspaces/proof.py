@@ -1,4 +1,4 @@
-"""Proofs for boxes of poses: that a robot can work at every pose of a box, or at none, its cables' sag included."""
+"""Proofs for boxes of poses with sagging cables: the robot can work at every pose of a box, or at none."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ class ProofVerdict(Status):
     PROVED_OUTSIDE = OUTSIDE, "at no position is every load balanced by tensions within the limits"
 
 
-BLOCK: Final = 1 << 11  # boxes at once: some hundredths of a second, after which an interrupt is heard
-MOST_CELLS: Final = 4_000_000  # that wait at once: 100 MB
-OBLONG: Final = 0.6  # of the longest edge: an edge that long is halved with it
-PARTS: Final = (1, 4, 8, 16)  # cubes of rotation vectors along an edge, one after the other: two are hardly smaller
+BLOCK: Final = 1 << 11  # boxes per block: some hundredths of a second, the delay of an interrupt
+MOST_CELLS: Final = 4_000_000  # waiting cells: 100 MB
+OBLONG: Final = 0.6  # share of the longest edge: longer edges are halved with it
+PARTS: Final = (1, 4, 8, 16)  # numbers of cubes of rotation vectors along an edge, in order: two are hardly smaller
 PRECISION: Final = (1.0, 1e-12)  # all that slopes leave out counts; a sum of a thousand parts errs by 1e-13 of them
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cells(Result):
-    """Cells into which a box of poses is divided, K of them.
+    """K cells of a divided box of poses.
 
     Attributes:
         low: Lowest position of each [m], shape (K, 3).
@@ -59,11 +59,11 @@ class Cells(Result):
 
 
 class Prover:
-    """Proofs for rows of boxes, with everything but the boxes prepared once.
+    """Proofs for rows of boxes, with all box-independent data prepared once.
 
     Attributes:
-        size: Mean length of a chord, about [m].
-        axes: Axes about which the platform may turn, shape (1 or 3, 3).
+        size: Approximate mean length of a chord [m].
+        axes: Axes about which the platform may rotate, shape (1 or 3, 3).
         deadline: Time on the monotonic clock after which no further block is proved [s].
         tried: Number of boxes that were tried.
     """
@@ -76,7 +76,7 @@ class Prover:
         precision: tuple[float, float] = PRECISION,
         progress: Progress | None = None,
     ) -> None:
-        """Prepare; the robot has no pulleys, and the precision differs from the default only in tests."""
+        """Prepare; the robot has no pulleys, and only tests use a precision other than the default."""
         limits = (LIMITS_OF[robot.tension_limits_of], np.nan)
         self._given = (
             (model.code, *model.parameters), limits, robot_terms(robot), _load_terms(wrenches, robot), precision,
@@ -90,8 +90,8 @@ class Prover:
     def verdicts(self, middle: Array, half: Array, rotations: Array | None = None, turns: Array | float = 0.0) -> Codes:
         """Verdicts (N,) of boxes of poses, block by block; OPEN after the deadline.
 
-        Boxes: middles (N, 3) and half edges (3,) [m], rotation vectors (N, 3), None for level, and largest turns away
-        from there [rad], () or (N,).
+        Boxes: centers (N, 3) and half edges (3,) [m], rotation vectors (N, 3), None for level, and largest rotations
+        relative to them [rad], () or (N,).
         """
         boxes = np.zeros((len(middle), BOX_COLUMNS))
         boxes[:, :3] = middle
@@ -120,7 +120,7 @@ class Prover:
 
 
 def _bisect(prover: Prover, box: PoseBox, smallest: float) -> Cells:
-    """Bisect a box breadth-first, down to the smallest edge [m], until all is decided or the time is over."""
+    """Bisect a box breadth-first, down to the smallest edge [m], until no cell is open or the time is over."""
     half = 0.5 * (box.high - box.low)
     waiting = (box.low + half)[None]
     done: list[tuple[Array, Array, Codes]] = []
@@ -150,7 +150,7 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
     if tilt == 0.0:
         return prover.verdicts(middle, half)
     verdict = np.full(len(middle), ProofVerdict.PROVED_INSIDE, dtype=np.int8)
-    cells, vectors = np.arange(len(middle)), np.zeros((len(middle), 3))  # a row for each cube that is open
+    cells, vectors = np.arange(len(middle)), np.zeros((len(middle), 3))  # one row per open cube
     finest, axes = float(np.linalg.norm(half)) / prover.size, prover.axes
     for place, parts in enumerate(PARTS):
         turn = tilt if parts == 1 else tilt * np.sqrt(len(axes)) / parts
@@ -173,9 +173,9 @@ def _decide(prover: Prover, middle: Array, half: Array, tilt: float) -> Codes:
 
 
 def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, more: int) -> tuple[Indices, Array]:
-    """Parts of each cube that meet the ball of tilts, with the cell that each belongs to.
+    """Parts of each cube that intersect the ball of tilts, with the cell of each part.
 
-    Half the edges of the cube around the whole ball are given, one a row.
+    Half edges of the cube around the whole ball are given, one per row.
     """
     count = more // parts
     steps = (2.0 * np.arange(count) + 1.0 - count) / more
@@ -187,7 +187,7 @@ def _smaller_cubes(cells: Indices, vectors: Array, edges: Array, parts: int, mor
 
 
 def _children(half: Array) -> tuple[Array, Array]:
-    """Middles of the parts of a box, from its own, and their half edges: all long edges are bisected."""
+    """Centers of the parts of a box, relative to its own, and their half edges: all long edges are bisected."""
     long = (half >= OBLONG * half.max()) & (half > 0.0)
     halved = np.where(long, 0.5 * half, half)
     steps = [np.array([-1.0, 1.0]) * halved[k] if long[k] else np.zeros(1) for k in range(3)]
@@ -195,7 +195,7 @@ def _children(half: Array) -> tuple[Array, Array]:
 
 
 def _load_terms(wrenches: WrenchSet, robot: Robot) -> tuple[Any, ...]:
-    """Wrench set as the kernel takes it: corners from their mean, accelerations as loads of a level platform."""
+    """Wrench set in the form of the kernel: corners relative to their mean, accelerations as loads when level."""
     center, corners, first = wrenches.center.copy(), wrenches.corners.copy(), 0
     for size in wrenches.sizes:
         mean = corners[first : first + size].mean(axis=0)
@@ -218,17 +218,17 @@ _CATENARY = Catenary()
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Proof(Result):
-    """Result of `prove`: a box of poses taken apart into cells, each proved inside, proved outside, or open.
+    """Result of `prove`: a box of poses divided into cells, each proved inside, proved outside, or open.
 
     Attributes:
         robot: The robot.
         box: The box of poses.
         wrenches: The set of loads.
-        model: The cable model that the proofs hold for.
+        model: Cable model of the proofs.
         verdict: Verdict on the whole box.
-        inside: Share of the box at whose poses every load is balanced within the limits, proved, 0 to 1.
-        outside: Share at whose poses some load is not, proved.
-        open: Share that is not decided.
+        inside: Share of the box, 0 to 1, with a proof that every load can be balanced within the limits.
+        outside: Share of the box with a proof that some load cannot be balanced.
+        open: Share without a proof.
         cells: The cells.
         tried: Number of boxes that were tried.
     """
@@ -246,7 +246,7 @@ class Proof(Result):
 
     @property
     def volume(self) -> float:
-        """Volume of positions of the whole box [m^3]; the shares are of it. Zero for a flat box."""
+        """Volume of positions of the whole box [m^3], the reference of the shares. Zero for a flat box."""
         return float(np.prod(self.box.high - self.box.low))
 
     @property
@@ -261,11 +261,11 @@ class Proof(Result):
 
     @property
     def open_volume(self) -> float:
-        """Volume that is not decided [m^3]."""
+        """Volume without a proof [m^3]."""
         return self.open * self.volume
 
     def __str__(self) -> str:
-        """The verdict, and the share and volume of each kind of cell."""
+        """Verdict, and share and volume of each kind of cell."""
         rows = (("inside", self.inside), ("outside", self.outside), ("open", self.open))
         shares = "\n".join(f"  {word:<8}{share:>8.2%}{share * self.volume:>12.5g} m3" for word, share in rows)
         return f"{self.verdict.name}: {self.verdict.text}\n{shares}\n  {counted(self.tried, 'box')} tried"
@@ -291,12 +291,12 @@ def prove(
 
     Args:
         robot: The robot, without pulleys.
-        box: Positions, and how far the platform may be tilted there.
-        wrenches: The set of loads, all of which have to be balanced; None for the weight alone.
-        budget: Time after which no further cells are looked at [s], > 0.
+        box: Positions, and the largest tilt of the platform.
+        wrenches: Set of loads, all of which must be balanced; None for the weight alone.
+        budget: Time after which no further cells are examined [s], > 0.
         model: Cable model.
-        smallest: Cells are not halved below this edge [m]; None: as long as the budget lasts.
-        progress: Called after every few thousand cells: how many are done, of how many are known of.
+        smallest: Smallest edge of a cell that is halved [m]; None for no limit except the budget.
+        progress: Called after every few thousand cells with the number of finished cells and the number of known cells.
 
     Returns:
         Proof.
@@ -341,7 +341,7 @@ def prove(
 
 
 def _check_robot(robot: Robot) -> None:
-    """Refuse robots for which there is no proof: with pulleys, or with fewer cables than degrees of freedom."""
+    """Reject robots without proofs: with pulleys, or with fewer cables than degrees of freedom."""
     check_cable_count(robot)
     if robot.winches is not None and (robot.winches.pulley_radius > 0.0).any():
         cable = int(np.argmax(robot.winches.pulley_radius > 0.0))

@@ -1,7 +1,7 @@
-"""Sets of loads that a platform has to bear, each by its support function.
+"""Sets of loads on a platform, each described by its support function.
 
-Of a set W only this enters: how far it reaches against a direction y, h_W(y) = max over w in W of -y . w. Every set
-here is a sum of four kinds, whose support functions add: segments, ellipsoids, polytopes, and inertial loads.
+The margin uses only the extent of a set W against a direction y, h_W(y) = max over w in W of -y . w. Every set here is
+a sum of four kinds, whose support functions add: segments, ellipsoids, polytopes, and inertial loads.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def _segments(segments: Array) -> str:
 
 
 def _each(values: Array, unit: str) -> str:
-    """Text of three numbers, or of one where they are equal."""
+    """Text of three numbers, or of one if they are equal."""
     if np.ptp(values) == 0.0:
         return n(values[0], unit=unit)
     return f"({', '.join(n(value) for value in values)}) {unit}"
@@ -45,14 +45,14 @@ def _each(values: Array, unit: str) -> str:
 class WrenchSet(ByFields):
     """A set of wrenches on the platform: force and moment about the center of mass in world axes, without gravity.
 
-    Made by `WrenchBox`, `WrenchEllipsoid`, `WrenchPolytope` and `Accelerations`, and by adding two sets with `+`: the
-    sums of each wrench of the one and each of the other.
+    Results of `WrenchBox`, `WrenchEllipsoid`, `WrenchPolytope` and `Accelerations`, and of the sum of two sets with
+    `+`: all sums of one wrench of each set.
 
     Attributes:
         center: A wrench [N, N m], shape (6,).
-        segments: Each adds all wrenches between minus and plus itself, shape (S, 6).
-        ellipsoids: Each A adds A s for all s no longer than 1, shape (E, 6, 6).
-        corners: Of polytopes [N, N m], those of one after those of the other, shape (C, 6).
+        segments: Segments; each adds all wrenches between minus and plus itself, shape (S, 6).
+        ellipsoids: Matrices A; each adds A s for all s with length at most 1, shape (E, 6, 6).
+        corners: Corners of the polytopes [N, N m], polytope by polytope, shape (C, 6).
         sizes: Number of corners of each polytope, shape (P,).
         accelerations: Largest acceleration of the center of mass along each world axis [m/s^2], and largest angular
             acceleration about each [rad/s^2], shape (2,): the loads of these, by the robot's mass and inertia.
@@ -79,7 +79,7 @@ class WrenchSet(ByFields):
         )
 
     def __str__(self) -> str:
-        """Description in a line, "±100 N, ±20 N m" for instance."""
+        """Description in one line, for example "±100 N, ±20 N m"."""
         parts = [_wrench(self.center)] if self.center.any() else []
         parts += [_segments(self.segments)] if self.segments.any() else []
         parts += ["an ellipsoid"] * len(self.ellipsoids)
@@ -108,7 +108,7 @@ class WrenchSet(ByFields):
 
 
 class WrenchBox(WrenchSet):
-    """All wrenches that differ from a center by no more than so much in each component.
+    """All wrenches that differ from a center by at most a given amount in each component.
 
     Examples:
         >>> import sagline as sl
@@ -127,7 +127,7 @@ class WrenchBox(WrenchSet):
             center: Force [N], then moment [N m], shape (6,); None for none.
 
         Raises:
-            InvalidValueError: If a number is not finite or negative, or a shape is another.
+            InvalidValueError: If a number is not finite or negative, or a shape is wrong.
         """
         self._fill(center=_center(center), segments=np.diag(_six(force, moment)))
 
@@ -172,7 +172,7 @@ class WrenchEllipsoid(WrenchSet):
 
 
 class WrenchPolytope(WrenchSet):
-    """All wrenches between given ones: their convex hull.
+    """Convex hull of given wrenches.
 
     Examples:
         >>> import sagline as sl
@@ -188,7 +188,7 @@ class WrenchPolytope(WrenchSet):
         """Check the corners.
 
         Args:
-            corners: Wrenches [N, N m], shape (C, 6), C >= 1; others between them do no harm.
+            corners: Wrenches [N, N m], shape (C, 6), C >= 1; wrenches between the others are allowed.
 
         Raises:
             InvalidValueError: If a number is not finite, or there is none.
@@ -201,7 +201,7 @@ class WrenchPolytope(WrenchSet):
 
 
 class Accelerations(WrenchSet):
-    """The inertial loads of a platform that accelerates, by the robot's mass, inertia and orientation.
+    """Inertial loads of an accelerating platform, from the robot's mass, inertia and orientation.
 
     The loads are those of the center of mass's acceleration and of the angular acceleration; what turning adds without
     accelerating (the gyroscopic moment) is left out.
