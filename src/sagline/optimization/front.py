@@ -33,19 +33,19 @@ class Front(Result):
     """Result of `design`: better robots, none of which is better than another in every goal.
 
     Attributes:
-        start: The robot that the search began with.
+        start: Initial robot of the search.
         robots: The better ones, K of them, best by the first goal first; the start alone where none is better. One
             only, the best by the weights, where the optimizer is not "nsga2".
         goals: The g goals.
-        values: Of the robots, each goal in its unit, shape (K, g).
-        start_values: Of the start, shape (g,).
+        values: Goals of the robots, each in its unit, shape (K, g).
+        start_values: Goals of the initial robot, shape (g,).
         parts: The d design variables.
         changed: Design variables of the robots, shape (K, d).
         better: True if a robot is better than the start.
         evaluated: Design variables of all candidates, in their order, the start first, shape (N, d).
-        evaluated_values: Their goals, shape (N, g), NaN where a candidate is no robot.
+        evaluated_values: Their goals, shape (N, g), NaN for an impossible candidate.
         optimizer: Name of the optimizer.
-        seed: Of the search.
+        seed: Seed of the search.
     """
 
     start: Robot
@@ -90,7 +90,7 @@ class Front(Result):
             The files: front.csv, and for each robot its name with .yaml.
 
         Raises:
-            FileError: If one cannot be written.
+            FileError: If a file cannot be written.
         """
         place = create_folder(file_path(folder, "folder", folder=True))
         robots = self.robots if self.better else ()
@@ -150,7 +150,7 @@ def _beaten(one: Array, others: Array) -> bool:
     return bool(((others <= one).all(axis=1) & (others < one).any(axis=1)).any())
 
 
-LONGEST: Final = 80  # letters of a robot's name that are kept before a suffix
+LONGEST: Final = 80  # kept letters of a robot's name before a suffix
 
 
 class Ledger:
@@ -167,7 +167,7 @@ class Ledger:
         evaluations: int,
         progress: Progress | None,
     ) -> None:
-        """Prepare, and refuse goals that are not finite for the first robot."""
+        """Prepare, and reject goals that are not finite for the first robot."""
         self._request, self._candidates = request, candidates
         self.record: DesignFolder | None = None
         self._evaluations, self._progress = evaluations, progress
@@ -184,7 +184,7 @@ class Ledger:
 
     @property
     def costs(self) -> int:
-        """Number of costs of a candidate: one a goal for a front, else one."""
+        """Number of costs per candidate: one per goal for a front, else one."""
         return len(self._request.goals) if self._request.optimizer == "nsga2" else 1
 
     def rate(self, points: Array) -> Array:
@@ -255,7 +255,7 @@ class Ledger:
         return known
 
     def _check_first(self) -> None:
-        """Refuse goals that are not finite for the first robot."""
+        """Reject goals that are not finite for the first robot."""
         for goal, value in zip(self._request.goals, self._first, strict=True):
             if np.isinf(value):
                 item = f"{goal.kind} of {self._request.robot.name}"

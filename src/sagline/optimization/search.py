@@ -25,17 +25,17 @@ def _optional_module(module: str) -> Any:
         raise InvalidValueError(f"the package {package}", "missing", "installed", step) from None
 
 
-Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) to costs (N, g); the least are wanted
+Rate: TypeAlias = Callable[[Array], Array]  # points of the unit cube (N, d) to costs (N, g), which are minimized
 
 
 class Task(NamedTuple):
     """Problem of an optimizer.
 
     Attributes:
-        rate: Gives the costs of points of the unit cube; a generation at once.
+        rate: Function that returns the costs of a generation of points of the unit cube.
         first: Points of the first generation, the robot itself first, shape (K, d).
         goals: Number of costs, g.
-        seed: Of the search.
+        seed: Seed of the search.
         evaluations: Number of points that may be rated, the first generation included.
     """
 
@@ -54,7 +54,7 @@ def latin_hypercube(count: int, dimensions: int, seed: int) -> Array:
 
 
 SPREAD: Final = 0.2  # first standard deviation, of the bounds' distance: they lie within some three of it
-GROWTH: Final = 2  # of the population, from each beginning to the next
+GROWTH: Final = 2  # factor of the population at each restart
 LEAST_DIMENSIONS: Final = 2  # numbers: with a single one the package fails; a second that means nothing goes along
 
 
@@ -84,7 +84,7 @@ def _strategy(cma: Any, start: Array, random: np.random.Generator, population: i
     options = {
         "bounds": [0.0, 1.0],
         "randn": lambda *shape: random.standard_normal(shape),
-        "seed": np.nan,  # none: randn has its own
+        "seed": np.nan,  # no seed: randn has its own
         "verbose": -9,
         **({} if population is None else {"popsize": population}),
     }

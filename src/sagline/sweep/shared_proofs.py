@@ -19,7 +19,7 @@ from sagline.robot.robot import Robot
 from sagline.tension.method import Options
 
 ITERATIONS: Final = 32  # loads of each pose whose proofs are tried on the others
-TRUST: Final = 1e-8  # of the forces at hand: ten times of what a verdict takes for none; rounding is far below
+TRUST: Final = 1e-8  # share of the present forces: ten times the tolerance of a verdict; rounding is far below
 PROVED: Final = 0  # column of the brackets
 
 
@@ -67,7 +67,7 @@ def _forces_at_hand(robot: Robot, loads: Array) -> Array:
 
 
 def _gaps(verdicts: tuple[Array, Array, Flags], along: Array, columns: Indices) -> Array:
-    """Infeasibility gap of each load (K, W) [N] along the proof of one load a pose; -inf without proof."""
+    """Infeasibility gap of each load (K, W) [N] along the proof of one load per pose; -inf without proof."""
     proved, direction, known = verdicts
     own = proved + np.einsum("kn,kn->k", direction, along[columns])
     gap = own[:, None] - direction @ along.T

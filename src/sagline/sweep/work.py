@@ -28,7 +28,7 @@ from sagline.workspaces.margin_rows import MarginRows
 # statuses of what is feasible, infeasible, open and lost
 INVERSE_ENDS: Final = (PoseStatus.SOLVED, PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE, PoseStatus.NOT_CONVERGED)
 MARGIN_ENDS: Final = (MarginStatus.FEASIBLE, MarginStatus.INFEASIBLE, MarginStatus.OPEN, -1)  # none is lost
-ROWS: Final = 1 << 14  # requests solved at once; their arrays fit the cache of the processor
+ROWS: Final = 1 << 14  # requests per call; their arrays fit the cache of the processor
 
 
 class Counts(NamedTuple):
@@ -128,7 +128,7 @@ class _Margins:
 
 
 def _rows(poses: Pose, part: slice) -> Array:
-    """Pose rows to the last bit: a new Pose would normalize the quaternions again."""
+    """Exact pose rows: a new Pose would normalize the quaternions again."""
     return locked(np.concatenate((poses.position[part], poses.quaternion[part]), axis=1))
 
 
@@ -146,7 +146,7 @@ SOLVERS: Final[dict[type[_Inverse | _Margins], frozenset[str]]] = {
 
 SECONDS: Final = 0.75  # of a task: what a scheduler does for it is a hundredth of that
 LONGEST: Final = 10.0  # s, of a task of a sweep that takes days
-TASKS: Final = 4000  # at most, until tasks are as long as that
+TASKS: Final = 4000  # upper limit, until tasks reach that duration
 LARGEST: Final = 1 << 26  # bytes that a task may write
 SAMPLES, SAMPLE = 16, 4096  # parts that are timed, and requests in each
 TIMED: Final = 0.5  # s: enough for a time per request
@@ -175,7 +175,7 @@ def _opened(folder: str, digest: str) -> SweepFolder:
 
 
 def found_counts(folder: SweepFolder, number: int) -> Counts | None:
-    """Counts of a task whose chunks are whole on the disk; None where one is missing or torn."""
+    """Counts of a task with complete chunks on the disk; None if one is missing or incomplete."""
     numbers = folder.read(number)
     return None if numbers is None else count_outcomes(numbers)
 
@@ -187,7 +187,7 @@ def measured_size(request: Request) -> TaskSize:
     compute_variables(request, parts[0])  # loads the machine code
     count, seconds = 0, 0.0
     for part in parts:
-        start = time.process_time()  # others may keep the processor busy
+        start = time.process_time()  # processor time, independent of other processes
         compute_variables(request, part)
         seconds += time.process_time() - start
         count += part.shape[0] * part.shape[1]

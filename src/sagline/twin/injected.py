@@ -17,11 +17,11 @@ class _FaultKind(NamedTuple):
     """One kind of fault."""
 
     item: str  # kind of part ("cell")
-    words: str  # the fault, with # in place of its value
-    sense: str  # meaning, in words
-    unit: str = ""  # of the value, in texts
+    words: str  # fault text, with # in place of its value
+    sense: str  # meaning as text
+    unit: str = ""  # unit of the value, in texts
     scale: float = 1.0  # of the value, to SI
-    for_good: bool = False  # whether it cannot end by itself
+    for_good: bool = False  # True if the fault cannot end without a reset
 
     @property
     def numbered(self) -> bool:
@@ -69,8 +69,8 @@ class Injected:
     """Fault injected into a machine.
 
     Attributes:
-        kind: One of `KINDS`, "cell sticks" for instance.
-        which: Number of the cell, cable, encoder, servo or group, from 0; 0 where there is only one.
+        kind: One of `KINDS`, for example "cell sticks".
+        which: Index of the cell, cable, encoder, servo or group, from 0; 0 for a single part.
         value: Value in SI units; 0 for a kind without one.
         time: Time of its beginning, since the start of the machine [s].
         duration: Duration [s]; infinite by default.
@@ -83,7 +83,7 @@ class Injected:
     duration: float = math.inf
 
     def __str__(self) -> str:
-        """As `fault` reads it."""
+        """Text in the form of `fault`."""
         kind = KINDS[self.kind]
         item = f"{kind.item} {self.which}" if kind.numbered else kind.item
         words = kind.words.replace("#", f"{self.value / kind.scale:.12g} {kind.unit}")
@@ -103,7 +103,7 @@ def fault(text: str) -> Injected:
         The fault.
 
     Raises:
-        InvalidValueError: If there is no such fault; the message lists the known words.
+        InvalidValueError: If the fault does not exist; the message lists the known words.
 
     Examples:
         >>> import sagline as sl
@@ -115,7 +115,7 @@ def fault(text: str) -> Injected:
         raise InvalidValueError("fault", brief(given), "a text", 'Write it as "cell 3 sticks at 40 s".')
     words = " ".join(given.lower().split())
     tail = _TAIL.search(words)
-    assert tail is not None  # it may be empty
+    assert tail is not None  # the match may be empty
     what = words[: tail.start()]
     time, duration = _seconds(text, tail["time"], 0.0), _seconds(text, tail["duration"], math.inf)
     if not duration > 0.0:
