@@ -39,7 +39,7 @@ from sagline.robot.robot import Robot
 if TYPE_CHECKING:
     from xarray import Dataset
 
-READ: Final = ("lengths", "counts")  # by Parameters.counted: what was read of the winches
+READ: Final = ("lengths", "counts")  # index: Parameters.counted; quantity read from the winches
 UNITS = ("m", "kg/m", "N", "kg", "rad", "1")
 OUTLYING = ("length", "load cell", "position", "rotation")
 P: Final = ("parameter",)
@@ -78,7 +78,7 @@ FOUND: Final = (
     Quantity("chi_squared_of_pose", N, "1", "share of each pose in chi_squared", low=0.0),
     Quantity("weight", N, "1", "less than 1 for a pose that does not fit the rest", "weights", low=0.0),
 )
-SENSORS: Final = {  # name in the file -> attribute, unit; each of one number, or one a cable or axis
+SENSORS: Final = {  # name in the file -> attribute, unit; one number each, or one per cable or axis
     "length_deviation": ("cable", "m"),
     "tension_deviation": ("cable", "N"),
     "position_deviation": ("axis", "m"),
@@ -126,7 +126,7 @@ DIRECTIONS: Final = {  # in parameter space that are unobservable or weakly obse
 
 
 def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequence[Quantity]) -> None:
-    """Refuse a data set that is no calibration, given its two robots and the quantities of its sensors."""
+    """Refuse a data set that is not a calibration; its two robots and the quantities of its sensors are given."""
     m = robot.cable_count
     if before.cable_count != m:
         raise InvalidValueError("robot_before", f"of {before.cable_count} cables", f"of {m}, as robot", STEP)
@@ -152,7 +152,7 @@ def _check_calibration(data: Dataset, robot: Robot, before: Robot, sensors: Sequ
 
 
 def load_calibration(file: os.PathLike[str] | str) -> Calibration:
-    """Read a calibration that its `save`, or `sagline calibrate`, wrote: the same calibration to the last bit.
+    """Read a calibration written by its `save` or by `sagline calibrate`; all numbers are equal to the last bit.
 
     Args:
         file: The NetCDF file.
@@ -161,8 +161,8 @@ def load_calibration(file: os.PathLike[str] | str) -> Calibration:
         The calibration.
 
     Raises:
-        FileError: If the file is missing, cut off, no NetCDF file, no calibration, of a newer format, or not as it was
-            written: its digest, shapes, units and indices are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a calibration, of a newer format, or changed
+            after it was written: its digest, shapes, units and indices are checked.
 
     Examples:
         >>> import numpy as np
@@ -201,7 +201,7 @@ def _pack(found: Calibration) -> Dataset:
 
 
 def _sensor(name: str, axes: int) -> Quantity:
-    """Deviation of a sensor: one number, or one of each cable or axis."""
+    """Standard deviation of a sensor: one number, or one per cable or axis."""
     part, unit = SENSORS[name]
     long_name = f"standard deviation of a {name.removesuffix('_deviation')} that is read"
     return Quantity(name, (part,) if axes else (), unit, long_name, low=0.0)
@@ -221,10 +221,10 @@ def _attributes(found: Calibration) -> dict[str, Any]:
 
 
 def _unpack(path: Path, data: Dataset) -> Calibration:
-    """The calibration of a data set; its path is for messages."""
+    """Calibration of a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     before = parse_robot(str(data.attrs["robot_before"]), f"{path}, robot_before")
-    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # which is always there
+    measured = ["length_deviation", *(name for name in SENSORS if name in data.variables)]  # the first is always there
     sensors = [_sensor(name, data.variables[name].ndim) for name in dict.fromkeys(measured)]
     _check_calibration(data, robot, before, sensors)
     found, numbers, placed = (fields_of(data, each) for each in (FOUND, PARAMETERS, (*PLACED, *sensors)))

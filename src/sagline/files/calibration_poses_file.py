@@ -1,4 +1,4 @@
-"""Files of poses to calibrate by: a path that rests at each, with the tensions and lengths of the rest."""
+"""Files of calibration poses: a path that rests at each pose, with the tensions and lengths at rest."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ HEAD: Final = """\
 # reads it, and `sagline track` plans it. Each pose contains the tensions to read there: frame_end_tension [N],
 # reached by unstrained_length [m], all cable off the drums{counts}.
 """
-SPEED: Final = 0.2  # m/s, at most, on the way from pose to pose
-ANGULAR_SPEED: Final = 0.1  # rad/s
-DWELL: Final = 2.0  # s, the least from pose to pose, and between two sets of tensions at one pose
-RATE: Final = 10.0  # samples of the path a second
-_PEAK: Final = 15.0 / 8.0  # of a quintic's speed, to its mean
+SPEED: Final = 0.2  # m/s, largest speed between two poses
+ANGULAR_SPEED: Final = 0.1  # rad/s, largest angular speed between two poses
+DWELL: Final = 2.0  # s, shortest time between two poses, and between two sets of tensions at one pose
+RATE: Final = 10.0  # samples of the path per second
+_PEAK: Final = 15.0 / 8.0  # ratio of the peak speed of a quintic to its mean speed
 _DECIMALS: Final = {"position": 4, "quaternion": 6, "frame_end_tension": 1, "unstrained_length": 5, "counts": 0}
-_DIGITS: Final = 4  # of an error: more is not known of one
+_DIGITS: Final = 4  # significant digits of an expected error; further digits have no meaning
 
 
 def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
@@ -56,7 +56,7 @@ def save(plan: CalibrationPoses, file: os.PathLike[str] | str) -> None:
 
 
 def _durations(poses: Pose) -> list[float]:
-    """Time of each way [s]: slow enough for any machine, and never less than a dwell."""
+    """Duration of each motion [s], at least DWELL; slow enough for any machine."""
     way = np.linalg.norm(np.diff(poses.position, axis=0), axis=1)
     turn = (poses.rotation[1:] * poses.rotation[:-1].inv()).magnitude()
     times = np.maximum(_PEAK * np.maximum(way / SPEED, turn / ANGULAR_SPEED), DWELL)
@@ -64,7 +64,7 @@ def _durations(poses: Pose) -> list[float]:
 
 
 def _about(plan: CalibrationPoses) -> dict[str, Any]:
-    """For whom, by whom and to what end they were chosen."""
+    """Entry that states the robot, the version of sagline and the purpose of the poses."""
     numbers = plan.parameters
     names = ("length_deviation", "tension_deviation", "position_deviation", "rotation_deviation")
     given = {name: getattr(plan.sensors, name) for name in names}
@@ -87,5 +87,5 @@ def _round(row: Array, decimals: int) -> list[Any]:
 
 
 def _plain(error: float) -> float | None:
-    """A number of few digits; None for what stays open."""
+    """Error rounded to few digits; None if it is not known."""
     return float(f"{error:.{_DIGITS}g}") if np.isfinite(error) else None

@@ -1,4 +1,4 @@
-"""Robots of CASPR, the cable-robot platform for MATLAB: one XML file of bodies, one of cables."""
+"""Robots of CASPR, the cable-robot platform for MATLAB: one XML file of bodies and one of cables."""
 
 from __future__ import annotations
 
@@ -50,21 +50,21 @@ _JOINTS: Final[dict[str, tuple[MotionPattern, _Vector | None]]] = {
 def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cable_set: str | None = None) -> Imported:
     """Read a robot of CASPR that has one platform.
 
-    CASPR's cables weigh nothing, and its ideal ones do not stretch: where the caller gives no `cables`, what the files
-    leave out is that of a 4 mm steel rope, and the robot says so in `assumed`. Pulleys that swivel about a vertical
-    axis are the robot's.
+    Cables in CASPR have no weight, and its ideal cables do not stretch. Without the argument `cables`, missing values
+    are those of a 4 mm steel rope and are listed in the robot's `assumed`. Pulleys that swivel about a vertical axis
+    are read.
 
     Args:
-        source: The robot's folder, or its file of bodies or of cables; the other file is looked for beside it.
-        cables: The cables' material; None takes what the file gives and assumes the rest.
+        source: The robot's folder, or its file of bodies or of cables; the other is searched for in the same folder.
+        cables: The cables' material; None takes the values of the file and assumes the missing ones.
         cable_set: Name of the set of cables; None takes the file's default.
 
     Returns:
-        Imported: the robot, and what was lost.
+        Imported: the robot, and the data that were lost.
 
     Raises:
-        FileError: If a file cannot be read, the two are not to be found, or they describe no robot with one platform
-            and straight, unrouted cables.
+        FileError: If a file cannot be read, one of the two is not found, or they do not describe a robot with one
+            platform and straight, unrouted cables.
 
     Examples:
         >>> import sagline as sl
@@ -99,7 +99,7 @@ def load_caspr(source: str | os.PathLike[str], cables: Cable | None = None, cabl
 
 
 def _files(source: Path) -> tuple[Path, Path]:
-    """The files of bodies and of cables; a file that is named wins over others of its kind in the folder."""
+    """Paths of the files of bodies and of cables; a file named by the caller has priority over others in the folder."""
     if not exists(source):
         raise FileError(source, "does not exist", "Check its name.")
     folder = source if source.is_dir() else source.parent
@@ -129,7 +129,7 @@ def _kind(root: Element) -> str | None:
 
 
 def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
-    """Fields of the robot in the file of bodies, and what is lost of it."""
+    """Fields of the robot from the file of bodies, and the data of this file that are lost."""
     links = root.findall(".//link_rigid")
     if len(links) != 1:
         raise InvalidValueError("number of <link_rigid>", len(links), "1", "sagline moves a single platform.")
@@ -148,7 +148,7 @@ def _platform(root: Element) -> tuple[dict[str, Any], list[str]]:
 
 
 def _inertia(element: Element, mass: float, center: Array) -> Array:
-    """Inertia about the center of mass; CASPR gives it about that or about the joint, the platform's origin."""
+    """Inertia about the center of mass; CASPR gives it about this point or about the joint (the platform's origin)."""
     xx, yy, zz, xy, xz, yz = (
         number_of_text(element.findtext(key), key, "kg m^2") for key in ("Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
     )
@@ -192,7 +192,7 @@ def _select_set(root: Element, wanted: str | None, lost: list[str]) -> Element:
 
 
 def _columns(chosen: Element, center: Array, lost: list[str]) -> dict[str, Any]:
-    """Numbers of the cables of a set, by name."""
+    """Values of the cables of a set, by name."""
     rows = []
     for k, element in enumerate(chosen):
         item = f"{element.tag} {element.get('name') or k}"
@@ -206,7 +206,7 @@ def _columns(chosen: Element, center: Array, lost: list[str]) -> dict[str, Any]:
 
 
 def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[Any, ...]:
-    """Numbers of a cable in the order of `_COLUMNS`; the axial stiffness is None where the file gives none."""
+    """Values of a cable in the order of `_COLUMNS`; the axial stiffness is None if the file does not give it."""
     ends = list(only_child(element, "attachments", item))
     if len(ends) != 2:
         raise InvalidValueError(f"{item}: number of attachments", len(ends), "2", "sagline's cables are not routed.")
@@ -226,14 +226,14 @@ def _row(element: Element, item: str, center: Array, lost: list[str]) -> tuple[A
         number_of_text(element.findtext(f"properties/{key}"), f"{item}: {key}", "N")
         for key in ("force_min", "force_max")
     )
-    # CASPR divides K by the cable's length: it is an axial stiffness in N
+    # CASPR divides K by the cable's length, so K is an axial stiffness in N
     stiffness = element.findtext("properties/K") if element.tag == "cable_linear_spring" else None
     known = None if stiffness is None else number_of_text(stiffness, f"{item}: K", "N")
     return points["0"], points["1"], low, high, known, *pulley
 
 
 def _pulley(end: Element, link: str, item: str, lost: list[str]) -> tuple[float, _Vector]:
-    """Radius and swivel axis at an end of a cable: the direction in which the cable enters the pulley, as in CASPR."""
+    """Pulley radius and swivel axis at a cable end; the axis is the direction in which the cable enters the pulley."""
     if end.tag != "attachment_base_pulley" or link != "0":
         unlike = f"of a kind unknown here, <{end.tag}>"
     elif end.find("pulley_radius") is None or end.find("cable_entry_vector") is None:

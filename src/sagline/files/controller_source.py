@@ -31,7 +31,7 @@ from sagline.robot.robot import Robot
 from sagline.twin.plc_program import FOLLOWING, TINY
 from sagline.twin.start import plc_limits
 
-REDUNDANT: Final = 2  # cables more than freedoms: of the tension distribution in sagline.c
+REDUNDANT: Final = 2  # number of cables minus degrees of freedom that sagline.c supports
 _PRECISIONS = {
     np.float64: "typedef double sagline_real;",
     np.float32: "#define SAGLINE_FLOAT /* single precision */\ntypedef float sagline_real;",
@@ -51,13 +51,13 @@ STOP: Final = """\
 
 
 def export_scl(robot: Robot, file: str | os.PathLike[str]) -> Path:
-    """Write what the PLCs of a robot need, as an SCL source for TIA Portal: data blocks, limits, and their program.
+    """Write the SCL source for the PLCs of a robot (TIA Portal): data blocks, limits and program.
 
-    The program grants and takes back control, takes commands, keeps to the limits, and slows the winches down by itself
-    when commands stay away; its head says what is to be set in the CPU. No compiler has seen it yet.
+    The program grants and withdraws control, accepts commands, enforces the limits, and slows the winches down by
+    itself when no commands arrive. Its header lists the settings of the CPU. It has not been compiled yet.
 
     Args:
-        robot: The robot as it is planned for; its winches need drum_radius and counts_per_turn.
+        robot: The robot used for planning; its winches need drum_radius and counts_per_turn.
         file: Path of the output, plc.scl for instance. A file that exists is replaced.
 
     Returns:
@@ -118,7 +118,7 @@ def _words(robot: Robot) -> dict[str, str]:
 
 
 def _block(block: Block) -> str:
-    """A data block, its rows in their order, as TIA Portal lays them out without optimized access."""
+    """Text of a data block; its rows keep their order, as in TIA Portal without optimized access."""
     start = [f"   magic := 16#{block.magic:08X};"]
     if any(field.name == "version" for field in block.fields):
         start.append(f"   version := {LAYOUT};")
@@ -142,30 +142,30 @@ def _row(name: str, values: list[float]) -> str:
 
 
 def _scl_number(value: float) -> str:
-    """A number as SCL writes it; no infinite ones are known there."""
+    """A number in SCL syntax; SCL has no infinite numbers."""
     text = repr(min(value, 1e300)).upper()
     return text if "." in text else text.replace("E", ".0E")
 
 
 def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bool = False) -> tuple[Path, Path, Path]:
-    """Write C99 that finds a robot's tensions and lengths on a microcontroller, and what a PLC can take of it.
+    """Write C99 that computes a robot's tensions and lengths on a microcontroller, and SCL of one function for a PLC.
 
-    Three files of one name: NAME.c is the same for every robot: one cable in both directions (P2 and P3 of "The
-    model"), the structure matrix and the inverse kinematics of a pose, with the tension distribution of `Closest` or
-    `MinimumNorm`; no heap, no recursion, bounded loops, a status for each answer. NAME.h holds the robot's constants.
-    NAME.scl is P3 in SCL for a Siemens PLC; no compiler has seen that one.
+    NAME.c is the same for every robot: the forward and inverse problem of one cable (P2 and P3 of "The model"), the
+    structure matrix and the inverse kinematics of a pose, with the tension distribution of `Closest` or
+    `MinimumNorm`. It has no heap and no recursion, its loops are bounded, and each function returns a status. NAME.h
+    holds the robot's constants. NAME.scl is P3 in SCL for a Siemens PLC; it has not been compiled yet.
 
     Args:
-        robot: The robot, with two more cables than degrees of freedom, nothing behind its frame anchors, and limits of
-            its chord tensions.
-        file: Path of the source, sagline.c; the others are beside it. Files that exist are replaced.
-        single_precision: Whether numbers are `float`, for controllers that compute no others in hardware.
+        robot: The robot, with two more cables than degrees of freedom, no pulleys or drums behind its frame anchors,
+            and limits of its chord tensions.
+        file: Path of the source, sagline.c; the other files are in the same folder. Existing files are replaced.
+        single_precision: If true, numbers are `float`, for controllers whose hardware has single precision only.
 
     Returns:
         Paths of the source, the header and the SCL text.
 
     Raises:
-        InvalidValueError: If the source does not cover the robot, or a number of it is beyond single precision.
+        InvalidValueError: If the source does not cover the robot, or a number exceeds single precision.
         FileError: If the name does not end in .c, or a file cannot be written.
 
     Examples:
@@ -191,7 +191,7 @@ def export_c(robot: Robot, file: str | os.PathLike[str], *, single_precision: bo
 
 
 def _check_exportable(robot: Robot) -> None:
-    """Refuse a robot without two redundant cables, with anything behind its frame anchors, or with other limits."""
+    """Refuse a robot without two redundant cables, with parts behind its frame anchors, or with unsupported limits."""
     n, m = robot.degrees_of_freedom, robot.cable_count
     if m != n + REDUNDANT:
         step = "Plan with sagline on a PC, and send the controller lengths."
@@ -234,7 +234,7 @@ def _header_text(robot: Robot, real: type[np.floating]) -> str:
 
 
 def _c_constant(values: Array, name: str, real: type[np.floating]) -> str:
-    """A constant of C, or braces of them; each reads back as the same number."""
+    """A constant in C, or a list in braces; each is read back as the same number."""
     if values.ndim:
         lines = [_c_constant(value, name, real) for value in values]
         separator = ", \\\n    " if values.ndim > 1 else ", "
@@ -252,20 +252,20 @@ def _c_constant(values: Array, name: str, real: type[np.floating]) -> str:
 
 
 def _first(values: Array) -> str:
-    """The first value that is not zero, and of which cable; empty if all are."""
+    """Text of the first nonzero value and its cable; empty if all values are zero."""
     where = np.flatnonzero(values)
     return f"{values[where[0]]:g} m at cable {where[0]}" if where.size else ""
 
 
 def _without(robot: Robot, field: str, found: str, allowed: str) -> None:
-    """Refuse what is behind the frame anchors."""
+    """Refuse a robot with parts behind the frame anchors."""
     if found:
         step = "The exported source knows none: plan with sagline on a PC, and send the controller lengths."
         raise InvalidValueError(f"{robot.name}: {field}", found, allowed, step)
 
 
 def _checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: str) -> Path:
-    """Path of a source file; FileError if its ending is another."""
+    """Path of a source file; FileError if its suffix is wrong."""
     path = file_path(file)
     if path.suffix != ending:
         raise FileError(path, f"is no name for {what}", f"Let it end in {ending}: {path.stem or usual}{ending}.")
@@ -273,7 +273,7 @@ def _checked_name(file: str | os.PathLike[str], ending: str, what: str, usual: s
 
 
 def _filled(source: str, words: dict[str, str]) -> str:
-    """Text of a file of this package, each @word@ replaced, in their order."""
+    """Text of a file of this package, with each @word@ replaced in the given order."""
     text = files("sagline.files").joinpath(source).read_text(encoding="utf-8")
     for word, value in words.items():
         text = text.replace(f"@{word}@", value)
@@ -281,6 +281,6 @@ def _filled(source: str, words: dict[str, str]) -> str:
 
 
 def _origin(robot: Robot) -> dict[str, str]:
-    """Words for the robot's name, in ASCII that no comment ends at, and for the version of sagline."""
+    """Words for the robot's name and the version of sagline; the name is ASCII and cannot end a comment."""
     name = "".join(x if x.isascii() and (x.isalnum() or x in " -_.,()") else "_" for x in robot.name)
     return {"name": name, "version": version("sagline")}

@@ -1,4 +1,4 @@
-"""Executions read back from a log in MCAP, and as data sets in NetCDF with the plan inside."""
+"""Executions read from logs in MCAP, and written to MCAP or to NetCDF with the plan inside."""
 
 from __future__ import annotations
 
@@ -36,24 +36,24 @@ PLAN_GROUP: Final = "plan"
 
 
 def load_execution(file: os.PathLike[str] | str, plan: int | None = None) -> Execution:
-    """Read a log in MCAP, of an execution or of a whole session, also of a process that was killed.
+    """Read an execution from a log in MCAP; the log may contain a whole session, or end early (killed process).
 
-    What an execution's `save` wrote is read back to the last bit.
+    Numbers written by `save` of an execution are read back to the last bit.
 
     Args:
         file: The log.
-        plan: Number of the plan, from 0; -1 is the last. None: all cycles, with the plan if the log has one alone.
+        plan: Index of the plan, from 0; -1 is the last. None: all cycles, with the plan if the log has only one.
 
     Returns:
-        The execution; one whose end is not in the log is UNKNOWN.
+        The execution; its status is UNKNOWN if its end is not in the log.
 
     Raises:
-        FileError: If the file is missing, no log, of a newer format, damaged, cut off before its first cycle was kept,
-            or a package is missing.
-        InvalidValueError: If it has no such plan.
+        FileError: If the file is missing, not a log, of a newer format, damaged or cut off before its first cycle, or
+            if a package is missing.
+        InvalidValueError: If the log does not have this plan.
 
     Warns:
-        SaglineWarning: If the log was cut off: what was recorded in its last second is not there.
+        SaglineWarning: If the log was cut off; its last second of recording is missing.
 
     Examples:
         >>> import sagline as sl
@@ -160,7 +160,7 @@ def to_dataset(execution: Execution) -> Dataset:
 
 
 def save(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a log or to NetCDF, as its name says."""
+    """Write an execution to a log or to NetCDF, depending on the suffix of the file."""
     path = file_path(file)
     ways = {".mcap": save_execution, ".nc": save_dataset}
     if path.suffix.lower() not in ways:
@@ -169,7 +169,7 @@ def save(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def save_execution(execution: Execution, file: os.PathLike[str] | str) -> None:
-    """Write an execution to a log in MCAP atomically, with plan and robot inside and every number as it is."""
+    """Write an execution to a log in MCAP atomically, with plan and robot inside and all numbers unrounded."""
     done, target = instance(execution, Execution, "execution"), file_path(file)
     check_packages()
     with atomic_file(target) as partial_file, FileIO(partial_file, "wb") as stream:
@@ -194,7 +194,7 @@ def save_dataset(execution: Execution, file: os.PathLike[str] | str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """A number or a text as it is; a state by its name."""
+    """A number or a text unchanged; the name of a state."""
     return value.name if isinstance(value, State) else str(value) if isinstance(value, str) else value
 
 

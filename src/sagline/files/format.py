@@ -62,7 +62,7 @@ MODULES: Final = {
 
 
 def module_of(result: object) -> Any:
-    """The module of files that writes a result, or what it derives from; KeyError if there is none."""
+    """The module that writes results of this type or of one of its base classes; KeyError if there is none."""
     names = [kind.__name__ for kind in type(result).__mro__]
     return import_module(f"sagline.files.{MODULES[next((name for name in names if name in MODULES), names[0])]}")
 

@@ -1,4 +1,4 @@
-"""Logs of winches in CSV: one row a pose, with the deviations of the sensors in comments above."""
+"""Logs of winches in CSV: one row per pose; comments above the columns give the deviations of the sensors."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ DEVIATIONS: Final = {
 }
 _KEYS: Final = (*DEVIATIONS, "frame", "target")
 _COMMENT = re.compile(r"\s*#\s*([A-Za-z_ ]+?)\s*:(.*)")
-_NEAR: Final = 0.7  # how like one of the keys a word is that was meant to be one: "name" is not like "frame"
+_NEAR: Final = 0.7  # similarity above which a word is taken as a misspelt key: "name" is less similar to "frame"
 XYZ: Final = ("x", "y", "z")
 COMMANDED: Final = "_commanded"
-_MOST: Final = 1000  # cables
-_OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # and their units
+_MOST: Final = 1000  # largest number of cables
+_OF_CABLE: Final = {"count": "", "length": "m", "load_cell": "N"}  # column of each cable and its unit
 _NUMBERED = re.compile(rf"\s*(count|length)_([0-9]{{1,{len(str(_MOST))}}})\s*(?:\[.*\])?\s*")
 USUAL: Final = {"tension": "5 N", "position": "1 mm", "rotation": "1 mrad"}  # standard deviations of the sensors
 
@@ -53,7 +53,7 @@ class _Sensors(YamlEntry):
 
 
 def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
-    """The sensors in the comments above the columns of a log."""
+    """Sensors read from the comments above the columns of a log, and the rest of the text."""
     lines = text.split("\n")
     count = next((k for k, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")), len(lines))
     said = [_key_line(line.rstrip("\r")) for line in lines[:count]]
@@ -68,7 +68,7 @@ def sensors_of_comments(text: str, path: Path) -> tuple[Sensors, str]:
 
 
 def _key_line(line: str) -> str:
-    """A comment that says something of the sensors, or is meant to, as YAML; nothing of any other."""
+    """A comment with a sensor key, or a similar word, as a line of YAML; an empty line for any other comment."""
     found = _COMMENT.fullmatch(line)
     if found is None:
         return ""
@@ -91,7 +91,7 @@ def _sensors(entry: _Sensors) -> Sensors:
 
 
 def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
-    """Comments from which `sensors_of_comments` has the same sensors."""
+    """Comments that `sensors_of_comments` reads as the same sensors."""
     for name, unit in DEVIATIONS.items():
         value: Array | None = getattr(sensors, name)
         if value is not None:
@@ -106,7 +106,7 @@ def _comments_of_sensors(sensors: Sensors) -> Iterator[str]:
 
 
 def _read(path: Path, text: str) -> tuple[CsvTable, int]:
-    """The table, and of how many cables it is."""
+    """The table, and its number of cables."""
     header = next((line for line in text.split("\n") if line.strip()), "")
     found = [_NUMBERED.fullmatch(cell) for cell in header.replace('"', "").split(",")]
     cables = max((min(int(match[2]), _MOST - 1) + 1 for match in found if match), default=1)
@@ -164,7 +164,7 @@ def _stack_columns(table: CsvTable, names: Iterable[str], *, all_of_them: bool =
 
 
 def _rotation(table: CsvTable, suffix: str) -> Array | None:
-    """Rotations as unit quaternions, rows of NaN where there is none."""
+    """Rotations as unit quaternions; rows of NaN where no rotation is given."""
     angles = _stack_columns(table, [name + suffix for name in EULER])
     quaternion = _stack_columns(table, [name + suffix for name in QUATERNION])
     if angles is not None and quaternion is not None:
@@ -202,7 +202,7 @@ def _commanded(table: CsvTable) -> Pose | None:
 
 
 def _log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
-    """Name with unit, and numbers of shape (N,), of each column of a log."""
+    """Name with unit and values, shape (N,), of each column of a log."""
     m = log.readings.shape[1]
     if log.time is not None:
         yield "time [s]", log.time
@@ -222,9 +222,9 @@ def _log_columns(log: WinchLog) -> Iterator[tuple[str, Array]]:
 
 
 def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> WinchLog:
-    """Read what a robot's encoders, load cells and perhaps a measuring system read at poses where it stood.
+    """Read values of a robot's encoders, load cells and (optional) measuring system, recorded at poses at rest.
 
-    A CSV file with one row a pose, below the names of its columns, in any order:
+    The CSV file has a header with the names of the columns, in any order, and one row per pose:
 
         # length_deviation: 0.5 mm
         # tension_deviation: 5 N
@@ -233,32 +233,32 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
         0,320530,312004,299911,0.41,0.52,0.39,1012.5,998.1,2003.0
         30,318112,311870,301442,0.44,0.50,0.41,,,
 
-    - `count_0`, `count_1`, ...: of the encoders; or `length_0`, ...: off the drums, as the machine believes them.
-    - `load_cell_0`, ...: at the frame ends; cables without a cell have no column.
-    - `x`, `y`, `z`: of the target in the measuring system's axes, or some of the three.
-    - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): of the platform in
-      these axes.
-    - `x_commanded`, `y_commanded`, `z_commanded`, and perhaps `qx_commanded`, ... or `alpha_commanded`, ...: the pose
-      that was commanded, level where only its position is given.
-    - `time`.
+    - `count_0`, `count_1`, ...: encoder counts; or `length_0`, ...: cable lengths off the drums from the controller.
+    - `load_cell_0`, ...: tensions at the frame ends; cables without a load cell have no column.
+    - `x`, `y`, `z`, or some of the three: position of the target in the axes of the measuring system.
+    - `qx`, `qy`, `qz`, `qw`, or `alpha`, `beta`, `gamma` (about z, then the new y, then the new x): rotation of the
+      platform in these axes.
+    - `x_commanded`, `y_commanded`, `z_commanded`, and optionally `qx_commanded`, ... or `alpha_commanded`, ...: the
+      commanded pose; without a rotation the platform is level.
+    - `time`: time of the row.
 
-    Units are in brackets; without, they are s, m, N and rad. Cells are blank without a reading, except for times
-    and commanded poses. Comments above the names of the columns say how far sensors are to be trusted, one number or
-    one for each cable or axis, and where the measuring system stands: `# frame: {position: [1, 0, 0.5], euler: {alpha:
-    90 deg}}` and `# target: [0, 0, 0.1]`, as of `Sensors`. Quaternions have length 1 to the 1e-3 of few printed
-    decimals, and are normalized.
+    Units are in brackets; the defaults are s, m, N and rad. A cell is blank if the value was not measured; times and
+    commanded poses must not be blank. Comments above the header give the standard deviations of the sensors (one
+    number, or one per cable or axis) and the pose of the measuring system: `# frame: {position: [1, 0, 0.5], euler:
+    {alpha: 90 deg}}` and `# target: [0, 0, 0.1]`, with the meaning of the fields of `Sensors`. Quaternions have length
+    1 within 1e-3 (rounding of printed decimals), and are normalized.
 
     Args:
         file: The file.
-        sensors: In place of what the file says of them.
+        sensors: Sensors that replace those in the file.
 
     Returns:
         The log; its source is the name of the file.
 
     Raises:
-        FileError: If it cannot be read, a column, comment or number is wrong, or nothing says how far a sensor is to be
-            trusted; the message names the line or the key.
-        InvalidValueError: If sensors are none, or of another number of cables.
+        FileError: If it cannot be read, a column, comment or number is wrong, or the deviation of a sensor is missing;
+            the message names the line or the key.
+        InvalidValueError: If `sensors` is not a `Sensors` object, or has another number of cables.
 
     Examples:
         >>> import sagline as sl
@@ -288,7 +288,7 @@ def load_log(file: os.PathLike[str] | str, sensors: Sensors | None = None) -> Wi
 
 
 def save(log: WinchLog, file: os.PathLike[str] | str) -> None:
-    """Write a log to a CSV file atomically; `load_log` reads the same numbers, to the last bit."""
+    """Write a log to a CSV file atomically; `load_log` reads equal numbers, to the last bit."""
     write_text(file_path(file), dump_log(log))
 
 

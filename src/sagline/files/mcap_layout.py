@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 ROWS: Final = "time"
 GROUP, CABLE, AXIS, TURN = ("group",), ("cable",), ("axis",), ("quaternion_part",)
 WORLD, PLATFORM = "world", "platform"
-FINE, COARSE = 2.0**20, 2.0**10  # 1/m: what is drawn is rounded to such steps, of whose bytes most are zero
-POINTS: Final = 7  # of a cable
+FINE, COARSE = 2.0**20, 2.0**10  # 1/m: drawn coordinates are rounded to these steps; most of their bytes are then zero
+POINTS: Final = 7  # points per cable
 _THICKNESS: Final = 3.0  # px
 _STEEL, _BLUE, _CABLE = (0.47, 0.5, 0.54), (0.23, 0.53, 0.79), (0.55, 0.36, 0.17)  # red, green, blue, 0 to 1
 
@@ -74,16 +74,16 @@ CYCLES: Final = (
     _integer("winch_fault", CABLE, "the drive's own code; 0: none", "samples.winch_fault"),
 )
 EVERY: Final = (TIME, *CYCLES)
-SMALL: Final = frozenset({"estimate", "mode"})  # whole numbers that are kept in a byte
-# Digits behind the point that a log keeps of what is recorded while the machine runs. They are finer than what
-# measures: an encoder's step is 72 nm and its whole counts are kept, a load cell's noise is 1 N. With all digits of
-# that noise fourteen minutes would be twice as large.
+SMALL: Final = frozenset({"estimate", "mode"})  # integers that are stored in one byte
+# Decimals that a log keeps of quantities recorded while the machine runs. They are finer than the sensors: an encoder
+# step is 72 nm and its integer counts are kept; the noise of a load cell is 1 N. With all digits of that noise, a log
+# of 14 minutes would be twice as large.
 DECIMALS: Final = {
     "time": 6, "late": 6, "clock": 6, "age": 5, "plc_time": 5, "position": 7, "quaternion": 8, "length": 7,
     "set_length": 8, "correction": 8, "rate": 5, "set_rate": 7, "torque": 3, "tension": 2, "filtered": 2,
     "set_tension": 3, "planned_tension": 3,
 }  # fmt: skip
-EVENTS: Final = {  # of what happened
+EVENTS: Final = {  # variables of events
     "time": "when it happened, on the clock of the link [s]",
     "cycle": "in which cycle of the controller, from 0",
     "kind": "state, fault or note",
@@ -98,7 +98,7 @@ def columns_of(execution: Execution) -> dict[str, NDArray[Any]]:
     return {quantity.name: quantity.of(execution) for quantity in EVERY}
 
 
-NANO: Final = 1e9  # of the log's own clock in a second
+NANO: Final = 1e9  # ticks of the log's clock per second [1/s]
 FORMAT: Final = 1  # raised whenever an older sagline could misread a log
 SOURCE: Final = f"sagline {version('sagline')}"
 CYCLE, RECORD, EVENT, TF, SCENE, TRUTH = "/cycle", "/record", "/event", "/tf", "/scene", "/truth"
@@ -107,17 +107,17 @@ PLAN: Final = "plan-{}.sagline"  # attachment: a packed data set
 END: Final = "plan-{}-end.json"  # attachment: status and reason
 PACKED: Final = "application/x-sagline-columns"
 JSON: Final = "application/json"
-SHARE_TF, SHARE_SCENE = 10, 100  # one of so many cycles
-PER_METER: Final = 1e3  # mm
+SHARE_TF, SHARE_SCENE = 10, 100  # one message per so many cycles
+PER_METER: Final = 1e3  # mm per m
 
 
 class _CycleField(NamedTuple):
-    """A quantity of `/cycle`, of which people need not all digits: `/record` has them."""
+    """A quantity of `/cycle`, rounded for human readers; `/record` has all digits."""
 
-    digits: int  # behind the point
+    digits: int  # number of decimals
     unit: str
     what: str
-    several: bool = False  # whether it is a list
+    several: bool = False  # true if it is a list
 
 
 CYCLE_FIELDS: Final = {
@@ -165,7 +165,7 @@ SCHEMAS: Final = {
 
 
 def head_of(robot: str, period: float) -> bytes:
-    """Attachment that states robot (as text of its file) and cycle period [s] of a log."""
+    """Attachment with the robot (text of its file) and the cycle period [s] of a log."""
     return json.dumps({"sagline_log_format": FORMAT, "source": SOURCE, "period": period, "robot": robot}).encode()
 
 
@@ -187,7 +187,7 @@ def event_message(event: Event) -> bytes:
 
 
 def event_of(text: bytes) -> Event:
-    """Event of a message; ValueError if it is none."""
+    """Event of a message; ValueError if the message is not an event."""
     try:
         said = json.loads(text)
         kind, state = EventKind(said["kind"]), State[said["state"]]
@@ -202,7 +202,7 @@ def truth_text(time: float, position: Any, quaternion: Any) -> bytes:
 
 
 def _json_values(values: NDArray[Any]) -> list[Any]:
-    """Values in JSON: None for numbers that are not finite, and for rows without finite ones."""
+    """Values in JSON: None for numbers that are not finite, and for rows without finite numbers."""
     known = np.isfinite(values)
     if known.all():
         return list(values.tolist())
@@ -227,7 +227,7 @@ def transform(stamp: int, position: Array, quaternion: Array) -> FrameTransform:
 
 
 class Scene:
-    """A robot as lines; what does not change is made once."""
+    """Scene of a robot as lines; the constant parts are created once."""
 
     def __init__(self, robot: Robot) -> None:
         """Draw frame and platform."""
@@ -236,7 +236,7 @@ class Scene:
         self._body = _corners(robot.platform_anchors)
 
     def at(self, stamp: int, position: Array, quaternion: Array, tension: Array) -> SceneUpdate:
-        """Whole scene at a time [ns]: position [m], quaternion scalar last, tensions at the frame ends [N]."""
+        """Whole scene at a time [ns]; position [m], quaternion (scalar last), tensions at the frame ends [N]."""
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
         scene = SceneUpdate()
@@ -274,7 +274,7 @@ def _lines(entity: SceneEntity, stamp: int, name: str, frame: str, color: tuple[
 
 
 def _corners(points: Array) -> Array:
-    """Lines from every point to every other that no third is nearer to than both are to one another (e, 2, 3)."""
+    """Lines between pairs of points, unless a third point is closer to both than they are to each other, (e, 2, 3)."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     near = [
         (i, j)

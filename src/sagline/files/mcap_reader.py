@@ -28,10 +28,10 @@ from sagline.robot.robot import Robot
 
 MAGIC: Final = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 AGAIN: Final = "Take the file from where it came."
-_HEAD: Final = 9  # bytes of a record before its content: what it is, and how long
+_HEAD: Final = 9  # bytes of a record before its content: type and length
 _CHUNK, _ATTACHMENT, _DATA_END = 0x06, 0x09, 0x0F
-_NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # of every chunk
-_LARGEST: Final = 1 << 27  # bytes of a chunk: a second of ours has a thousandth of that
+_NEEDED: Final = {quantity.name for quantity in EVERY} | {"plan", "zero", "epoch"}  # columns required in every chunk
+_LARGEST: Final = 1 << 27  # bytes of a chunk; one second of a sagline log has about a thousandth of it
 _PLAN_NAME, _END_NAME = (re.compile(name.replace(".", r"\.").format(r"(\d+|none)")) for name in (PLAN, END))
 
 
@@ -45,8 +45,8 @@ class Ending(NamedTuple):
 class Truth(NamedTuple):
     """True pose of the platform at one time."""
 
-    stamp: int  # when, on the log's own clock [ns]
-    time: float  # on the twin's [s]
+    stamp: int  # time on the log's clock [ns]
+    time: float  # time on the twin's clock [s]
     position: list[float]  # [m], 3
     quaternion: list[float]  # scalar last, 4
 
@@ -57,14 +57,14 @@ class RecordedLog:
 
     path: Path  # the file
     robot: Robot | None = None  # the robot; None until it has been read
-    period: float = 0.0  # of a cycle [s]
+    period: float = 0.0  # period of a cycle [s]
     plans: list[bytes] = field(default_factory=list)  # the plans, packed
-    endings: dict[int, Ending] = field(default_factory=dict)  # how they ended, by their numbers; -1 for what had none
+    endings: dict[int, Ending] = field(default_factory=dict)  # end of each plan, by its index; -1: no plan
     blocks: list[dict[str, NDArray[Any]]] = field(default_factory=list)  # columns of cycles, chunk by chunk
-    events: list[Event] = field(default_factory=list)  # what happened
-    truth: list[Truth] = field(default_factory=list)  # where the platform really was, in the log of a twin
-    epoch: int = 0  # of the log's own clock [ns]
-    complete: bool = False  # whether the log has its end
+    events: list[Event] = field(default_factory=list)  # events in order
+    truth: list[Truth] = field(default_factory=list)  # true poses of the platform, in the log of a twin
+    epoch: int = 0  # zero of the log's clock [ns]
+    complete: bool = False  # true if the end of the log has been read
 
 
 class LogReader:
@@ -75,7 +75,7 @@ class LogReader:
     """
 
     def __init__(self, file: os.PathLike[str] | str) -> None:
-        """Name the file; `more` reads it."""
+        """Store the path of the file; `more` reads it."""
         self.log = RecordedLog(file_path(file))
         check_packages()
         self._offset = self._digest = 0
@@ -91,7 +91,7 @@ class LogReader:
                 self._take(code, record)
         except (FileError, MemoryError):
             raise
-        except Exception as error:  # the libraries have no error of their own for a damaged file: any will do
+        except Exception as error:  # the libraries have no error class for a damaged file, so any error is caught
             raise self._damaged() from error
         torn = self._offset - before < len(data) and not self.log.complete
         if torn and data.endswith(MAGIC) and len(data) > len(MAGIC):
@@ -119,13 +119,13 @@ class LogReader:
     def _check_kind(self, data: bytes) -> None:
         if data[: len(MAGIC)] == MAGIC:
             return
-        if MAGIC.startswith(data):  # nothing, or the first few bytes
+        if MAGIC.startswith(data):  # the file is empty, or has only the first few bytes
             raise FileError(self.log.path, "is empty", "Nothing was recorded in it, or it was cut off at once.")
         step = "Give the .mcap file that was recorded, or that an execution's save wrote."
         raise FileError(self.log.path, "is not a log in MCAP", step)
 
     def _records(self, data: bytes) -> Iterator[tuple[int, bytes]]:
-        """Complete records; the rest is read by the next call."""
+        """Complete records; an incomplete record is read by the next call."""
         place = 0 if self._offset else len(MAGIC)
         start = self._offset
         if not start:
@@ -150,7 +150,7 @@ class LogReader:
 
     def _take(self, code: int, record: bytes) -> None:
         if code not in (_CHUNK, _ATTACHMENT) or (code == _CHUNK and self.log.robot is None):
-            return  # a log of ours begins with its robot
+            return  # a sagline log begins with its robot
         from mcap.records import Attachment, Channel, Chunk, Message
         from mcap.stream_reader import StreamReader, breakup_chunk
 
@@ -229,7 +229,7 @@ def read_log(file: os.PathLike[str] | str) -> RecordedLog:
 
 
 def has_begun(file: os.PathLike[str] | str) -> bool:
-    """True if a log that another process writes can be read yet: False while it is missing or its first bytes are."""
+    """True if a log written by another process can be read; False while the file or its first bytes are missing."""
     try:
         path = file_path(file)
         check_regular(path, path.stat().st_mode)

@@ -1,8 +1,8 @@
-"""Logs in MCAP as they are written, by chunk: complete chunks survive the end of the process.
+"""Writing of logs in MCAP, chunk by chunk: complete chunks remain readable if the process is killed.
 
-All numbers are in `/record`, one message a chunk with the numbers of its cycles packed; attachments hold the robot
-and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and `/scene` as Foxglove
-draws them.
+All numbers are in `/record`, one message per chunk with the packed values of its cycles. Attachments hold the robot
+and the plans. The other topics are for other programs: `/cycle` and `/event` in JSON, `/tf` and `/scene` in the
+schemas of Foxglove.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ from sagline.robot.robot import Robot
 
 PACKAGES: Final = ("mcap", "mcap_protobuf", "foxglove_schemas_protobuf", "zstandard")
 _UNLIMITED: Final = 1 << 40  # bytes: no chunk ends by its size
-CHUNK: Final = 0.9  # s from chunk to chunk: with what it takes to write one, no more than a second is ever lost
-BLOCK: Final = 100  # cycles of a chunk at the most: on a lockstep clock they come faster
-ROOM: Final = 4096  # of what waits to be written: 41 s of cycles
-PATIENCE: Final = 0.1  # s, between two looks whether the writer still lives
+CHUNK: Final = 0.9  # s between chunks; with the time to write one, less than one second is lost
+BLOCK: Final = 100  # largest number of cycles per chunk: on a lockstep clock cycles come faster
+ROOM: Final = 4096  # capacity of the queue: 41 s of cycles
+PATIENCE: Final = 0.1  # s between two checks that the writer thread is alive
 
 
 class _Unbuffered:
@@ -53,7 +53,7 @@ class _Unbuffered:
         self._size = 0
 
     def write(self, data: bytes) -> int:
-        """Write all of it."""
+        """Write all bytes."""
         rest = memoryview(data)
         while rest:
             rest = rest[self._file.write(rest) or 0 :]
@@ -69,14 +69,14 @@ class _Unbuffered:
 
 
 class McapFile:
-    """The writer of one log. Not for several threads at a time."""
+    """The writer of one log; only one thread at a time may use it."""
 
     def __init__(self, file: RawIOBase, robot: Robot, period: float, epoch: int = 0) -> None:
         """Begin a log."""
-        # file: where to; opened unbuffered, closed by the caller
-        # period: of a cycle [s]
-        # epoch: what is added to times for the log's own [ns]
-        import xarray  # noqa: F401 — whatever is loaded is loaded here, before anything moves
+        # file: output, opened unbuffered, closed by the caller
+        # period: period of a cycle [s]
+        # epoch: offset added to times to get those of the log [ns]
+        import xarray  # noqa: F401 — loaded here, before the machine moves
         from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
         from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
         from mcap.writer import Writer
@@ -101,7 +101,7 @@ class McapFile:
         self._channels = {topic: writer.register_channel(topic, *kind) for topic, kind in kinds.items()}
 
     def begin(self, plan: Plan) -> int:
-        """Attach a plan; returns its number."""
+        """Attach a plan; returns its index."""
         number, self._plans = self._plans, self._plans + 1
         self._attach(mcap_layout.PLAN.format(number), mcap_layout.PACKED, pack_dataset(plan_dataset(plan)))
         return number
@@ -112,7 +112,7 @@ class McapFile:
         self._attach(name, mcap_layout.JSON, json.dumps({"status": status, "reason": reason}).encode())
 
     def block(self, columns: Mapping[str, NDArray[Any]], plan: int, zero: Array, rest: Callable[[], Any] = int) -> None:
-        """Write cycles of a plan (`NONE` for none) with the zero of homing [m]; `rest` is called between messages."""
+        """Write cycles of a plan (`NONE`: no plan) and the homing offset [m]; `rest` is called between messages."""
         stamps = [self.stamp(value) for value in columns["time"].tolist()]
         kept = {**columns, "plan": np.array(plan), "zero": zero, "epoch": np.array(self.epoch)}
         for stamp, text in zip(stamps, mcap_layout.cycle_texts(kept), strict=True):
@@ -137,15 +137,15 @@ class McapFile:
         self._message(mcap_layout.TRUTH, self.stamp(time), mcap_layout.truth_text(time, position, quaternion))
 
     def close_chunk(self) -> None:
-        """Write the chunk so far to the file."""
+        """Write the current chunk to the file."""
         self._writer.flush()
 
     def finish(self) -> None:
-        """Write the end; nothing comes after it."""
+        """Write the end of the log; nothing can be written afterwards."""
         self._writer.finish()
 
     def stamp(self, time: float) -> int:
-        """The log's own time of a time [s]."""
+        """Log time [ns] of a time [s]."""
         return self.epoch + round(time * mcap_layout.NANO)
 
     def _attach(self, name: str, kind: str, data: bytes) -> None:
@@ -159,7 +159,7 @@ class McapFile:
     def _known(
         columns: Mapping[str, NDArray[Any]], stamps: list[int], share: int
     ) -> list[tuple[int, dict[str, Array]]]:
-        """Stamp, pose and tensions of each n-th cycle that has an estimate of the pose."""
+        """Stamp, pose and tensions of every `share`-th cycle that has an estimate of the pose."""
         names = ("position", "quaternion", "tension")
         known = np.flatnonzero(np.isfinite(columns["position"]).all(axis=1))
         return [(stamps[k], {name: columns[name][k] for name in names}) for k in known[::share].tolist()]
@@ -173,11 +173,11 @@ def check_packages() -> None:
 
 
 class Recorder:
-    """A log that is written beside a controller, or a twin, by a thread of its own.
+    """A log written by a separate thread while a controller or a twin runs.
 
-    Whatever is handed over is put into a queue and left there: nothing here waits for a disk. Where the queue is full
-    or the disk is full, recording stops for good, `stopped` says why, and what is in the file stays. Numbers are
-    kept to the digits of `DECIMALS`.
+    Data are put into a queue, so the caller never waits for a disk. If the queue or the disk is full, recording stops
+    permanently, `stopped` gives the reason, and the data already in the file remain. Numbers are rounded to the
+    decimals of `DECIMALS`.
     """
 
     def __init__(
@@ -190,15 +190,15 @@ class Recorder:
         epoch: int | None = None,
         stream: RawIOBase | None = None,
     ) -> None:
-        """Open the file and begin.
+        """Open the file and start the thread.
 
         Args:
-            file: The file, "run.mcap" for instance; a regular file that exists is replaced, anything else is refused.
-            robot: The robot as the controller knows it.
-            period: Of a cycle [s].
-            group_count: Number of groups G; None: two winches are a group.
-            epoch: Offset from times of the link's clock to those of the log [ns]; None: what makes the first of
-                them the time of day.
+            file: The file, "run.mcap" for instance; an existing regular file is replaced; any other target is refused.
+            robot: The robot used by the controller.
+            period: Period of a cycle [s].
+            group_count: Number of groups G; None: two winches per group.
+            epoch: Offset from times of the link's clock to those of the log [ns]; None: the log starts at the
+                present time of day.
             stream: Output instead of the file, unbuffered.
         """
         self.file = check_file(file_path(file))
@@ -225,11 +225,11 @@ class Recorder:
         return self._why
 
     def begins(self, plan: Plan) -> None:
-        """Take a plan, before the first cycle that follows it."""
+        """Record a plan; call it before the first cycle of the plan."""
         self._put(partial(self._begin, plan))
 
     def ends(self, status: Status, reason: str) -> None:
-        """Record the end of the plan, after its last cycle."""
+        """Record the end of the plan; call it after the last cycle of the plan."""
         self._put(partial(self._end, status.name, reason))
 
     def cycle(self, cycle: Recorded) -> None:
@@ -238,19 +238,19 @@ class Recorder:
         self._put(partial(self._add, cycle))
 
     def event(self, event: Event) -> None:
-        """Take an event; one before the first cycle waits until the log is dated."""
+        """Record an event; an event before the first cycle waits until the start time of the log is known."""
         if self._epoch is None:
             self._early.append(event)
         else:
             self._put(partial(self._mcap.event, event))
 
     def truth(self, time: float, position: Array, quaternion: Array) -> None:
-        """Take the true pose of the platform at a time [s]; position and quaternion are copied."""
+        """Record the true pose of the platform at a time [s]; position and quaternion are copied."""
         self._date(time)
         self._put(partial(self._mcap.truth, time, position.copy(), quaternion.copy()))
 
     def close(self) -> None:
-        """Write what waits, and the end; wait until that is done."""
+        """Write the queued data and the end of the log; wait until this is done."""
         if self._early:
             self._date(self._early[-1].time)
         while self._thread.is_alive():
@@ -262,7 +262,7 @@ class Recorder:
         self._why = self._why or "it is closed"
 
     def __enter__(self) -> Recorder:
-        """Record inside, close at the end."""
+        """Record inside the block and close at its end."""
         return self
 
     def __exit__(self, *failure: object) -> None:
@@ -278,7 +278,7 @@ class Recorder:
             self._why = f"{self.file}: {ROOM} entries wait to be written, and the queue is full; the disk is too slow"
 
     def _date(self, time_of_link: float) -> None:
-        """Date the log: from here on its times are times of day."""
+        """Set the start time of the log; from now on its times are times of day."""
         if self._epoch is None:
             self._epoch = self._mcap.epoch = time.time_ns() - round(time_of_link * mcap_layout.NANO)
             for event in self._early:
@@ -292,7 +292,7 @@ class Recorder:
                 self._mcap.finish()
         except OSError as error:
             self._why = f"{self.file}: cannot be written ({_reason(error)})"
-        except Exception as error:  # for any error, the loop continues and the operator gets a message
+        except Exception as error:  # after any error the control loop continues and the operator gets a message
             self._why = f"{self.file}: {type(error).__name__}: {error}; a mistake in sagline"
 
     def _write(self) -> None:
@@ -306,7 +306,7 @@ class Recorder:
                 if task is None:
                     break
                 task()
-            late = time.monotonic() >= due and self._queue.empty()  # else what waits comes into the same chunk
+            late = time.monotonic() >= due and self._queue.empty()  # otherwise the queued data go into the same chunk
             if late or len(self._tape) >= BLOCK:
                 self._close_block()
                 self._mcap.close_chunk()
@@ -331,7 +331,7 @@ class Recorder:
         self._plan = NONE
 
     def _close_block(self) -> None:
-        """Write the cycles so far."""
+        """Write the collected cycles."""
         if not len(self._tape):
             return
         none = ExecutionStatus.UNKNOWN

@@ -13,7 +13,7 @@ from sagline.core.arrays import Array, locked
 from sagline.files.reading import read_text
 from sagline.files.table import TABLE_LIMIT, CsvTable
 
-# of each kind of column the other one, and what to do where a file has that
+# for each kind of column: the other kind, and the next step if a file has that kind
 _OTHERS: Final = {"L": ("C", "these are counts: add --counts"), "C": ("L", "these are lengths: leave out --counts")}
 UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 
@@ -21,20 +21,20 @@ UNITS = {"span": "m", "rise": "m", "length": "m", "tension": "N"}
 class LengthSamples(NamedTuple):
     """N samples of the unstrained lengths of m cables."""
 
-    time: Array | None  # [s], shape (N,); None where the file has none
+    time: Array | None  # times [s], shape (N,); None if the file has no times
     unstrained_length: Array  # [m], shape (N, m)
 
 
 class CountSamples(NamedTuple):
     """N samples of the counts of m encoders."""
 
-    time: Array | None  # [s], shape (N,); None where the file has none
+    time: Array | None  # times [s], shape (N,); None if the file has no times
     counts: Array  # shape (N, m)
 
 
 def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = np.inf) -> LengthSamples:
-    """Read a CSV file with a column for each cable, L0, L1, ..., and perhaps the time."""
-    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; without, they are s and m
+    """Read a CSV file with one column per cable, L0, L1, ..., and optionally the time."""
+    # Units are in brackets, `time [s],L0 [mm],L1 [mm]`; the defaults are s and m
     # cable_count: number of cables m of the robot
     # size: largest extent of the robot [m]; lengths a hundred times longer must have another unit
     table, names = _read(file, "L", "m", cable_count)
@@ -45,13 +45,13 @@ def load_lengths(file: os.PathLike[str] | str, cable_count: int, size: float = n
 
 
 def load_counts(file: os.PathLike[str] | str, cable_count: int) -> CountSamples:
-    """Read a CSV file with a column for each encoder, C0, C1, ..., and perhaps the time."""
-    # returns times [s], if there are any, and counts
+    """Read a CSV file with one column per encoder, C0, C1, ..., and optionally the time."""
+    # returns times [s] (None if the file has no times) and counts
     return CountSamples(*_samples(*_read(file, "C", "", cable_count)))
 
 
 def _read(file: os.PathLike[str] | str, letter: str, unit: str, cable_count: int) -> tuple[CsvTable, list[str]]:
-    """A table with a column for each cable, and their names."""
+    """A table with one column per cable, and the names of these columns."""
     path = Path(file)
     names = _columns(letter, cable_count)
     other, hint = _OTHERS[letter]
@@ -67,7 +67,7 @@ def _columns(letter: str, cable_count: int) -> list[str]:
 
 
 def _samples(table: CsvTable, names: list[str]) -> tuple[Array | None, Array]:
-    """Times, and a row a sample."""
+    """Times, and values with one row per sample."""
     time = table.columns.get("time")
     if time is not None:
         late = np.diff(time, prepend=-np.inf) <= 0.0
@@ -80,14 +80,14 @@ class Measurements(NamedTuple):
 
     span: Array  # horizontal distance of the ends [m], shape (n,)
     rise: Array  # height of the platform end above the frame end [m], shape (n,)
-    unstrained_length: Array  # as an encoder counts it [m], shape (n,)
+    unstrained_length: Array  # measured by the encoder [m], shape (n,)
     tension: Array  # [N], shape (n,)
 
 
 def load_measurements(file: os.PathLike[str] | str) -> Measurements:
     """Read a CSV file with the columns span, rise, length and tension, in any order.
 
-    Units are in brackets, `span [m],rise [mm],length [m],tension [kN]`; without, they are m and N.
+    Units are in brackets, `span [m],rise [mm],length [m],tension [kN]`; the defaults are m and N.
 
     Args:
         file: The file.

@@ -20,29 +20,29 @@ from sagline.files.writing import atomic_file, check_file
 from sagline.interference.mesh import MOST, Mesh, extent_text
 from sagline.workspaces.surface import Surface
 
-LIMIT: Final = 200.0  # MB of a file
-CHECKED: Final = 20_000  # triangles up to which a mesh is searched for places where it crosses itself
+LIMIT: Final = 200.0  # MB, largest size of a file
+CHECKED: Final = 20_000  # largest number of triangles for which self-intersections are searched
 KINDS: Final = (".stl", ".ply", ".obj", ".glb")
-_CONTACTS: Final = 40  # of a triangle, most of them with its own neighbors
-_UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # of glTF, whose y points up
+_CONTACTS: Final = 40  # contacts per triangle; most are with its own neighbors
+_UPRIGHT: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])  # z up to y up of glTF
 ENDINGS: Final = (".stl", ".glb", ".ply", ".vtk", ".vtu")
 _VTK: Final = (".vtk", ".vtu")
 
 
 def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = None) -> Mesh:
-    """A solid from a file: what stands around a robot, or a platform.
+    """Read a solid from a file: an obstacle around a robot, or a platform.
 
     Args:
-        file: STL, PLY, OBJ or GLB, at most 200 MB and a million triangles. z points up; of a GLB, whose y does by its
-            standard, z does after it is read.
-        unit: Unit of its coordinates, "mm" for instance; files of these kinds do not say it.
-        name: Name; None: that of the file.
+        file: STL, PLY, OBJ or GLB, at most 200 MB and a million triangles. z points up; a GLB has y up by its
+            standard and is rotated to z up.
+        unit: Unit of its coordinates, "mm" for instance; these formats do not state it.
+        name: Name; None: the name of the file.
 
     Returns:
         Mesh, in meters.
 
     Raises:
-        FileError: If the file cannot be read, or the surface is not closed, or crosses itself (looked for
+        FileError: If the file cannot be read, or the surface is not closed, or crosses itself (checked for
             up to 20,000 triangles); the message gives its extent.
         SaglineError: If trimesh or python-fcl is missing; the message says how to install it.
 
@@ -73,7 +73,7 @@ def load_mesh(file: str | os.PathLike[str], unit: str = "m", name: str | None = 
 
 
 def meters(unit: str, item: str) -> float:
-    """Length of a unit [m]; InvalidValueError if it is no unit of length."""
+    """Length of a unit [m]; InvalidValueError if it is not a unit of length."""
     try:
         factor = in_si(f"1 {label(unit, item)}", "m", item)
     except InvalidValueError:
@@ -96,7 +96,7 @@ def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
         vertices, faces = np.array(read.vertices, dtype=np.float64), np.array(read.faces, dtype=np.int64)
     except SaglineError:
         raise
-    except Exception as error:  # whatever a file that is none makes a reader of five formats stumble over
+    except Exception as error:  # the readers of the formats raise many kinds of errors for a wrong file
         reason = " ".join(str(error).split())[:80] or type(error).__name__
         raise FileError(
             path, f"cannot be read as {kind.upper()} ({reason})", "Check that it is the file you mean."
@@ -109,7 +109,7 @@ def _triangles(path: Path, data: bytes) -> tuple[Array, Indices]:
 
 
 def first_crossing(mesh: Mesh) -> Array | None:
-    """Point [m] where a surface meets itself other than along its edges and at its corners; None if there is none."""
+    """Point [m] where a surface crosses itself, common edges and corners not counted; None if there is none."""
     from sagline.interference.meshed import package
 
     fcl = package()
@@ -134,9 +134,9 @@ def _without_common_vertex(faces: Indices, pairs: Indices) -> NDArray[np.bool_]:
 
 def save(surface: Surface, file: Path | str, colors: ArrayLike | None = None) -> None:
     """Write a surface to a file atomically, in meters."""
-    # file: the file; its ending says what it becomes: .stl, .glb (y up, as that format requires), .ply, .vtk or .vtu
-    # (meshio or PyVista writes these). One that exists is replaced
-    # colors: red, green, blue of each vertex, 0 to 255, shape (V, 3); GLB and PLY have them
+    # file: the suffix selects the format: .stl, .glb (y up, as this format requires), .ply, .vtk or .vtu (meshio or
+    # PyVista writes the last three). An existing file is replaced
+    # colors: red, green, blue of each vertex, 0 to 255, shape (V, 3); only GLB and PLY store them
     target = file_path(file)
     ending = target.suffix.lower()
     if ending not in ENDINGS:
@@ -170,7 +170,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
     except ModuleNotFoundError:
         raise FileError.not_installed("trimesh", "Surfaces need it", "workspace") from None
     vertices, faces = surface.vertices, surface.faces
-    if kind == "stl":  # has triangles alone: corners that are one in its 24 bits are one to who reads it
+    if kind == "stl":  # STL has no vertex list: readers merge corners that are equal in single precision
         vertices, faces = _in_single_precision(vertices, faces)
     if kind == "glb":
         vertices = np.stack([vertices[:, 0], vertices[:, 2], -vertices[:, 1]], axis=1)
@@ -180,7 +180,7 @@ def _by_trimesh(surface: Surface, kind: str, colors: NDArray[np.uint8] | None) -
 
 
 def _in_single_precision(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
-    """Vertices rounded, the same ones as one, and no triangle that this flattens."""
+    """Rounded vertices with equal ones merged, and triangles without those that rounding makes degenerate."""
     rounded, place = np.unique(np.round(vertices, 7).astype(np.float32), axis=0, return_inverse=True)
     faces = place.reshape(-1)[faces]
     return rounded.astype(np.float64), faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
@@ -203,7 +203,7 @@ def _by_meshio(surface: Surface, file: Path, kind: str) -> None:
 def _by_pyvista(surface: Surface, file: Path, ending: str) -> None:
     import pyvista
 
-    named = file.with_name(f"{file.name}{ending}")  # it goes by the ending
+    named = file.with_name(f"{file.name}{ending}")  # PyVista selects the format by the suffix
     faces = np.column_stack([np.full(len(surface.faces), 3), surface.faces])
     mesh = pyvista.PolyData(surface.vertices, faces.ravel())
     (mesh if ending == ".vtk" else mesh.cast_to_unstructured_grid()).save(str(named))

@@ -1,10 +1,11 @@
 """MJCF, the model format of MuJoCo: straight elastic cables as spatial tendons, pulleys as cylinders.
 
-The cylinders do not swivel. A cable whose platform end moves by small u in its vertical plane, across the chord, and v
-out of it, lengthens by u^2/(2 l) + v^2 cos phi/(2 s): l is its free length, s the distance of the end from the swivel
-axis. On a fixed cylinder it unrolls to a straight line, and lengthens by v^2/(2 a), a the length from its first point
-to its end. So the tendon starts where a = s/cos phi, R tan(psi/2) before it leaves the cylinder: force and stiffness
-are those of a pulley that swivels.
+The cylinders do not swivel. Let the platform end of a cable move by a small u in its vertical plane, perpendicular to
+the chord, and by v out of this plane. Over a swiveling pulley the cable then lengthens by
+u^2/(2 l) + v^2 cos phi/(2 s), where l is its free length and s the distance of the end from the swivel axis. On a
+fixed cylinder the cable unrolls to a straight line and lengthens by v^2/(2 a), where a is the length from its first
+point to its end. The tendon therefore starts where a = s/cos phi, R tan(psi/2) before it leaves the cylinder; force
+and stiffness are then those of a swiveling pulley.
 """
 
 from __future__ import annotations
@@ -37,33 +38,33 @@ NOTE = (
     "and a part of the wrap), and its springlength excludes it. "
     "The model has no friction on the pulleys and no drums. "
 )
-_OFF = 0.05  # of the radius: a tendon that begins nearer to its cylinder would not be laid on it
-_WIDTH = 0.2  # of a pulley as it is drawn, to its radius
-_BESIDE = 2.0  # radii from the middle of a pulley, on the side on which the cable lies
-_LONGEST = 1e3  # radii: of a tendon before its cylinder
+_OFF = 0.05  # share of the radius: a tendon that starts closer to its cylinder would not wrap around it
+_WIDTH = 0.2  # ratio of the drawn width of a pulley to its radius
+_BESIDE = 2.0  # distance of the side point from the pulley center in radii, on the side of the cable
+_LONGEST = 1e3  # largest length of a tendon before its cylinder, in radii
 _NOTE = (
     " Written by sagline. Every cable is a straight spring that pulls and never pushes, of the given unstrained length "
     "and axial stiffness. Its sag, its weight and the tension limits are not in this model. The damping is not the "
     "robot's: it lets the platform come to rest, and acts on slack cables too. "
 )
-_RADIUS = 0.002  # of ends of cables, which are only drawn, to the size of the robot
-_DRAWN = {"contype": "0", "conaffinity": "0"}  # touches nothing
-_THINNEST = 0.02  # of a box that is only drawn, to its longest edge
-_STEPS = 20.0  # in a period of the fastest motion
-_LONGEST_STEP = 0.002  # MuJoCo's own [s]
-_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # format of a step: rounded down
-_STRETCH_DAMPING = 4.0  # half the bound of the frequencies, about the fastest there is, is damped critically
-_SWING_DAMPING = 0.4  # a fifth of critical
+_RADIUS = 0.002  # ratio of the radius of drawn cable ends to the size of the robot
+_DRAWN = {"contype": "0", "conaffinity": "0"}  # no contacts
+_THINNEST = 0.02  # ratio of the shortest to the longest edge of a box that is only drawn
+_STEPS = 20.0  # time steps per period of the fastest motion
+_LONGEST_STEP = 0.002  # default time step of MuJoCo [s]
+_DOWN = Context(prec=2, rounding=ROUND_DOWN)  # the time step is rounded down to two digits
+_STRETCH_DAMPING = 4.0  # half the frequency bound, about the highest frequency, is damped critically
+_SWING_DAMPING = 0.4  # a fifth of critical damping
 _ROUNDING = 1e-12
-_SHORTEST = 1e-6  # of a cable [m]
+_SHORTEST = 1e-6  # shortest cable [m]
 
 
 class _Lead(NamedTuple):
     """First points of the tendons, and points beside the pulleys, in the world [m], (m, 3)."""
 
     start: Array
-    side: Array  # on which the cables lie
-    missing: Array  # cable off the drum that is not in the tendon [m], (m,); negative where a tendon is longer
+    side: Array  # points on the side of each pulley where the cable is
+    missing: Array  # cable off the drum minus tendon length [m], (m,); negative if the tendon is longer
 
 
 def _lead_of(robot: Robot, pose: Pose) -> _Lead:
@@ -72,7 +73,7 @@ def _lead_of(robot: Robot, pose: Pose) -> _Lead:
     wrap = touching_angle(robot, pose)
     if np.isnan(wrap).any():
         refuse_missing_chords(robot, pose)
-    before = np.minimum(np.tan(0.5 * wrap), _LONGEST)  # radii from the beginning of the tendon to the exit point
+    before = np.minimum(np.tan(0.5 * wrap), _LONGEST)  # radii from the start of the tendon to the exit point
     off = np.maximum(np.minimum(_OFF, 0.5 * before), before - wrap)
     first = np.maximum(wrap - before + off, 0.0)
     sine, cosine = np.sin(first), np.cos(first)
@@ -84,13 +85,13 @@ def _lead_of(robot: Robot, pose: Pose) -> _Lead:
 
 
 def _free_chords(robot: Robot, pose: Pose) -> Array:
-    """Chords from where straight cables leave the frame to their platform ends [m], shape (m, 3)."""
+    """Chords of straight cables from their exit points at the frame to their platform ends [m], shape (m, 3)."""
     exits = points_on_pulleys(robot, pose, np.nan_to_num(touching_angle(robot, pose)))
     return np.asarray(pose.transform(robot.platform_anchors) - exits)
 
 
 def _add_pulleys(world: Element, robot: Robot, pose: Pose, lead: _Lead) -> None:
-    """Add the pulleys, each a body of its own that stands still."""
+    """Add the pulleys, each as a separate fixed body."""
     radius = pulleys_of(robot).radius
     toward, centers = outward(robot, pose), pulley_centers(robot, pose)
     for i in np.flatnonzero(radius > 0.0):
@@ -110,20 +111,19 @@ def _add(parent: Element, tag: str, **attributes: str | ArrayLike) -> Element:
 
 
 def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = None) -> str:
-    """The text of a MuJoCo model of the robot, with the platform at a pose.
+    """Text of a MuJoCo model of the robot, with the platform at a pose.
 
-    A cable of unstrained length L is a spatial tendon of stiffness EA/L that is slack below L: the model `Elastic`.
-    Where it runs over a pulley it lies on a cylinder, which does not swivel: forces, lengths and stiffness are those of
-    the robot at the pose, and the file says what is lost elsewhere.
-    The time step is short enough for the fastest motion that the platform can make on its cables, wherever it is.
-    Damping lets it come to rest: that of a cable is proportional to its stiffness; where motions are left that no cable
-    resists, the platform's joints are damped as well.
+    A cable of unstrained length L is a spatial tendon of stiffness EA/L that is slack below L (the model `Elastic`).
+    A pulley is a cylinder that does not swivel: forces, lengths and stiffness agree with the robot at the pose, and
+    comments in the file state the deviations elsewhere. The time step is short enough for the fastest vibration of the
+    platform on its cables at any pose. Damping brings the platform to rest: the damping of a cable is proportional to
+    its stiffness; the platform's joints are damped as well if the cables do not resist all motions.
 
     Args:
         robot: The robot.
         pose: A single pose, where the platform starts.
-        unstrained_length: L, all cable off the drum [m], >= 1e-6, shape (m,). None takes the lengths with which
-            straight elastic cables hold the platform at rest at this pose.
+        unstrained_length: Unstrained length L off the drum [m], >= 1e-6, shape (m,). None: the
+            lengths with which straight elastic cables hold the platform at rest at this pose.
 
     Returns:
         The XML text.
@@ -152,7 +152,7 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
     root.append(Comment(_NOTE + NOTE if over_pulley.any() else _NOTE))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     step = f"{_DOWN.create_decimal_from_float(time_step):g}"
-    # implicitfast takes damping implicitly: it never limits the step
+    # implicitfast integrates damping implicitly, so damping does not limit the time step
     _add(root, "option", gravity=(0.0, 0.0, -robot.gravity), timestep=step, integrator="implicitfast")
     radius = _RADIUS * _add_view(root, robot)
     world = _add(root, "worldbody")
@@ -181,14 +181,13 @@ def dump_mjcf(robot: Robot, pose: Pose, unstrained_length: ArrayLike | None = No
 
 def _step_and_damping(robot: Robot, pose: Pose, stiffness: Array) -> tuple[float, float, float]:
     """Time step [s], damping of a cable over its stiffness [s], and damping of each joint [N s/m, N m s/rad]."""
-    # The last is zero where the cables resist every motion
-    # The cables' springs are the same at every pose, so none of its motions is faster than if each cable pulled where
-    # the platform gives way most easily: the square of its frequency is at most the sum over the cables of stiffness
-    # times largest mobility of the end. The many steps in a period leave room for what forces that turn with the
-    # platform add.
+    # The joint damping is zero if the cables resist every motion.
+    # Bound of the frequencies at every pose: the square of the angular frequency is at most the sum over the cables of
+    # stiffness times the largest mobility of the platform end. Forces that rotate with the platform add to this; the
+    # large number of steps per period is a margin for them.
     levers = (robot.platform_anchors - robot.center_of_mass) @ pose.matrix.T
     along, about = robot.freedom[:, :3], robot.freedom[:, 3:]
-    moved = along + np.cross(about, levers[:, None])  # of cable i's end by free motion j, (m, n, 3)
+    moved = along + np.cross(about, levers[:, None])  # displacement of the end of cable i in free motion j, (m, n, 3)
     inertia = pose.matrix @ robot.inertia @ pose.matrix.T
     masses = robot.mass * along @ along.T + about @ inertia @ about.T
     mobility = np.swapaxes(moved, 1, 2) @ np.linalg.solve(masses, moved)
@@ -252,14 +251,14 @@ def _add_platform(world: Element, robot: Robot, pose: Pose, radius: float, drag:
 
 
 def _inertia(robot: Robot, pose: Pose) -> Array:
-    """The robot's inertia; where MuJoCo would not take it, one of the same effect on the free motions."""
+    """The robot's inertia; if MuJoCo would refuse it, an inertia with the same effect on the free motions."""
     least, middle, most = np.linalg.eigvalsh(robot.inertia)
-    missing = most - (least + middle) + _ROUNDING * most  # of two moments to reach the third, as those of a body do
+    missing = most - (least + middle) + _ROUNDING * most  # of two moments to reach the third; zero for a body
     if least > 0.0 and missing <= 0.0:
         return robot.inertia
-    if robot.motion_pattern == "3R3T":  # a flat plate up to rounding; or an impossible inertia, which MuJoCo reports
+    if robot.motion_pattern == "3R3T":  # a flat plate (rounding error), or an impossible inertia, which MuJoCo reports
         return robot.inertia + missing * np.eye(3) if missing < 2.0 * _ROUNDING * most else robot.inertia
-    axes = robot.freedom[:, 3:] @ pose.matrix  # the normal of a plane in the platform's axes, if it turns at all
+    axes = robot.freedom[:, 3:] @ pose.matrix  # rotation axis of planar motion in the platform's axes
     moment = np.einsum("ij,jk,ik->", axes, robot.inertia, axes)
     return np.asarray((moment or robot.mass) * np.eye(3))
 

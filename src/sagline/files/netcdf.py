@@ -1,7 +1,7 @@
 """NetCDF files: atomic writing with a digest at the end, and reading of undamaged files only.
 
-HDF5 states its own length and ignores what follows, so the digest is behind it. It is checked before anything else
-is read: a library that reads a damaged file may ask for any amount of memory and time.
+An HDF5 file states its own length and HDF5 ignores later bytes, so the digest is appended at the end. The digest is
+checked before anything else is read, because reading a damaged file may take any amount of memory and time.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ OTHERS: Final = {
     "sagline_frequency_map_format": ("a frequency map", "Open it with xarray.open_dataset."),
 }
 Choice = TypeVar("Choice")
-_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # of every file in NetCDF-4
+_BEGIN: Final = b"\x89HDF\r\n\x1a\n"  # first bytes of every NetCDF-4 file
 _KINDS: Final = {
     **dict.fromkeys((".yaml", ".yml"), "a YAML file"),
     **dict.fromkeys((".xml", ".wcrfx"), "an XML file"),
     **{f".{kind}": f"a {kind.upper()} file" for kind in ("csv", "json", "png", "svg")},
 }
-INFLATION = 1000  # times the size of a file that its numbers may take in memory: no real file is packed better
-HEADERS: Final = 1 << 18  # bytes, more than all names and attributes take beside texts, such as the robot
+INFLATION = 1000  # largest ratio of memory to file size; no real file is compressed more
+HEADERS: Final = 1 << 18  # bytes, more than all names and attributes need, except for long texts such as the robot
 _HEAD, _TAIL = b"\nsagline sha256 ", b"\n"
 _LENGTH = len(_HEAD) + sha256().digest_size * 2 + len(_TAIL)
-_BLOCK = 1 << 20  # bytes read at once
+_BLOCK = 1 << 20  # bytes per read
 
 
 def seal(file: Path) -> None:
@@ -55,7 +55,7 @@ def seal(file: Path) -> None:
 
 
 def _digest_is_right(file: Path) -> bool | None:
-    """True if the digest at the end of a file is that of its content; None if there is none."""
+    """True if the digest at the end of a file matches its content; None if the file has no digest."""
     with file.open("rb") as handle:
         before = max(0, file.stat().st_size - _LENGTH)
         handle.seek(before)
@@ -67,7 +67,7 @@ def _digest_is_right(file: Path) -> bool | None:
 
 
 def _line(handle: BinaryIO, size: int) -> bytes:
-    """Digest line over the next bytes of a file; the position is behind them afterwards."""
+    """Digest line of the next `size` bytes of a file; moves the file position behind them."""
     found = sha256()
     while size > 0 and (block := handle.read(min(_BLOCK, size))):
         found.update(block)
@@ -77,17 +77,17 @@ def _line(handle: BinaryIO, size: int) -> bytes:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """One kind of content, in a reader's words."""
+    """One kind of content, with texts for messages."""
 
-    name: str  # what it is called: "plan"
-    made: str  # what a file of it is: "run of sagline track"
-    give: str  # which file to give: "Give the .nc file that sagline track wrote."
-    again: str  # what to do about a damaged file
-    key: str  # the attribute that has its format
+    name: str  # name of the content: "plan"
+    made: str  # description of such a file: "run of sagline track"
+    give: str  # next step for the user: "Give the .nc file that sagline track wrote."
+    again: str  # next step for a damaged file
+    key: str  # attribute that holds the version of the format
     version: int  # newest version of the format; raised whenever an older sagline could misread the file
 
     def format_of(self, path: Path, attributes: Mapping[str, Any]) -> int:
-        """Version of the format of a file; FileError if it is of other content or of a newer version."""
+        """Format version of a file; FileError if the file has other content or a newer version."""
         found = attributes.get(self.key)
         if found is None:
             raise FileError(path, *self._instead(attributes))
@@ -105,7 +105,7 @@ class Content:
         return int(found)
 
     def _instead(self, attributes: Mapping[str, Any]) -> tuple[str, str]:
-        """Other content of a file, and the next step."""
+        """Description of the other content of a file, and the next step."""
         for key, (what, step) in OTHERS.items():
             if key in attributes:
                 return f"is {what} of sagline, not a {self.name}", step
@@ -119,7 +119,7 @@ class Content:
 def labeled_dataset(
     variables: Mapping[str, Any], attributes: Mapping[str, Any], coordinates: Mapping[str, Any] | None = None
 ) -> Dataset:
-    """Make a data set whose dimensions carry labels, without indexes: the reader builds those needed."""
+    """Make a data set whose dimensions have labels but no indexes; the reader builds the indexes it needs."""
     from xarray import Coordinates, Dataset
 
     parts = {dimension for dimensions, *_ in variables.values() for dimension in dimensions} & PARTS.keys()
@@ -133,25 +133,25 @@ def index_coordinate(dimension: str, count: int) -> tuple[str, Any, dict[str, st
 
 
 def write_dataset(data: Dataset, file: Path, groups: Mapping[str, Dataset] | None = None) -> None:
-    """Write a data set, with a digest over all values and attributes at the end, behind what NetCDF reads."""
+    """Write a data set; a digest over all values and attributes follows the NetCDF data."""
     parts: list[tuple[str | None, Dataset]] = [(None, data), *(groups or {}).items()]
     texts = [value for _, part in parts for value in part.attrs.values() if isinstance(value, str)]
     size = sum(part.nbytes + HEADERS for _, part in parts) + sum(len(text.encode()) for text in texts)
     with atomic_file(file, size=size) as partial:
         try:
             for group, part in parts:
-                # _FillValue None: numbers are stored as they are, and NaN needs no second meaning
+                # _FillValue None: numbers are stored unchanged, and NaN does not mean "missing"
                 encoding = {str(name): {"_FillValue": None} for name in part.variables}
                 mode: Literal["w", "a"] = "w" if group is None else "a"
-                # absolute: xarray takes ~ for the home
+                # absolute path: xarray expands ~ to the home folder
                 part.to_netcdf(partial.absolute(), mode, group=group, engine="h5netcdf", encoding=encoding)
-        except RuntimeError as error:  # error of h5py on a full disk
+        except RuntimeError as error:  # h5py raises it on a full disk
             raise OSError(str(error)) from error
         seal(partial)
 
 
 def read_dataset(path: Path, content: Content) -> tuple[Dataset, bool]:
-    """Data set of an undamaged file, and whether it carries a digest, which is checked before anything else is read."""
+    """Data set of an undamaged file, and true if the file has a digest; the digest is checked before reading."""
     try:
         check_regular(path, path.stat().st_mode)  # opening a pipe would wait for its writer
         right = _digest_is_right(path)
@@ -194,13 +194,13 @@ def _load(path: Path, content: Content) -> Dataset:
 
     size = path.stat().st_size
     try:
-        with File(path) as file:  # h5netcdf writes to stderr about a file of which this cannot be read
+        with File(path) as file:  # h5netcdf would write to stderr if the file cannot be opened
             dict(file.attrs)
         with open_dataset(path.absolute(), engine="h5netcdf", decode_times=False, mask_and_scale=False) as data:
             if data.nbytes > INFLATION * size:
                 raise ValueError(f"{size} bytes that say to hold {data.nbytes:.2g}")
             return data.load()
-    except Exception as error:  # h5py, h5netcdf and xarray have no error of their own for a damaged file: any will do
+    except Exception as error:  # h5py, h5netcdf and xarray have no error class for a damaged file, so any is caught
         raise FileError(path, *_cause(path, content)) from error
 
 
@@ -215,7 +215,7 @@ def _cause(path: Path, content: Content) -> tuple[str, str]:
 
 
 def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[str, Any]:
-    """Attributes of an object that are numbers, each followed by its unit unless that is None."""
+    """Numeric attributes of an object, each followed by its unit unless the unit is None."""
     found: dict[str, Any] = {}
     for name, unit in units.items():
         found |= {name: float(getattr(source, name)), **({} if unit is None else {f"{name}_units": unit})}
@@ -223,7 +223,7 @@ def attributes_with_units(source: Any, units: Mapping[str, str | None]) -> dict[
 
 
 def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -> dict[str, Any]:
-    """A model, method or the like as attributes: its name, and each of its options that is set."""
+    """Name and set options of a model, method or similar object, as attributes."""
     if choices.get(type(choice).__name__) is not type(choice):
         raise InvalidValueError(key, type(choice).__name__, ", ".join(choices), "Only these can be read back.")
     options = {f"{key}_{field.name}": getattr(choice, field.name) for field in fields(choice)}
@@ -233,7 +233,7 @@ def choice_attributes(key: str, choice: Any, choices: Mapping[str, type[Any]]) -
 def choice_of(
     path: Path, attributes: Mapping[str, Any], key: str, choices: Mapping[str, type[Choice]], **known: Any
 ) -> Choice:
-    """Object whose attributes `choice_attributes` wrote; FileError if its kind or an option is unknown."""
+    """Object read from attributes written by `choice_attributes`; FileError if its kind or an option is unknown."""
     name = attributes[key]
     if name not in choices:
         refused = InvalidValueError(key, repr(name), ", ".join(choices), "Read it with a newer sagline.")
@@ -243,7 +243,7 @@ def choice_of(
     try:
         options = {option: _plain(value) for option, value in given.items() if value is not None}
         found: Choice = choice(**{**options, **known})
-    except TypeError as error:  # a text where a number belongs
+    except TypeError as error:  # a text in place of a number
         raise FileError(path, f"{key}: {error}", "Write it again; it was edited.") from None
     return found
 
@@ -253,7 +253,7 @@ def _plain(value: Any) -> Any:
 
 
 def robot_of(path: Path, data: Dataset, item: str = "robot") -> Robot:
-    """Robot of a data set; FileError if it is none, or has another number of cables."""
+    """Robot of a data set; FileError if it is not a robot, or has another number of cables."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, {item}")
     if data.sizes["cable"] != robot.cable_count:
         reason = f"has {data.sizes['cable']} cables, its robot {robot.cable_count}"
