@@ -139,7 +139,7 @@ def thinning(number: int) -> slice:
 def cables_over_time(
     time: Array, values: Array, label: str, width: float, name: str = "", stops: Iterable[float] = ()
 ) -> tuple[Sheet, Axes]:
-    """A line a cable over time, values (N, m); a vertical line at each stop, between which the time is counted."""
+    """A line per cable over time, values (N, m); a vertical line at each stop, between which the time is counted."""
     figure, ax = axes("time without stops [s]" if stops else "time [s]", label, height=2.7)
     part = thinning(len(time))
     for i, course in enumerate(values[part].T):

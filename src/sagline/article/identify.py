@@ -214,7 +214,7 @@ def _tolerance(tolerance: float) -> float:
 
 
 def _first_of_good_tail(values: Array, good: Flags) -> float:
-    """The value from which on, to the end of the array, all is good; NaN where the last one is not."""
+    """The value from which on, to the end of the array, all is good; NaN if the last one is not."""
     bad = np.flatnonzero(~good)
     first = int(bad[-1]) + 1 if bad.size else 0
     return float(values[first]) if first < values.size else float("nan")

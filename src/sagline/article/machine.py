@@ -27,7 +27,7 @@ class Parameter(NamedTuple):
     unit: str  # unit of its error
     typical: float  # typical error, in that unit
     plausible: float  # the largest error we think possible, in that unit; ours, the article says nothing of it
-    positive: bool = False  # whether it can only be larger than planned
+    positive: bool = False  # true if it can only be larger than planned
 
 
 PARAMETERS = (

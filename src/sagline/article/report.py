@@ -160,7 +160,7 @@ def _unknown(word: str) -> sl.InvalidValueError:
 
 
 def _picture(chapters: Sequence[Chapter]) -> Panel | None:
-    """The largest position error of each model for both robots; None where the report does not have them."""
+    """The largest position error of each model for both robots; None if the report does not have them."""
     numbers = next((f.numbers for c in chapters for f in c.findings if f.key == KEY), None)
     if numbers is None:
         return None

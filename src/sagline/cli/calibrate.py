@@ -36,7 +36,7 @@ FIGURES: Final = (".png", ".svg", ".pdf")
 
 
 class _Request(NamedTuple):
-    """The options of fitting and of choosing poses; the deviations are those of the sensors that the options give."""
+    """Options for the fit and for the choice of poses; the deviations are those of sensors given by options."""
 
     robot: str
     unknowns: tuple[str, ...]
@@ -224,7 +224,7 @@ def _written(found: Calibration, request: _Request, line: Any) -> list[Path]:
 
 
 def _show_lines(text: Callable[[int], str]) -> None:
-    """Print a text that is made for the width of a narrow terminal."""
+    """Print a text that depends on the width of the terminal."""
     from sagline.calibration import summary
 
     show_pieces(
@@ -238,7 +238,7 @@ def _tell_files(files: list[Path]) -> None:
 
 
 def _tell_offset(found: Calibration, files: list[Path]) -> None:
-    """Print a note on the zeros of read lengths, which a robot file does not keep."""
+    """Print a note on the zero offsets of measured lengths, because a robot file does not contain them."""
     robots = [file.name for file in files if file.suffix.lower() in ROBOTS]
     if robots and found.length_offset.any():
         whole = next((file.name for file in files if file.suffix.lower() == WHOLE), None)

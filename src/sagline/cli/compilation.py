@@ -1,4 +1,4 @@
-"""Compilation of the kernels that a command needs, before it begins, by two processes at the same time.
+"""Compilation of the kernels that a command needs, before it begins, in two parallel processes.
 
 numba compiles under one lock, so a second process is needed. It compiles into a folder of its own; the files of each
 entry are moved when they are complete.
@@ -85,7 +85,7 @@ def first_run_text(stages: Sequence[Stage]) -> str:
 
 
 def _stage(path: str, types: Any) -> Stage:
-    """The begin of an entry; the second version of one takes a flag where the first takes None."""
+    """Stage at the start of an entry; in the second version of a kernel, a flag replaces the None of the first."""
     version = 1 if any("none" in str(each) for each in types) else 2
     named = [entry for entry in ENTRIES.values() if KERNELS + entry.path == path]
     for entry in named:
@@ -95,7 +95,7 @@ def _stage(path: str, types: Any) -> Stage:
 
 
 def not_compiled(names: Sequence[str]) -> list[str]:
-    """The entries among these that are not compiled yet."""
+    """Names of the entries that are not compiled yet."""
     return [name for name in names if not ENTRIES[name].is_compiled]
 
 
@@ -107,7 +107,7 @@ def available_cores() -> int:
 
 
 def split_entries(names: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Entries for this process and for the other one, with about the same time; an entry is with the one before it."""
+    """Entries for this process and for the other one, with about equal times; dependent entries stay together."""
     groups: dict[str, list[str]] = {}
     for name in names:
         groups.setdefault(_root(name), []).append(name)
@@ -147,7 +147,7 @@ class CompilerProcess:
     """A second process that compiles entries; it ends with the block, and with this process in any case."""
 
     def __init__(self, names: Sequence[str]) -> None:
-        """Start it for some entries.
+        """Start the process for some entries.
 
         Raises:
             OSError: If it cannot be started.
@@ -166,11 +166,11 @@ class CompilerProcess:
         return subprocess.Popen(
             [sys.executable, "-m", "sagline.cli.compilation", *names],
             env={**os.environ, "NUMBA_CACHE_DIR": str(self._folder)},
-            stdin=subprocess.PIPE,  # its end of file is the end of this process
+            stdin=subprocess.PIPE,  # closed when this process ends, which ends the other process
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            start_new_session=True,  # Ctrl-C is for this process, which then ends that one
+            start_new_session=True,  # Ctrl-C reaches only this process, which then ends the other
         )
 
     def __enter__(self) -> CompilerProcess:
@@ -194,14 +194,14 @@ class CompilerProcess:
         self._process.kill()
 
     def stages(self) -> Iterator[Stage]:
-        """The stages that it reports, until it ends."""
+        """Stages reported by the process, until it ends."""
         assert self._process.stdout is not None
         for line in self._process.stdout:
             words, done, expected, finished = line.rstrip("\n").split("\t")
             yield Stage(words, int(done), int(expected), finished == "1")
 
     def move_kernels(self) -> None:
-        """Move its compiled kernels into the cache of this process, when this one does not compile."""
+        """Move the compiled kernels into the cache of this process; this process must not compile meanwhile."""
         from numba.core.compiler_lock import global_compiler_lock
 
         from sagline.kernels.cache import SUFFIX
@@ -217,9 +217,9 @@ class CompilerProcess:
 
 
 def main(names: Sequence[str]) -> None:
-    """Compile entries and print a line for every kernel: the program of the second process."""
+    """Compile entries and print a line for every kernel: main program of the second process."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    ended: list[Stage] = []  # numba reports an end before it writes the machine code, which is moved after our line
+    ended: list[Stage] = []  # numba reports the end before it writes the machine code, so a line is printed later
 
     def report(stage: Stage) -> None:
         print_ended()
@@ -245,21 +245,21 @@ def _print_stage(stage: Stage) -> None:
 def _end_with_parent() -> None:
     from sagline.kernels.jit import FOLDER
 
-    os.read(0, 1)  # nothing is written: this returns when the other process has ended
+    os.read(0, 1)  # returns when the other process has ended, as nothing is ever written
     if FOLDER.parent.name.startswith(PREFIX):
-        # another program in this process: no compilation continues and writes into the removed folder
+        # replaces the program of this process, so that no compilation writes into the removed folder
         os.execv(sys.executable, [sys.executable, "-c", REMOVE, str(FOLDER.parent)])
     os._exit(1)
 
 
 def _root(name: str) -> str:
-    """The first in the chain of entries that an entry comes after."""
+    """First entry of the chain of entries that this entry depends on."""
     after = ENTRIES[name].after
     return name if after is None else _root(after)
 
 
 def _begins(group: Sequence[str]) -> bool:
-    """True if a group contains the entries that its members come after."""
+    """True if a group contains all entries that its members depend on."""
     return all(ENTRIES[name].after in (None, *group) for name in group)
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from sagline.optimization.goals import Goal
 
 FIGURE: Final = "front"
-MOST_ROWS: Final = 12  # of the table; front.csv has all
+MOST_ROWS: Final = 12  # rows of the printed table; front.csv has all
 
 
 def design(

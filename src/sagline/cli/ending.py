@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from threading import ExceptHookArgs
 
-OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last as of SIGPIPE
+OUTSIDE, BAD_INPUT, UNEXPECTED, INTERRUPTED, CUT_OFF = 1, 2, 70, 130, 141  # the last is that of SIGPIPE
 REPORT = "the authors of sagline"
 
 
@@ -151,7 +151,7 @@ def _give_up_unwritable() -> None:
 
 
 class _Interrupts:
-    """Handler of Ctrl-C in the main thread, unless the process was started with SIGINT ignored."""
+    """Handler of Ctrl-C in the main thread; not installed if the process was started with SIGINT ignored."""
 
     def __init__(self) -> None:
         """Install the handler."""
@@ -169,12 +169,12 @@ class _Interrupts:
         signal.default_int_handler(number, frame)
 
     def ignore(self) -> None:
-        """Ignore Ctrl-C from here on."""
+        """Ignore Ctrl-C from now on."""
         if self._handles:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def restore(self) -> None:
-        """Restore the handlers of before."""
+        """Restore the previous handlers."""
         sys.unraisablehook = self._hook
         if self._handles:
             signal.signal(signal.SIGINT, self._before)

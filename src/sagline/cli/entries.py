@@ -1,4 +1,4 @@
-"""Table of the kernels that Python calls: words for the user, the size of each, and a call that compiles it."""
+"""Table of the kernels that Python calls: description for the user, size, and a call that compiles each."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ class _Entry(NamedTuple):
     """An entry of the kernels.
 
     Attributes:
-        words: Its purpose, for the user; the key of the table.
-        path: Module below `sagline.kernels`, and function.
+        words: Purpose in words for the user; the key of the table.
+        path: Module in `sagline.kernels`, and function.
         kernels: Number of kernels that are compiled for it with an empty cache.
         seconds: Time to compile it on one core of an ordinary machine [s]; only the proportions matter.
         solve: Calls the public function that needs it, with `sagline`, on the smallest problem.
@@ -187,7 +187,7 @@ def _chains(sl: Any) -> None:
 
 
 def _hanging_state(sl: Any, name: str = ROBOT) -> Equilibrium:
-    """Catenaries of one tension, nearly in balance: no kernel that solves for the balance is needed."""
+    """State of catenaries with equal tensions, nearly in equilibrium; needs no kernel that solves for equilibrium."""
     import numpy as np
 
     from sagline.core.arrays import locked
@@ -205,7 +205,7 @@ def _hanging_state(sl: Any, name: str = ROBOT) -> Equilibrium:
 
 
 def _unknown_state(sl: Any, name: str = ROBOT) -> Equilibrium:
-    """Cables with NaN everywhere: all results are found at once."""
+    """State of cables with NaN everywhere, for which all results are computed immediately."""
     import numpy as np
 
     from sagline.core.arrays import locked

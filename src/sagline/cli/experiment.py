@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
 
 KNOWN: Final = ("article",)
-PARTS: Final = 1000  # of the progress
+PARTS: Final = 1000  # steps of the progress bar
 
 
 def experiment(

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from sagline.kinematics.forward_rows import ForwardSolution
     from sagline.robot.robot import Robot
 
-SHOWN = 12  # rows of the table on the terminal; the file has all of them
+SHOWN = 12  # rows of the printed table; the file has all
 COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw", "force_residual", "moment_residual", "iterations")
 Cell = float | str
 
@@ -105,7 +105,7 @@ def _counted(file: Path, robot: Robot) -> LengthSamples:
 
 
 def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
-    """Header and one row a sample; with the time if the file has it."""
+    """Header and one row per sample; with the time if the file has it."""
     from sagline.kinematics.status import ForwardStatus
 
     units = {"x": "m", "y": "m", "z": "m", "force_residual": "N", "moment_residual": "N*m"}
@@ -119,7 +119,7 @@ def _rows(lengths: LengthSamples, found: ForwardSolution) -> list[list[Cell]]:
 
 
 def _grid(rows: list[list[Cell]]) -> TextTable:
-    """The first samples; the time or the number names each row."""
+    """The first samples; each row begins with its time or number."""
     header, body = [str(name) for name in rows[0]], rows[1 : SHOWN + 1]
     texts = [[cell if isinstance(cell, str) else number_text(cell, ".6g") for cell in row] for row in body]
     if not header[0].startswith("time"):

@@ -1,4 +1,4 @@
-"""The server of `sagline view`; further readings are compiled by another process while cables can be dragged."""
+"""The server of `sagline view`; kernels of further displayed values are compiled in another process meanwhile."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from sagline.viewer.page import Page
 
 LATER = "trimesh"  # a package that the viewer loads when it is needed
-ENTRY_OF = {  # by the names of the viewer's readings, in the order in which they are compiled
+ENTRY_OF = {  # entry by the name of the viewer's computation, in the order of compilation
     "WORKSPACE": SIGNED_MARGINS,
     "MARGIN": MARGINS,
     "POLYGON": POLYGON,
@@ -58,7 +58,7 @@ PATIENCE = 5.0  # s: longest wait for a compilation at the end
 
 
 class ServerAddress(NamedTuple):
-    """Address and port of the page, 0 for any free one, and True to open a browser here."""
+    """Address and port (0: any free port) of the page, and true to open a browser on this computer."""
 
     host: str
     port: int
@@ -82,14 +82,14 @@ def serve(
     meanwhile: Callable[[Page], AbstractContextManager[None]] = lambda _: nullcontext(),
     **page: Any,
 ) -> int:
-    """Serve a page until Ctrl-C, `meanwhile` around it; `page` is as `Page` takes it. Returns the exit code."""
+    """Serve a page until Ctrl-C inside the context `meanwhile`; `page`: arguments of `Page`. Returns the exit code."""
     from sagline.viewer import server as web
     from sagline.viewer.features import FEATURES
     from sagline.viewer.page import Page
 
     server = web.start_server(address.host, address.port, robot.name)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # from here on Ctrl-C is the normal end
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # from now on Ctrl-C is the normal end
     try:
         url = web.url(server, address.host)
         show_text(f"{robot.name} is at {url}   (Ctrl-C stops it)", whole=True)
@@ -116,14 +116,14 @@ def _has_display() -> bool:
 
 
 class CompiledReadings:
-    """The readings of the viewer whose kernels are compiled; `missing` has the words of the other entries."""
+    """State of compilation of the viewer's computations; `missing` has the words of the entries not yet compiled."""
 
     def __init__(self) -> None:
         """Find the entries that are not compiled."""
-        self.missing = not_compiled(ORDER)  # replaced as a whole, by the thread that compiles
+        self.missing = not_compiled(ORDER)  # the compiling thread replaces the whole list
 
     def ready(self, reading: Computation) -> bool:
-        """True if a reading needs no compilation."""
+        """True if a computation needs no compilation."""
         return ENTRY_OF[reading.name] not in self.missing
 
     @contextmanager
@@ -132,7 +132,7 @@ class CompiledReadings:
         serving = threading.get_ident()
 
         def tell(stage: Stage) -> None:
-            if threading.get_ident() == serving:  # the page shows only what its own thread waits for
+            if threading.get_ident() == serving:  # the page shows only compilations that its own thread waits for
                 viewer.wait(first_run_text([stage]))
 
         ended = threading.Event()

@@ -91,7 +91,7 @@ def encoder(
 
 
 def write_rows(plan: Plan, name: str, rows: Sequence[Sequence[float]], out: Path | None) -> int:
-    """Write rows of all samples at the feasible ones, with times; `name` formats a column; returns the exit code."""
+    """Write the rows of feasible samples, with times; `name` formats a column; returns the exit code."""
     kept = np.atleast_1d(plan.feasible)
     header = [name.format(k) for k in range(len(rows[0]))]
     body = [row for row, is_kept in zip(rows, kept, strict=True) if is_kept]

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from sagline.control.recording import Event
     from sagline.core.arrays import Array
 
-MOST_EVENTS: Final = 20  # that are listed
+MOST_EVENTS: Final = 20  # largest number of listed events
 MOST_PLANS: Final = 100_000
-# a cycle that began later than one and no later than the next [s]
+# limits of the classes of delay of a cycle [s]
 LATE: Final = (0.0, 1e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 1e-1, np.inf)
 EXTREME: Final = ("name", "value", "unit", "time", "cable")
 BAR: Final = 30  # characters of the longest bar
@@ -107,7 +107,7 @@ def _states(done: Execution) -> list[list[str]]:
 
 
 def _extremes(done: Execution) -> list[tuple[str, float, str, float, int | None]]:
-    """Name, value, unit, time [s] and cable of the largest errors; None for a cable where it is the platform's."""
+    """Name, value, unit, time [s] and cable of the largest errors; the cable is None for an error of the platform."""
     from sagline.control.execution import position_error
 
     errors: list[tuple[str, Array, str]] = [

@@ -27,7 +27,7 @@ NAMES = (
 )
 MODULES = {"encoder": "lengths", "show": "robots", "export-c": "export", "export-scl": "export"}  # else of their names
 DEBUG = "--debug"
-MOST_NAMES = 6  # of files that are listed after an error
+MOST_NAMES = 6  # largest number of files listed after an error
 START = """\
 Cable robots whose cables sag: from a robot and a path to proven cable lengths.
 
@@ -61,9 +61,9 @@ class _Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the arguments; an empty text is an error, because as a path it would mean the current folder."""
-        if not ctx.resilient_parsing:  # which is the shell's, for completion
+        if not ctx.resilient_parsing:  # resilient parsing is used for completion in the shell
             given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
-            parameter: Any  # typer has a kind of its own
+            parameter: Any  # typer has its own class of parameters
             for parameter in self.get_params(ctx):
                 value = given.get(parameter.name or "")
                 for text in value if isinstance(value, list | tuple) else (value,):
@@ -107,7 +107,7 @@ class _Group(TyperGroup):
         self.commands: Any = _Commands()
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **extra: Any) -> Any:
-        """Run one of them; `--debug` may stand anywhere."""
+        """Run a subcommand; `--debug` may be at any place."""
         words = (sys.argv[1:] if args is None else list(args)) or ["--help"]
         debug = DEBUG in words
         alone = extra.pop("standalone_mode", True)
@@ -131,7 +131,7 @@ class _Group(TyperGroup):
 app = typer.Typer(
     cls=_Group,
     no_args_is_help=True,
-    rich_markup_mode=None,  # plain help: the same words at every width, nothing folded, and no slabs of color
+    rich_markup_mode=None,  # plain help: equal text at every width, nothing folded, no colors
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from sagline.robot.pose import Pose, PoseBox
     from sagline.robot.robot import Robot
 
-MIDDLE = 0.5  # of the frame's edges: box of the printed feasible share
+MIDDLE = 0.5  # ratio to the frame's edges: box of the printed feasible share
 GRID = 7  # poses along each edge of a box
-NEARLY_ALL = 0.95  # feasible poses of a box that the file recommends
-_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # of the frame's edges, tried in this order
+NEARLY_ALL = 0.95  # smallest feasible share of the box in the file
+_BOXES = (0.7, 0.6, 0.5, 0.4, 0.3, 0.2)  # ratios to the frame's edges, tried in this order
 
 
 ROPE_NAMES = "dyneema-sk78, dyneema-sk62, steel-6x19, steel-7x19"
@@ -161,7 +161,7 @@ def _design(name: str, said: dict[str, str]) -> Design:
         layout=layout,
     )
     if len(said) == len(QUESTIONS):
-        design.robot()  # checks that the rope carries the platform
+        design.robot()  # checks that the rope can support the platform
     return design
 
 

@@ -1,4 +1,4 @@
-"""Arguments and options of the subcommands: how they are declared, and those that several of them share."""
+"""Arguments and options of the subcommands: functions to declare them, and common ones."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class ModelName(StrEnum):
 
 
 class TensionVariable(StrEnum):
-    """Tensions between which a tension distribution is optimal."""
+    """Kinds of tension for which a tension distribution is optimal."""
 
     CHORD = "chord"
     HORIZONTAL = "horizontal"
@@ -114,7 +114,7 @@ def figures_flag(text: str) -> Any:
 
 
 def _unchanged(value: Any) -> Any:
-    """The value: a callback converts it, because an error of a parser would lose its form."""
+    """The unchanged value; a callback converts it, because typer would reformat the error of a parser."""
     return value
 
 

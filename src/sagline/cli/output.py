@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SUFFIXES = ("png", "svg")  # of a figure
+SUFFIXES = ("png", "svg")  # formats of a figure
 
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table of texts; it is split between columns where it is too wide, and no cell is ever cut.
+    """A table of texts; it is split between columns if it is too wide; cells are never cut.
 
     Attributes:
-        heads: Heads of the columns; they may have lines.
-        rows: A text for each column.
+        heads: Heads of the columns; they may have several lines.
+        rows: One text per column in each row.
         title: Title of the table; "" for none.
-        keys: Number of first columns that name a row; they are repeated in each piece.
-        left: Numbers of the columns that are set flush left; the others are flush right.
-        prose: Numbers of the columns that may be broken into lines, between words.
+        keys: Number of leading columns that name a row; they are repeated in each piece.
+        left: Indices of the left-aligned columns; other columns are right-aligned.
+        prose: Indices of the columns that may be broken into lines, between words.
     """
 
     heads: Sequence[str]
@@ -110,7 +110,7 @@ def _split(columns: range, count: int) -> Iterable[range]:
 
 def number_text(number: float, form: str) -> str:
     """A number with a true minus sign; a dash for NaN."""
-    return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no minus zero
+    return "–" if isnan(number) else format(number, f"z{form}").replace("-", "−")  # z: no negative zero
 
 
 def csv_text(rows: Iterable[Sequence[object]]) -> str:
@@ -146,7 +146,7 @@ class Output:
                 save(figure, self.file(f"{name}.{suffix}"))
 
     def report(self, record: Callable[[], Mapping[str, object]], tell: Callable[[], None], *, as_json: bool) -> None:
-        """Print a record and the files as JSON, or what `tell` prints and the files for a person."""
+        """Print a record and the files as JSON, or the text of `tell` and the files."""
         if as_json:
             show_json({**record(), "files": self.files})
         else:
@@ -154,7 +154,7 @@ class Output:
             self.show()
 
     def show(self) -> None:
-        """Print the folder and the names of the files in it; the two forms of a figure are one name."""
+        """Print the folder and the names of the files in it; the two formats of a figure share one name."""
         if not self.files:
             return
         suffixes: dict[str, list[str]] = {}

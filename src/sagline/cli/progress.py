@@ -1,4 +1,4 @@
-"""The progress line: the work, the time left, and the kernels that are compiled before it."""
+"""The progress line: the work, the remaining time, and the compilation of kernels before the work."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ PATIENCE = 2.0  # s: work that takes longer shows a bar and the time left
 
 
 class ProgressLine:
-    """One live line on a terminal; elsewhere a line for each entry that is compiled."""
+    """One live line on a terminal; elsewhere one line per compiled entry."""
 
     def __init__(self, console: Console, bar: Progress, what: str) -> None:
-        """Add the work to a bar, which is disabled outside a terminal."""
+        """Add the work to a progress bar; the bar is disabled outside a terminal."""
         self._console = console
         self._bar = bar
         self._what = what = printable(what)

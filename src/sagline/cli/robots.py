@@ -111,7 +111,7 @@ def _short(robot: Robot) -> dict[str, Any]:
 
 
 def _frame(robot: Robot) -> Array:
-    """Edges of the frame; if it has none, of the box that holds its anchors and reaches down to the floor."""
+    """Edge lengths of the frame; without a frame, those of the box from the floor around the anchors."""
     if robot.frame_size is not None:
         return robot.frame_size
     low, high = robot.frame_anchors.min(axis=0), robot.frame_anchors.max(axis=0)
@@ -120,7 +120,7 @@ def _frame(robot: Robot) -> Array:
 
 
 def _platform(robot: Robot) -> Array:
-    """Edges of the platform; if it has none, of the box that holds its anchors."""
+    """Edge lengths of the platform; if not given, those of the box around its anchors."""
     extent: Array = np.ptp(robot.platform_anchors, axis=0)
     return extent if robot.platform_size is None else robot.platform_size
 
@@ -167,7 +167,7 @@ def _parts_of(deviations: Mapping[str, Array]) -> dict[str, Any]:
 
 
 def _deviations(deviations: Mapping[str, Array], head: str) -> TextTable:
-    """Standard deviations of numbers: one where all of a field are alike."""
+    """Table of standard deviations; one number for a field if all its values are equal."""
     from sagline.robot.tolerances import UNCERTAIN
 
     rows = []
@@ -211,7 +211,7 @@ def _winches(robot: Robot, winches: Winch) -> TextTable:
 
 
 def _spread(value: Any, digits: int = 5) -> str:
-    """One value for all cables, or all of them; counts need more digits than lengths."""
+    """One value if all cables have it, otherwise all values; counts need more digits than lengths."""
     if isinstance(value, str | list):
         return value if isinstance(value, str) else f"({', '.join(value)})"
     return f"{value[0]:.{digits}g}" if np.all(value == value[0]) else _numbers(value, digits)

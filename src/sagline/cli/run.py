@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ROBOTS = ("article-suspended", "article-mixed")
 FIGURES = ("figure-18-path", "figure-19-velocity", "figure-20-suspended", "figure-21-mixed", "figure-22-error")
 HULLS = ("hull-suspended", "hull-mixed")  # workspaces with sag, the article's future work
-CELLS = 20  # along the longest edge of the frame: half a second a robot, volumes to 0.2 %
+CELLS = 20  # along the longest edge of the frame: half a second per robot, error of volumes 0.2 %
 
 
 def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:

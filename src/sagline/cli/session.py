@@ -25,12 +25,12 @@ from sagline.robot.pose import Pose
 EVERY: Final = 0.2  # s between two updates of the status line
 PROMPT: Final = "> "
 FAILED: Final = 1  # exit code after a fault
-LATE: Final = 0.02  # s, above which a note is printed at the end
+LATE: Final = 0.02  # s, delay above which a note is printed at the end
 AXES: Final = ("x", "y", "z")
 
 
 class StatusLine:
-    """Last line of a terminal, which does not scroll with the lines above; without effect elsewhere."""
+    """Last line of a terminal, which does not scroll with the lines above; no effect if stdout is not a terminal."""
 
     def __init__(self, *, shown: bool) -> None:
         """Use stdout, if `shown` and if it is a terminal."""
@@ -92,15 +92,15 @@ class OperatorSession:
     """Lines that are read, cycles of the controller, and events that are printed."""
 
     def __init__(self, controller: Controller, *, alone: bool, shadow: bool) -> None:
-        """Prepare a session: `alone` for lines from a pipe, which wait for one another; `shadow` to read only."""
+        """Prepare a session; `alone`: lines from a pipe, each waits for the previous one; `shadow`: read only."""
         control = controller
         self.control, self._alone, self._shadow = controller, alone, shadow
         self._event_count = 0
         self._ended = self._is_interrupted = False
-        self._wait = 0  # cycles
+        self._wait = 0  # cycles to wait
         self._lines: SimpleQueue[_Line] = SimpleQueue()
         self._line = StatusLine(shown=not alone)
-        # arguments, help, parser of the arguments and action, by the first word
+        # by command: arguments, help, parser of the arguments, and action
         self._words: dict[str, tuple[str, str, Callable[[str], Any], Callable[..., object]]] = {
             "home": (
                 "[X,Y,Z[,A,B,C]]",
@@ -203,7 +203,7 @@ class OperatorSession:
         self._line.update(self._status)
 
     def _next_line(self) -> _Line | None:
-        """The next line: at once from an operator, from a pipe when the platform is at rest."""
+        """Next line: immediately from an operator; from a pipe only when the platform is at rest."""
         if self._wait or (self._alone and self.control.moving):
             return None
         if self._alone and self.control.state in (State.FAULT, State.EMERGENCY):

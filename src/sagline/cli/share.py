@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from sagline.share.course import SharedMotion
 
 ENDINGS: Final = (".html", ".htm")
-HEAD: Final = 2000  # bytes of a page that have its mark
+HEAD: Final = 2000  # first bytes of a page, which contain its mark
 
 
 def share(
@@ -106,7 +106,7 @@ def _log(source: Path) -> SharedMotion:
 
 
 def _free(file: Path) -> Path:
-    """The default file; FileError if it exists and is no page of sagline."""
+    """The default file; FileError if it exists and is not a page of sagline."""
     from sagline.share.page import MADE
 
     check_file(file)

@@ -28,7 +28,7 @@ from sagline.tension.method import TensionMethod
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
 
-ROWS = {  # of a summary: label and number format
+ROWS = {  # rows of a summary: label and number format
     "position_error_max_mm": ("position error, largest [mm]", ".3g"),
     "position_error_mean_mm": ("position error, mean [mm]", ".3g"),
     "chord_tension_min_n": ("chord tension, smallest [N]", ".1f"),
@@ -41,9 +41,9 @@ ROWS = {  # of a summary: label and number format
     "inverse_us_per_pose": ("inverse kinematics [µs a pose]", ".2f"),
 }
 NARROW, WIDE = 10, 30  # characters of a column's head: four narrow ones fit a line of 80
-MOST_GAPS = 5  # that are printed
+MOST_GAPS = 5  # largest number of printed gaps
 WIDEN = " Move the path, or widen the tension limits."
-SAME_PLACE = 1e-6  # m: far above rounding, far below the distance of a second equilibrium
+SAME_PLACE = 1e-6  # m: far above rounding errors, far below the distance to a second equilibrium
 
 
 class ConfirmedRun(NamedTuple):
@@ -59,14 +59,14 @@ class ConfirmedRun(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Robot and model, as files are named."""
+        """Name of the files: robot and model."""
         return run_name(self.plan.state.one_robot, self.plan.state.cables.model)
 
     @property
     def lost(self) -> int:
         """Number of planned poses without a stable equilibrium of the platform."""
         stays = self.confirmation.held
-        if isinstance(self.plan.state.cables.model, Catenary):  # planned exactly: elsewhere is another equilibrium
+        if isinstance(self.plan.state.cables.model, Catenary):  # exact plan: elsewhere is another equilibrium
             stays = stays & (np.linalg.norm(self.confirmation.position_error, axis=-1) < SAME_PLACE)
         return int(np.sum(self.plan.feasible & ~stays))
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from sagline.robot.robot import Robot
     from sagline.tension.method import TensionMethod
 
-LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at one pose their tensions are those of others
+LEFT_OUT = ("Closest", "QuadraticProgram", "PolygonWalk")  # at one pose their tensions equal those of other methods
 
 
 def tension(
@@ -72,7 +72,7 @@ def tension(
     with working(f"{robot.name}: tension distributions", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
         least = inverse(
             robot, place, model.build(), MinimumNorm(variable.value), wrench
-        )  # raises what no method can do
+        )  # raises an error if no method applies
         plans = {
             title: _plan(robot, place, model, method(variable.value), wrench)
             for title, method in METHODS.items()

@@ -21,10 +21,10 @@ from sagline.files.writing import json_text
 if TYPE_CHECKING:
     from sagline.cli.progress import ProgressLine
 
-FREE = 1 << 16  # columns of a file or a pipe
+FREE = 1 << 16  # width of a file or a pipe
 
 _out = Console(highlight=False, markup=False, emoji=False)
-_wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # of files and pipes
+_wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # for files and pipes
 _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
@@ -40,7 +40,7 @@ def working(what: str, *needed: str) -> Iterator[ProgressLine]:
 
 @contextmanager
 def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None]]:
-    """The same for parts with names; yields a function of the number done, their total and the name of the next."""
+    """Show progress of named parts; yields a function of the number done, the total and the name of the next part."""
     with working(what, *needed) as line:
 
         def tell(done: int, total: int, name: str) -> None:
@@ -90,7 +90,7 @@ def show_text(what: str, indent: int = 0, style: str = "", *, whole: bool = Fals
 
 
 def show_pieces(pieces: Callable[[Console, int], Iterable[tuple[RenderableType, int]]]) -> None:
-    """Print parts of the result, made for the width of the terminal, each with its least width."""
+    """Print parts of the result, made for the width of the terminal, each with its smallest width."""
     console = _out if _out.is_terminal else _wide
     for piece, least in pieces(console, console.width):
         _emit(piece, max(console.width, least))
@@ -126,7 +126,7 @@ def _emit(what: RenderableType, width: int | None = None) -> None:
     console = _out if _out.is_terminal else _wide
     with _refused(), console.capture() as captured:
         console.print(what, width=width, soft_wrap=width is None, crop=False)
-    _write(captured.get().replace(SPACE, " "))  # so that text can be searched in a pipe
+    _write(captured.get().replace(SPACE, " "))  # plain spaces, so that text in a pipe can be searched
 
 
 def _write(text: str) -> None:

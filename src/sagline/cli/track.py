@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from sagline.motion.path import Path as MotionPath
     from sagline.robot.robot import Robot
 
-TOO_FAR = 100.0  # times the robot's size, as of measured lengths
+TOO_FAR = 100.0  # times the robot's size, as for measured lengths
 FIGURES = ("path", "velocity", "cables", "error")
 
 

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from sagline.twin.machine import Machine
     from sagline.twin.server import Server
 
-LOOK: Final = 0.1  # s, between two looks at what the PLCs do
-LATE: Final = 0.05  # s, by which a scan may be late without a word
+LOOK: Final = 0.1  # s between two checks of the PLCs
+LATE: Final = 0.05  # s, largest delay of a scan without a message
 STATUS: Final = {  # the first that holds, by the names of `GroupStatus`
     "EMERGENCY": "emergency stop",
     "LOCKED": "drums locked",

@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from sagline.workspaces.wrench_sets import WrenchSet
 
 LAST_PORT = 65535
-MOST_POSES = 1_000_000  # of a grid
+MOST_POSES = 1_000_000  # largest number of poses of a grid
 HEAVIEST = 1e12  # kg: beyond all machines, far below what overflows
 
 _KINDS: Final = {"force": "N", "moment": "N m", "linear": "m/s^2", "angular": "rad/s^2"}  # of loads, and their units
 _SIGN: Final = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
 _SPAN: Final = re.compile(r"(.*?)(?:\.\.|\bto\b)(.*)", re.DOTALL)
-_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # and no exponent
+_UNIT: Final = re.compile(r"(?!e[-+]?[0-9])[a-zµ].*", re.IGNORECASE | re.DOTALL)  # excludes an exponent
 _POINTS: Final = re.compile(r"([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})\s*[x×]\s*([0-9]{1,4})")
 _STEP: Final = "Give forces, moments and accelerations with units: --wrench '±100 N, ±20 N m'."
-_LONGEST: Final = 200  # letters of a set of loads or a box
+_LONGEST: Final = 200  # largest number of characters of a set of loads or a box
 
 
 def quantity(text: str, item: str, unit: str, *, low: float = -np.inf, above: float = -np.inf) -> float:
-    """A number in SI from a text with or without unit, "20" or "20 kg"; from `low` on, or above `above`."""
+    """A number in SI from a text with or without unit, "20" or "20 kg"; at least `low` and greater than `above`."""
     number = cast(float, in_si(text, unit, item))
     if abs(number) > HEAVIEST:
         raise InvalidValueError(item, repr(text), f"up to {HEAVIEST:g} {unit}", f"Correct {item}.")
@@ -77,7 +77,7 @@ def robot_with_payload(name: str, payload: float | None) -> Robot:
 def wrenches_of(text: str, item: str) -> WrenchSet:
     """A set of loads: "±100 N, ±20 N m", "±2 m/s^2", or one wrench from "fx,fy,fz[,mx,my,mz]".
 
-    One number of a kind counts along all axes, three along x, y and z.
+    One number of a kind applies to all axes; three numbers apply to x, y and z.
     """
     from sagline.workspaces.wrench_sets import Accelerations, WrenchBox, WrenchPolytope
 
@@ -117,7 +117,7 @@ def _load_of(part: str, item: str) -> tuple[str, float]:
 
 
 def points_of(text: str, item: str) -> tuple[int, ...]:
-    """Numbers of points of a grid along x, y and z, from "20x15x8"."""
+    """Point counts of a grid along x, y and z, from "20x15x8"."""
     found = _POINTS.fullmatch(text.strip())
     points = tuple(map(int, found.groups())) if found else (0,)
     if not 0 < prod(points) <= MOST_POSES:

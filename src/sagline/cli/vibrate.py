@@ -52,10 +52,10 @@ class _Direction(StrEnum):
     ABOUT_Z = "about z"
 
 
-LEAST_SHARE = 0.05  # of the platform in a mode that is shown; the file has all modes
+LEAST_SHARE = 0.05  # smallest share of the platform in a printed mode; the file has all modes
 COLUMNS = ("mode", "kind", "frequency_hz", "platform_share", "cable", "cable_share", "damping_ratio")
-LOWEST = 3  # modes that are shown in any case
-FIGURES = ("frequency", "peak")  # of a map
+LOWEST = 3  # lowest modes that are always printed
+FIGURES = ("frequency", "peak")  # figures of a map
 
 
 _PointsOption = Annotated[
@@ -159,7 +159,7 @@ def _check_film(film: int | None, modes: list[ListedMode]) -> None:
 
 
 def _tell(found: Vibration, modes: list[ListedMode], state: Equilibrium) -> None:
-    """Print the table, with each massless mode beside the mode that has most of its motion."""
+    """Print the table; each massless mode is in the row of the mode most similar to it."""
     from sagline.dynamics.vibration.mode_list import MASSLESS, WITH_MASS, mode_correlation
 
     swinging = [mode for mode in modes if mode.kind == WITH_MASS]

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from sagline.viewer.session import LogFollower, PlayedLog
 
 LOG: Final = ".mcap"
-LOOK: Final = 0.5  # s, between two looks at a file that grows
+LOOK: Final = 0.5  # s between two checks of a growing file
 
 
 _RobotOption = Annotated[
@@ -102,7 +102,7 @@ def view(
         item, step = "--live" if live else "--truth", "Give one: sagline view run.mcap."
         raise InvalidValueError(item, "given without a log", "a log in MCAP", step)
     found = run if run is not None and _is_calibration(run) else None
-    if found is None and Path(robot).suffix.lower() == ".nc":  # no robot has this suffix: its reader says what is wrong
+    if found is None and Path(robot).suffix.lower() == ".nc":  # no robot file: the reader reports the error
         found = Path(robot)
     alone = {"--wrench": wrench, "--payload": payload, "--pose": pose, "--mode": mode}
     given = [item for item, value in alone.items() if value is not None]
@@ -220,14 +220,14 @@ def played_beside(robot: Robot, first: Path, second: Path) -> Beside:
 
 
 def _check_robot(file: Path, kind: str, made_for: Robot, robot: Robot, *, alone: bool = False) -> None:
-    """Raise FileError for a file of another robot; the advice names the file alone, or the robot too."""
+    """Raise FileError for a file of another robot; the next step names the file only, or the file and the robot."""
     if made_for.name != robot.name:
         step = f"View it as: sagline view {file if alone else f'{made_for.name} {file}'}"
         raise FileError(file, f"is a {kind} of {made_for.name}, not of {robot.name}", step)
 
 
 def _first_session(follower: LogFollower, logs: list[Path], *, live: bool) -> PlayedLog:
-    """The cycles in a log; of a live one, as soon as all logs have begun and there is a cycle."""
+    """Cycles in a log; for live logs, waits until all logs have begun and contain a cycle."""
     from sagline.files.mcap_reader import has_begun
 
     while live and not all(map(has_begun, logs)):

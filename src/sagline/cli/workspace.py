@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from sagline.workspaces.proof import Proof
     from sagline.workspaces.space import Limit, Workspace
 
-MOST_LIMITS = 12  # shares that are shown
+MOST_LIMITS = 12  # largest number of printed limits
 LoadsOption = Annotated[
     Any,
     converted_option(
@@ -164,7 +164,7 @@ def workspace(
     }
     cable = model.build()
     criteria = _criteria(name, limits, scene, in_frame=in_frame)
-    if tilt > pi:  # a number without unit is in radians
+    if tilt > pi:  # the user may have meant degrees: a number without unit is in radians
         step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
         raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = robot_with_payload(name, payload)
@@ -195,7 +195,7 @@ def workspace(
 
                 line.stage("drawing")
                 output.draw(plot.workspace(space))
-                if space.unit == "m³":  # of a plane the first figure is the slice
+                if space.unit == "m³":  # for a plane the first figure is the slice
                     output.draw(plot.slice(space))
     output.report(lambda: _record(space, proof), lambda: _tell(space, proof), as_json=as_json)
     if space.nearest is not None:

@@ -1,9 +1,9 @@
 """Lossless compression of columns of numbers, and of data sets inside other files.
 
-Measured and planned values are smooth in time. A column is taken as integers (scaled decimals where all values have
-few, otherwise the bits of the floats, which are ordered as the numbers are), and differences of the order from 0 to 5
-that takes the fewest bits are kept. Their upper bytes are nearly all zero; bytes of equal weight are stored together,
-so that zstandard compresses them to almost nothing.
+Measured and planned values are smooth in time. A column is converted to integers: scaled decimals if all values have
+few decimals, otherwise the bits of the floats (their order is that of the numbers). Differences of order 0 to 5 are
+stored; the order with the fewest bits is chosen. Their upper bytes are nearly all zero. Bytes of equal weight are
+stored together, so zstandard compresses them strongly.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 MOST_ORDER: Final = 5
-LEVEL: Final = 9  # of zstandard: above it takes much longer and saves little
+LEVEL: Final = 9  # level of zstandard; higher levels take much longer and save little
 TYPES: Final = ("float64", "int64", "int8", "bool")
-_EXACT: Final = 2.0**53  # whole numbers that floats have all of
+_EXACT: Final = 2.0**53  # all integers below this are exact floats
 _GAPS: Final = np.iinfo(np.int64).min + np.arange(3)  # codes of NaN, infinite and -infinite among decimals
 _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 
@@ -34,17 +34,17 @@ _GAP_VALUES: Final = np.array([np.nan, np.inf, -np.inf])
 class _Column:
     """Head of a packed column."""
 
-    name: str  # what it is called
-    type: str  # of its numbers
-    shape: tuple[int, ...]  # its own
-    decimals: int  # how many its numbers have at most; -1: the bits of its floats are kept, or it is whole
-    order: int  # of the differences
+    name: str  # name of the column
+    type: str  # type of the values
+    shape: tuple[int, ...]  # shape of the column
+    decimals: int  # largest number of decimals; -1: stored as the bits of floats, or integers
+    order: int  # order of the differences
 
 
 def round_decimals(values: NDArray[np.float64], decimals: int) -> NDArray[np.float64]:
-    """Nearest numbers with so many decimals, each the float that its digits are read as; no -0.0."""
+    """Numbers rounded to `decimals`, each the float nearest to the decimal; no -0.0."""
     scale = 10.0**decimals
-    whole = np.abs(values) < _EXACT / scale  # beyond it a float has no such decimals
+    whole = np.abs(values) < _EXACT / scale  # larger floats have no such decimals
     return np.asarray(np.where(whole, np.rint(np.where(whole, values, 0.0) * scale) / scale, values) + 0.0)  # no -0.0
 
 
@@ -54,9 +54,9 @@ def pack(
     rest: Callable[[], Any] = int,
 ) -> bytes:
     """Pack columns, first axis first, without loss."""
-    # columns: floats, whole numbers or flags of any shape; the first axis is the course
-    # decimals: of columns that may have no more than so many: one that has more is kept bit by bit
-    # rest: called between two columns, for a thread that should let others go on
+    # columns: floats, integers or flags of any shape; the first axis is time
+    # decimals: expected number of decimals by column; a column with more decimals is stored bit by bit
+    # rest: called between two columns, so that other threads can run
     from zstandard import compress
 
     known = decimals or {}
@@ -72,7 +72,7 @@ def pack(
 
 
 def unpack(data: bytes) -> dict[str, NDArray[Any]]:
-    """The columns that `pack` packed, the same to the last bit."""
+    """Columns packed by `pack`, equal to the last bit."""
     from zstandard import ZstdDecompressor, ZstdError, get_frame_parameters
 
     try:
@@ -85,7 +85,7 @@ def unpack(data: bytes) -> dict[str, NDArray[Any]]:
         start = 4 + int.from_bytes(plain[:4], "little")
         heads = json.loads(plain[4:start])
         columns = [_Column(name, kind, tuple(shape), *rest) for name, kind, shape, *rest in heads]
-    except (ZstdError, TypeError, ValueError) as error:  # the last is that of JSON too
+    except (ZstdError, TypeError, ValueError) as error:  # ValueError is raised by JSON too
         raise ValueError(f"no packed columns ({error})") from None
     found: dict[str, NDArray[Any]] = {}
     for column in columns:
@@ -100,7 +100,7 @@ def unpack(data: bytes) -> dict[str, NDArray[Any]]:
 
 
 def _count(column: _Column) -> int:
-    """Number of values of a column; ValueError if its head is none that `pack` writes."""
+    """Number of values of a column; ValueError if `pack` does not write such a head."""
     sizes = all(0 <= size < 1 << 40 for size in column.shape)
     if not (
         column.type in TYPES and sizes and column.order in range(MOST_ORDER + 1) and column.decimals in range(-1, 16)
@@ -110,7 +110,7 @@ def _count(column: _Column) -> int:
 
 
 def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]:
-    """Numbers as whole ones, and how many decimals were taken away; -1 for none, or for bits."""
+    """Values as integers, and the number of decimals they are scaled by; -1 for integers or for bits of floats."""
     if values.dtype.name not in TYPES:
         raise TypeError(f"columns of {values.dtype} are not packed")
     if values.dtype != np.float64:
@@ -132,14 +132,14 @@ def _whole(values: NDArray[Any], decimals: int) -> tuple[NDArray[np.int64], int]
 
 
 def _decimal(whole: NDArray[np.int64], decimals: int) -> NDArray[np.float64]:
-    values = np.asarray(whole / 10.0**decimals)  # the float nearest to the decimal: both are exact
+    values = np.asarray(whole / 10.0**decimals)  # the float nearest to the decimal, as both operands are exact
     for gap, value in zip(_GAPS, _GAP_VALUES, strict=True):
         values[whole == gap] = value
     return values
 
 
 def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
-    """The order whose differences take the fewest bits, and these, with the sign in the lowest bit."""
+    """Order whose differences need the fewest bits, and these differences with the sign in the lowest bit."""
     best: tuple[float, int, NDArray[np.uint64]] | None = None
     for order in range(MOST_ORDER + 1):
         small = ((whole << 1) ^ (whole >> 63)).view(np.uint64)
@@ -152,7 +152,7 @@ def _smallest(whole: NDArray[np.int64]) -> tuple[int, NDArray[np.uint64]]:
 
 
 def _planes(small: NDArray[np.uint64]) -> bytes:
-    """Bytes of equal weight together, column by column."""
+    """Bytes grouped by weight, column by column."""
     courses = np.ascontiguousarray(small.T).view(np.uint8)
     return courses.reshape(-1, 8).T.tobytes()
 
@@ -180,14 +180,14 @@ def pack_dataset(data: Dataset) -> bytes:
         if labels is None:
             numbers[str(name)] = values
         variables[str(name)] = [variable.dims, variable.attrs, labels]
-    # a plain number is no array, and JSON knows neither those of numpy
+    # numbers and arrays of numpy are converted for JSON
     head = json.dumps({"attributes": data.attrs, "variables": variables}, default=lambda value: value.tolist())
     text = head.encode()
     return b"".join((len(text).to_bytes(4, "little"), text, pack(numbers)))
 
 
 def unpack_dataset(data: bytes) -> Dataset:
-    """The data set that `pack_dataset` packed."""
+    """Data set packed by `pack_dataset`."""
     from xarray import Coordinates, Dataset
 
     end = 4 + int.from_bytes(data[:4], "little")

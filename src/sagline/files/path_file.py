@@ -24,7 +24,7 @@ PLACE = ("time", "x", "y", "z")
 EULER = ("alpha", "beta", "gamma")
 QUATERNION = ("qx", "qy", "qz", "qw")
 UNITS = dict(zip(PLACE + EULER + QUATERNION, ("s", "m", "m", "m", "rad", "rad", "rad", "", "", "", ""), strict=True))
-_LEAST_STEP = 1e-12  # s; over less, differences of positions give no velocity
+_LEAST_STEP = 1e-12  # s; shortest time step for which differences of positions give a velocity
 TIMING_UNITS = {
     "rate": "1/s",
     "durations": "s",
@@ -62,7 +62,7 @@ def _path_from_table(path: FilePath, text: str) -> Path:
 
 
 def _check_columns(table: CsvTable) -> None:
-    """Refuse a table that gives no position, or an orientation in half or in two ways."""
+    """Refuse a table without a position, or with an incomplete or a double orientation."""
     orientation = table.columns.keys() & set(EULER + QUATERNION)
     wanted = PLACE + next((way for way in (EULER, QUATERNION) if orientation & set(way)), ())
     table.check_columns(wanted, f"; found: {', '.join(table.columns)}")
@@ -89,22 +89,22 @@ def load_path(file: str | os.PathLike[str]) -> Path:
           - {position: [2 m, 1500 mm, 1.5], euler: {alpha: 20 deg}}        # alpha about z, beta about y, gamma about x
           - {position: [2, 1, 1.5], quaternion: [0, 0, 0.6, 0.8]}          # x, y, z, w
 
-    Poses to calibrate by, as their `save` writes them, are such a file, with the tensions and lengths of each waypoint.
+    Calibration poses written by their `save` have this format, with the tensions and lengths of each waypoint.
 
     A CSV file has one row for each sample, below a header `time,x,y,z`, followed by `alpha,beta,gamma`, by
     `qx,qy,qz,qw`, or by nothing for a constant orientation. Units are in brackets, `time [s],x [mm],...,alpha [deg]`;
-    without, they are s, m and rad. Velocity and acceleration are those of a spline (see `path_from_samples`).
+    the defaults are s, m and rad. Velocity and acceleration are those of a spline (see `path_from_samples`).
 
-    Quaternions in either file have length 1 to the 1e-3 of few printed decimals, and are normalized.
+    Quaternions in either file have length 1 within 1e-3 (rounding of printed decimals), and are normalized.
 
     Args:
-        file: The file; its suffix says which of the two it is.
+        file: The file; its suffix selects the format.
 
     Returns:
         The path.
 
     Raises:
-        FileError: If the file cannot be read, or what it says is no path; the message names the line or the key.
+        FileError: If the file cannot be read, or is not a path; the message names the line or the key.
 
     Examples:
         >>> import sagline as sl
@@ -125,7 +125,7 @@ def load_path(file: str | os.PathLike[str]) -> Path:
 
 
 class _Waypoint(PoseEntry):
-    """A pose, and what `CalibrationPoses.save` writes beside it: how the cables are wound there, which is no path."""
+    """A pose, and the tensions and lengths that `CalibrationPoses.save` adds; a path does not use these."""
 
     frame_end_tension: Any = None
     unstrained_length: Any = None

@@ -86,7 +86,7 @@ QUANTITIES = (
     ),
 )
 
-# of a plan whose cables have something behind them
+# variables of a plan with pulleys or drums behind the frame anchors
 MACHINE = (
     Quantity("free_length", CABLE, "m", "unstrained length of the free cable", known=SOLVED, low=0.0),
     Quantity(
@@ -115,7 +115,7 @@ MACHINE = (
     ),
 )
 
-# of one whose friction counts
+# variable of a plan with friction
 WINDING = Quantity(
     "winding",
     CABLE,
@@ -125,7 +125,7 @@ WINDING = Quantity(
     low=-1.0,
 )
 
-# of a plan that has them; one of a file written before they were kept has none
+# proofs of infeasibility; older files do not have them
 PROOF = (
     Quantity(
         "farkas",
@@ -156,7 +156,7 @@ PROOF = (
     ),
 )
 
-# of a path only
+# variable of a plan along a path
 TIME = Quantity("time", (), "s", "time from the start of the path", "path.time")
 MOTION = (
     Quantity("twist", ("twist_part",), "m/s, rad/s", "velocity of the platform origin, angular velocity", "path.twist"),
@@ -168,13 +168,13 @@ MOTION = (
         "path.twist_rate",
     ),
 )
-# of a path whose jerk is known
+# variable of a path with known jerk
 JERK = Quantity("jerk", ("twist_part",), "m/s^3, rad/s^3", "rate of twist_rate", "path.jerk")
-RESTS = "rests"  # of a path whose rests are known
+RESTS = "rests"  # attribute of a path with known rests
 
 
 def _check_plan(data: Dataset, cables: int) -> None:
-    """Refuse a data set that is no plan of a robot with this number of cables."""
+    """Refuse a data set that is not a plan of a robot with this number of cables."""
     status = data.variables["pose_status"]
     rows = tuple(str(name) for name in status.dims)
     if rows not in ((), ("pose",)):
@@ -190,18 +190,18 @@ def _check_plan(data: Dataset, cables: int) -> None:
 def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
     """Write a plan to a NetCDF file atomically.
 
-    Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Poses without
-    an answer are kept, with their status, shortfall, blocking cables and proof, and NaN lengths and forces. A digest
-    over all values and attributes is at the end, behind the data of NetCDF, and detects changes.
+    Dimensions are pose (absent for a single pose) and cable; a path's times are a coordinate of pose. Infeasible
+    poses are included, with their status, shortfall, blocking cables and proof, and NaN lengths and forces. A digest
+    over all values and attributes follows the NetCDF data and detects changes.
 
     Args:
         plan: The plan, of one robot.
-        file: The file, "run.nc" for instance; a regular file that exists is replaced, anything else is refused.
+        file: The file, "run.nc" for instance; an existing regular file is replaced, any other target is refused.
 
     Raises:
-        InvalidValueError: If the plan is of several robots, one a pose; of a cable model or a tension method that is
-            none of sagline's; or if its values are none that `inverse` gives.
-        FileError: If the file cannot be written; what was there before is untouched.
+        InvalidValueError: If the plan has several robots (one per pose), a cable model or a tension method that is not
+            part of sagline, or values that `inverse` cannot give.
+        FileError: If the file cannot be written; an existing file is then unchanged.
 
     Examples:
         >>> import sagline as sl
@@ -215,20 +215,20 @@ def save_plan(plan: Plan, file: os.PathLike[str] | str) -> None:
 
 
 def load_plan(file: os.PathLike[str] | str) -> Plan:
-    """Read a plan that `save_plan` wrote: the same plan to the last bit.
+    """Read a plan written by `save_plan`; all numbers are equal to the last bit.
 
     Args:
         file: The NetCDF file.
 
     Returns:
-        The plan; its proofs, from `farkas` on, are None in a file that was written before files kept them.
+        The plan; its proofs (`farkas` and the following fields) are None if an older file does not contain them.
 
     Raises:
-        FileError: If the file is missing, cut off, no NetCDF file, no plan, of a newer format, or not as it was
-            written: its digest, shapes, units, status codes and signs are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a plan, of a newer format, or changed
+            after it was written: its digest, shapes, units, status codes and signs are checked.
 
     Warns:
-        SaglineWarning: If the file is from before files carried a digest.
+        SaglineWarning: If the file has no digest because an older version wrote it.
 
     Examples:
         >>> import sagline as sl
@@ -242,7 +242,7 @@ def load_plan(file: os.PathLike[str] | str) -> Plan:
 
 
 def _warn_of_damage(path: FilePath) -> None:
-    """Warn that damage to a file without a digest need not show; the caller of `load_plan` is meant."""
+    """Warn that damage of a file without a digest may be undetected; the warning names the caller of `load_plan`."""
     text = f"{path} is from before plans carried a digest: damage to it need not show. Save it again to have one."
     warnings.warn(text, SaglineWarning, stacklevel=4)
 
@@ -271,7 +271,7 @@ def _attributes(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
-    """Plan of a data set that `plan_dataset` made; file and name of the robot are for messages."""
+    """Plan of a data set made by `plan_dataset`; path and item are used in messages."""
     robot = robot_of(path, data, item)
     _check_plan(data, robot.cable_count)
     behind = MACHINE[0].name in data.variables
@@ -281,7 +281,7 @@ def plan_of_dataset(path: FilePath, data: Dataset, item: str = "robot") -> Plan:
     found = fields_of(data, (*QUANTITIES, *MACHINE, WINDING, TIME, *MOTION, JERK))
     state, motion = found["state"], found.get("path")
     pose = Pose.from_quaternion(**state["pose"])
-    spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # over a pulley that of the free span
+    spans = {"chord_tension": found["chord_tension"], **state["cables"]}  # of the free span at a pulley
     cables = CableState(
         model=choice_of(path, data.attrs, "model", MODELS),
         cable=robot.cables,
@@ -310,7 +310,7 @@ FORMAT: Final = Format(
     give="Give the .nc file that sagline track wrote.",
     again="Run sagline track again, or take the file from where it came.",
     key="sagline_format",
-    version=2,  # 2: with a digest
+    version=2,  # version 2 added the digest
     pack=plan_dataset,
     unpack=plan_of_dataset,
     sealed_from=2,

@@ -1,4 +1,4 @@
-"""Poses and wrenches as people write them: on the command line, in the viewer and in YAML."""
+"""Poses and wrenches from text: on the command line, in the viewer and in YAML."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagline.files.yaml_text import YamlEntry
 from sagline.robot.pose import Pose
 
 FARTHEST, STRONGEST = 1e6, 1e12  # m; N and N m: beyond all machines, far below what overflows
-QUATERNION_TOLERANCE: Final = 1e-3  # of a length 1, printed with three decimals; more is a mistake
+QUATERNION_TOLERANCE: Final = 1e-3  # largest deviation of the length from 1: rounding to three decimals
 POSE_STEP: Final = "Give meters, and degrees about z, y and x: --pose 1,0,1.5 or --pose 1,0,1.5,10,0,0."
 WRENCH_STEP: Final = (
     "Give newtons, and newton meters about the center of mass: --wrench 0,0,-50 or --wrench 0,0,-50,0,5,0."
@@ -27,7 +27,7 @@ def decimal_numbers(parts: Sequence[str], item: str, unit: str, largest: float) 
     found = []
     for part in parts:
         number = plain_number(part)
-        if number is None or not abs(number) <= largest:  # NaN neither
+        if number is None or not abs(number) <= largest:  # also true for NaN
             raise InvalidValueError(item, repr(part), f"decimal numbers up to {largest:g} {unit}", f"Correct {item}.")
         found.append(number)
     return found
@@ -40,12 +40,12 @@ def pose_of_text(text: str, item: str = "--pose", step: str = POSE_STEP) -> Pose
 
 
 def wrench_of_text(text: str | None, item: str = "--wrench", step: str = WRENCH_STEP) -> Array | None:
-    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for none."""
+    """A wrench from "fx,fy,fz" in N, or "fx,fy,fz,mx,my,mz" with moments in N m; None for None."""
     return None if text is None else np.array(_three_or_six(text, item, "N or N m", STRONGEST, step))
 
 
 def _three_or_six(text: str, item: str, unit: str, largest: float, step: str) -> list[float]:
-    """Plain numbers between commas; of three, three zeros follow."""
+    """Six numbers from three or six separated by commas; three numbers are followed by three zeros."""
     parts = text.split(",", maxsplit=6)
     if len(parts) not in (3, 6):
         raise InvalidValueError(item, repr(text), "three or six numbers", step)
@@ -68,7 +68,7 @@ class PoseEntry(YamlEntry):
 
 
 def pose_of_entry(entry: PoseEntry, item: str) -> Pose:
-    """Pose of an entry of a file; InvalidValueError if it is none, or farther away than any machine."""
+    """Pose of an entry of a file; InvalidValueError if it is not a pose, or too far away for any machine."""
     position = si_numbers(entry.position, 3, "m", f"{item}.position")
     if (far := float(np.abs(position).max())) > FARTHEST:
         raise InvalidValueError(f"{item}.position", f"{far:g} m away", f"up to {FARTHEST:g} m", UNITS_STEP)

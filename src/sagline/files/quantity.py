@@ -1,4 +1,4 @@
-"""Numbers as people write them in files: plain in SI, or as text with a unit."""
+"""Numbers in files: plain in SI, or as text with a unit."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ if TYPE_CHECKING:
 
 Nested = float | list["Nested"]
 
-LARGEST: Final = 1e50  # in SI: the products of a few such numbers are still numbers
+LARGEST: Final = 1e50  # in SI; products of a few such numbers do not overflow
 REACH: Final = f"numbers up to {LARGEST:g}"
-_LONGEST: Final = 60  # letters of a number with its unit; a float64 takes 24
+_LONGEST: Final = 60  # largest number of characters of a number with its unit; a float64 needs 24
 
 _DECIMAL = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-_WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # as YAML and Python write what no digits can
-_FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, pint trips over some
+_WORD = r"[-+]?\.?(?:inf|Inf|INF)|\.?(?:nan|NaN|NAN)"  # infinite numbers and NaN in YAML and Python
+_FACTOR = r"[A-Za-zµμΩÅ°_]+(?:[ \t]?(?:\^|\*\*)[ \t]?[-+]?[0-9]|[²³])?"  # no parentheses, as pint fails on some
 _UNIT = rf"{_FACTOR}(?:(?:[ \t]?[*/·][ \t]?|[ \t]){_FACTOR}){{0,5}}"
-_BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are what typographers put before a unit
-_TORQUE = re.compile(r"\b([cmkM]?N)m\b(?![ \t]?(?:\^|\*\*))")  # Nm, written as people do; Nm^2 and Nms are not clear
+_BLANKS = re.compile("[ \t\r\n\u00a0\u202f]+")  # the last two are no-break spaces, used before units
+_TORQUE = re.compile(r"\b([cmkM]?N)m\b(?![ \t]?(?:\^|\*\*))")  # Nm means N m; Nm^2 and Nms are ambiguous
 _PLAIN = re.compile(rf"[ \t]*(?:({_DECIMAL})|{_WORD})[ \t]*")
 _WITH_UNIT = re.compile(rf"[ \t]*({_DECIMAL})([ \t]+1[ \t]?/[ \t]?{_UNIT}|[ \t]*{_UNIT})[ \t]*")
 
 
 def plain_number(text: str) -> float | None:
-    """A decimal number in the digits 0 to 9, with a point, a sign and an exponent if need be; or inf, or nan.
+    """A decimal number in the digits 0 to 9, with optional point, sign and exponent; or inf, or nan.
 
-    What else is a number to YAML, Python or C is none here: 1:30, 0x10, 1_000, digits of other alphabets.
+    Other notations of YAML, Python or C are not accepted: 1:30, 0x10, 1_000, digits of other alphabets.
 
     Returns:
-        The number, infinite only where the text says so (1e999 is the largest float64); None where it is none.
+        The number, infinite only for the word inf (1e999 is the largest float64); None if the text is not a number.
 
     Examples:
         >>> from sagline.files.quantity import plain_number
@@ -52,7 +52,7 @@ def plain_number(text: str) -> float | None:
 
 
 def within_reach(number: float) -> bool:
-    """True if a number is finite, and of a size that products of a few do not take out of float64."""
+    """True if a number is finite, and products of a few such numbers do not overflow."""
     return abs(number) <= LARGEST
 
 
@@ -88,7 +88,7 @@ def _from_text(text: str, unit: str) -> float | None:
 
 
 def _limit(number: float) -> float:
-    """Number within the range of float64: only words are infinite, not too many digits."""
+    """Number limited to the range of float64: only the word inf is infinite, not a number with too many digits."""
     return max(-float_info.max, min(number, float_info.max))
 
 
@@ -101,16 +101,16 @@ def _factor(given: str, wanted: str) -> float | None:
     try:
         texts = (_TORQUE.sub(r"(\1*m)", given), wanted)
         one, wish = (units.Quantity(1.0, units.parse_units(text)) for text in texts)
-        # to pint an angle is no dimension, and 5 Hz would do for 5 rad/s; a root unit it is
+        # in pint angles are dimensionless, so 5 Hz would convert to 5 rad/s; the root units differ
         same = one.to_root_units().units == wish.to_root_units().units
         return float(one.to(wish.units).magnitude) if same else None
     except (PintError, ValueError, TypeError, AttributeError, SyntaxError, ArithmeticError):
-        return None  # pint has no common ancestor for what it cannot parse
+        return None  # pint raises errors without a common base class
 
 
 @cache
 def _registry() -> UnitRegistry[Any]:
-    # takes as long to build as a whole track run: only when a file has units, and once
+    # slow to build (as long as a track run): built once, and only if a file has units
     from pint import UnitRegistry
 
     return UnitRegistry(autoconvert_offset_to_baseunit=False)

@@ -22,14 +22,14 @@ _OTHER_TEXT: Final = {codecs.BOM_UTF16_LE: "UTF-16", codecs.BOM_UTF16_BE: "UTF-1
 
 
 def check_regular(path: Path, mode: int) -> None:
-    """Refuse a path whose mode, as `os.stat` gives it, is not that of a regular file."""
+    """Refuse a path whose mode (from `os.stat`) is not that of a regular file."""
     if not stat.S_ISREG(mode):
         kind, step = _IRREGULAR.get(stat.S_IFMT(mode), ("no file", "Name a file."))
         raise FileError(path, f"is {kind}", step)
 
 
 def unreadable(path: Path, error: Exception) -> FileError:
-    """Error of a file that the system does not let be read, to be raised."""
+    """Error to raise for a file that the system cannot read."""
     reason = getattr(error, "strerror", None) or error
     return FileError(path, f"cannot be read ({reason})", "Check its name and its permissions.")
 
@@ -44,7 +44,7 @@ def exists(path: Path) -> bool:
 
 
 def read_bytes(path: Path, limit: float) -> bytes:
-    """Bytes of a regular file of up to so many MB; pipes and devices are not opened, as they may never end."""
+    """Bytes of a regular file up to `limit` MB; pipes and devices are not opened, as they may never end."""
     most = int(limit * MEGABYTE)
     try:
         check_regular(path, path.stat().st_mode)
@@ -59,7 +59,7 @@ def read_bytes(path: Path, limit: float) -> bytes:
 
 
 def read_text(path: Path, limit: float) -> str:
-    """Text of a file in UTF-8 of up to so many MB, without a byte order mark."""
+    """Text of a UTF-8 file up to `limit` MB, without a byte order mark."""
     data = read_bytes(path, limit)
     if other := _OTHER_TEXT.get(data[:2]):
         raise FileError(path, f"is {other} text, not UTF-8 text", "Save it again as UTF-8.")
@@ -75,6 +75,6 @@ def read_text(path: Path, limit: float) -> str:
 
 
 def error_at_line(path: Path | str, reason: str, next_step: str) -> FileError:
-    """An error whose item is the line that its reason names, if it names one."""
+    """Error whose item is the line number in the reason, if there is one."""
     line = re.search(r"\bline \d+", reason)
     return FileError(path, reason, next_step, item=line and line[0])

@@ -22,42 +22,42 @@ if TYPE_CHECKING:
 
 
 def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
-    """A preset by its name, or a robot file by its path.
+    """Load a preset by its name, or a robot file by its path.
 
     A robot file is YAML. Its keys are the fields of `Robot`; a quantity is a number in SI or a text with its unit:
 
         name: my robot
-        frame_anchors: [[0, 0, 3], [4000 mm, 0, 3], ...]      # one point a cable
+        frame_anchors: [[0, 0, 3], [4000 mm, 0, 3], ...]      # one point per cable
         platform_anchors: [[-0.1, 0, 0.1], ...]
         cables: {linear_density: 67 g/m, youngs_modulus: 2 GPa, section_area: 22 mm^2}
-            # or axial_stiffness; radius or diameter instead of section_area; a number, or a list of one a cable
-            # beside them diameter, which drums need, and expansion [1/K]
+            # or axial_stiffness; radius or diameter instead of section_area; a number, or a list with one per cable
+            # also diameter, which drums need, and expansion [1/K]
         winches: {pulley_radius: 50 mm, swivel_axis: up, drum_radius: 60 mm, gear: 20, counts_per_turn: 131072}
-            # its keys are the fields of `Winch`: one value for all cables, or a list of one a cable
+            # its keys are the fields of `Winch`: one value for all cables, or a list with one per cable
         mass: 50 kg
         inertia: {box: [0.3, 0.3, 0.5]}
             # or cylinder_radius and cylinder_height (along z), Ixx ... Iyz, three numbers, or a 3 x 3 matrix
         tension_min: 20 N
         assumed: {tension_min: the winch's data sheet gives none}
         tolerances: {frame_anchors: 5 mm, axial_stiffness: 20 %, mass: 0.5 kg}
-            # standard deviations of the values above, for `calibrate`: one number for all, [x, y, z], or a list of
-            # one a cable; shares for drum_radius, linear_density, axial_stiffness, load_cell_gain and mass alone
+            # standard deviations of the values above, for `calibrate`: one number for all, [x, y, z], or a list
+            # with one per cable; percent for drum_radius, linear_density, axial_stiffness, load_cell_gain, mass
         calibration: {log: winches.csv, date: 2026-03-01, standard_error: {frame_anchors: 1 mm, mass: 80 g}}
-            # estimates of the above, written by `calibrate`
+            # origin and standard errors of estimated values, written by `calibrate`
         scene: [{name: pole, capsule: [[1, 0, 0], [1, 0, 3]], radius: 5 cm}]      # obstacles: `load_scene`
 
-    A file may begin with a preset and say what is other, `base: cogiro` beside its own name: what it does not say is
-    the preset's, and so is what is assumed of that.
+    A file may be based on a preset (`base: cogiro` in addition to its own name): it gives only the values that differ;
+    all other values, and the notes on which of them are assumed, are those of the preset.
 
     Args:
-        name_or_path: One of `robot_names()`, or the path of a file. A path object, and a text that ends in .yaml
-            or .yml, has a folder in it or names what exists, is a path.
+        name_or_path: One of `robot_names()`, or the path of a file. An argument is a path if it is a path
+            object, ends in .yaml or .yml, contains a folder or names an existing file.
 
     Returns:
         The robot, checked.
 
     Raises:
-        FileError: If the file cannot be read, or says something wrong; the message names the key and the value.
+        FileError: If the file cannot be read, or a value is wrong; the message names the key and the value.
         InvalidValueError: If there is no such preset.
 
     Examples:
@@ -93,7 +93,7 @@ def dump_robot(robot: Robot) -> str:
         robot: The robot.
 
     Returns:
-        YAML text that `load_robot` turns into the same robot to the last bit, once it is in a file.
+        YAML text; `load_robot` reads an equal robot from a file with this text, to the last bit.
 
     Examples:
         >>> import sagline as sl
@@ -124,12 +124,12 @@ def dump_robot(robot: Robot) -> str:
 
 
 def _deviations(found: Mapping[str, Array]) -> dict[str, Any]:
-    """Standard deviations, one number where all of a field are alike."""
+    """Standard deviations; one number for a field if all its values are equal."""
     return {name: (one.flat[0].item() if (one == one.flat[0]).all() else one.tolist()) for name, one in found.items()}
 
 
 def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
-    """A file's keys over those of the preset that it names as its base, if it does."""
+    """Keys of a file merged over those of its base preset, if it names one."""
     if "base" not in data:
         return data
     name = data.pop("base")
@@ -138,7 +138,7 @@ def _on_base(data: dict[Any, Any], origin: Path | str) -> dict[Any, Any]:
         step = f"Did you mean {near}?" if near else "Name one of them, or leave base out."
         raise FileError.of(origin, InvalidValueError("base", brief(name), ", ".join(robot_names()), step))
     base = _on_base(parse_mapping(preset_text(name), f"preset {name}"), origin)
-    del base["name"]  # two robots of one name would overwrite each other's files
+    del base["name"]  # the file needs its own name: equal names would overwrite each other's files
     assumed = {field: why for field, why in base.get("assumed", {}).items() if field not in data}
     own = data.get("assumed", {})
     return {**base, **data, "assumed": {**assumed, **own} if isinstance(own, dict) else own}
@@ -152,7 +152,7 @@ def _winches(winches: Winch) -> dict[str, Any]:
         for key, field in winches.known().items()
         if key == "pulley_radius" or key not in plain or field.tobytes() != plain[key].tobytes()
     }
-    if "guides" in data:  # dead length follows from them
+    if "guides" in data:  # the dead length follows from the guides
         data = {key: value for key, value in data.items() if key not in ("dead_cable", "dead_rise")}
     if "swivel_axis" in data:
         words = {tuple(axis): word for word, axis in SWIVEL_AXES.items()}
@@ -167,7 +167,7 @@ def _is_name(text: str, path: Path) -> bool:
 
 
 def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
-    """Obstacles around a robot, from the `scene` of its file.
+    """Load the obstacles around a robot from the `scene` of its file.
 
     A scene is a list; positions are in the world, a quantity is a number in SI or a text with its unit:
 
@@ -177,17 +177,17 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
           - {name: lamp, sphere: [0, 0, 2.8], radius: 20 cm}
           - {name: hall, mesh: hall.stl, unit: mm, position: [0, 0, -1], turned: 90 deg}
 
-    `turned` is about z, `mesh` a file beside the robot's, as by `load_mesh`. The scene is the file's: a `Robot` has
-    none, and `dump_robot` writes none.
+    `turned` is a rotation about z; `mesh` is a file in the folder of the robot file, read by `load_mesh`. The scene is
+    part of the file only: a `Robot` has no scene, and `dump_robot` does not write one.
 
     Args:
         file: The robot file.
 
     Returns:
-        Boxes, capsules, spheres and meshes in the order of the file; none if it has no scene.
+        Boxes, capsules, spheres and meshes in the order of the file; empty if it has no scene.
 
     Raises:
-        FileError: If the file or a mesh cannot be read, or says something wrong; the message names the key.
+        FileError: If the file or a mesh cannot be read, or a value is wrong; the message names the key.
 
     Examples:
         >>> import sagline as sl
@@ -200,7 +200,7 @@ def load_scene(file: str | os.PathLike[str]) -> tuple[Obstacle, ...]:
 
 
 def _obstacle(place: ObstacleEntry, item: str, path: Path) -> Obstacle:
-    """Obstacle of an entry in the scene of a robot file; a mesh is loaded from beside that file."""
+    """Obstacle of an entry in the scene of a robot file; a mesh is loaded from the folder of this file."""
     try:
         solid = place.solid(item)
     except InvalidValueError as error:

@@ -25,14 +25,14 @@ from sagline.robot.winch import Winch
 if TYPE_CHECKING:
     from sagline.interference.obstacles import Box, Capsule, Sphere
 
-_KINDS: Final = {  # and the keys allowed beside each
+_KINDS: Final = {  # kinds of obstacles, and the further keys allowed for each
     "box": ("center", "turned"),
     "capsule": ("radius",),
     "sphere": ("radius",),
     "mesh": ("unit", "position", "turned"),
 }
 _EITHER: Final = "one of box, capsule, sphere, mesh"
-_ERROR: Final = "calibration.standard_error."  # place of a robot's tolerances
+_ERROR: Final = "calibration.standard_error."  # prefix of the keys of standard errors
 _UNITS: Final = {
     "frame_anchors": "m",
     "platform_anchors": "m",
@@ -58,25 +58,25 @@ _UNITS: Final = {
     **{f"cables.{name}": unit for name, unit in units(Cable).items()},
     **{f"winches.{name}": unit for name, unit in units(Winch).items()},
 }  # every other key of inertia is in kg m^2
-SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # the words for the axes that there are
+SWIVEL_AXES: Final = {"up": [0.0, 0.0, 1.0], "down": [0.0, 0.0, -1.0]}  # words for vertical axes
 
 
 class ObstacleEntry(YamlEntry):
-    """Obstacle around the robot; which keys go together is said by `_KINDS`."""
+    """Obstacle around the robot; `_KINDS` lists the keys that may be combined."""
 
     name: str
-    box: Any = None  # edges
-    center: Any = None  # of a box
-    capsule: Any = None  # both ends of its axis
-    sphere: Any = None  # center
-    radius: Any = None  # of a capsule or sphere
-    mesh: str | None = None  # file, beside the robot's
-    unit: str = "m"  # of the coordinates of a mesh
-    position: Any = None  # of the origin of a mesh
+    box: Any = None  # lengths of its edges
+    center: Any = None  # center of a box
+    capsule: Any = None  # end points of its axis
+    sphere: Any = None  # its center
+    radius: Any = None  # radius of a capsule or sphere
+    mesh: str | None = None  # file in the folder of the robot file
+    unit: str = "m"  # unit of the coordinates of a mesh
+    position: Any = None  # position of the origin of a mesh
     turned: Any = 0.0  # angle of a box or mesh about z
 
     def _kind(self, item: str) -> str:
-        """Kind of the obstacle; InvalidValueError if its keys do not go together."""
+        """Kind of the obstacle; InvalidValueError if its keys cannot be combined."""
         label(self.name, f"{item}.name")
         given = self.model_fields_set - {"name"}
         found = [kind for kind in _KINDS if kind in given]
@@ -92,8 +92,8 @@ class ObstacleEntry(YamlEntry):
         return kind
 
     def solid(self, item: str) -> Box | Capsule | Sphere | None:
-        """Box, capsule or sphere of the entry; None for a mesh, whose values are checked but not its file."""
-        from sagline.files.mesh_file import meters  # here: most robot files have no scene
+        """Box, capsule or sphere of the entry; None for a mesh (its values are checked, not its file)."""
+        from sagline.files.mesh_file import meters  # imported here because most robot files have no scene
         from sagline.interference.obstacles import Box, Capsule, Sphere
 
         kind = self._kind(item)
@@ -111,7 +111,7 @@ class ObstacleEntry(YamlEntry):
         return Capsule(ends[0], ends[1], radius, self.name)
 
     def pose(self, item: str) -> Pose:
-        """Pose of the obstacle's frame: the position of a mesh, and the turn about z."""
+        """Pose of the obstacle's frame: the position of a mesh, and the rotation about z."""
         angle = number(in_si(self.turned, "rad", f"{item}.turned"), f"{item}.turned", "rad")
         return Pose.from_euler(self._point(item, "position"), angle, 0.0, 0.0)
 
@@ -125,12 +125,12 @@ class _RobotPart(YamlEntry):
     """A mapping in a robot file."""
 
     def given(self, key: str, within: str = "") -> Any:
-        """A key's quantity in SI."""
+        """Quantity of a key in SI."""
         item = within + key
         return in_si(getattr(self, key), _UNITS.get(item, "kg*m^2"), item)
 
     def only_way(self, item: str, ways: tuple[tuple[str, ...], ...], beside: tuple[str, ...]) -> tuple[str, ...]:
-        """The one of several sets of keys that is there, whole and alone except for the keys `beside` them."""
+        """The only set of keys that is given, complete; of other keys only those in `beside` are allowed."""
         found = self.model_fields_set.difference(beside)
         for way in ways:
             if found == set(way):
@@ -161,7 +161,7 @@ class _Cables(_RobotPart):
     expansion: Any = None
 
     def cable(self) -> Cable:
-        """The cables, from whichever way their stiffness is given; a diameter gives it where nothing else does."""
+        """The cables; their stiffness is computed from the given keys, from the diameter if no other key gives it."""
         ways = (("axial_stiffness",), *(("youngs_modulus", key) for key in ("section_area", "radius", "diameter")))
         beside = ["linear_density", "expansion"]
         if self.model_fields_set & {"axial_stiffness", "section_area"}:
@@ -185,7 +185,7 @@ class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
     swivel_axis: Any = None  # may be a word
 
     def winches(self) -> Winch:
-        """The winches; what is left out takes the winch's own default."""
+        """The winches; missing values are the defaults of `Winch`."""
         if "swivel_axis" in self.model_fields_set:
             self.swivel_axis = _vectors(self.swivel_axis)
         keys = [key for key in _Winches.model_fields if key in self.model_fields_set]
@@ -193,7 +193,7 @@ class _Winches(_with_keys(units(Winch))):  # type: ignore[misc]
 
 
 def _vectors(value: object) -> object:
-    """Swivel axes whose words, for all cables or in a list, have become vectors."""
+    """Swivel axes with words replaced by vectors; one for all cables, or a list."""
     if isinstance(value, list):
         return [_vectors(entry) for entry in value]
     if not isinstance(value, str) or plain_number(value) is not None:
@@ -217,7 +217,7 @@ class _Inertia(_RobotPart):
     Ixx: Any = None
     Iyy: Any = None
     Izz: Any = None
-    Ixy: Any = 0.0  # an element of the matrix, not the product of inertia with its sign turned; so are the next two
+    Ixy: Any = 0.0  # element of the matrix (negative product of inertia), like the next two
     Ixz: Any = 0.0
     Iyz: Any = 0.0
     box: Any = None
@@ -254,7 +254,7 @@ class _Inertia(_RobotPart):
 
 
 class _TestBox(_RobotPart):
-    """The box of poses in which the robot can work."""
+    """Box of poses for tests of the robot."""
 
     low: Any
     high: Any
@@ -262,10 +262,10 @@ class _TestBox(_RobotPart):
 
 
 class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
-    """Standard deviations of a robot's numbers; each one number for the field, one along each axis, or all of it."""
+    """Standard deviations of a robot's values; one number per field, one per axis, or one per value."""
 
     def of(self, robot: Robot, within: str) -> dict[str, Any]:
-        """Those that are given, in SI; percents are of the robot's own numbers."""
+        """Standard deviations in SI; percentages refer to the robot's values."""
         found = {}
         for key in (key for key in _Deviations.model_fields if key in self.model_fields_set):
             item, value = within + key, getattr(self, key)
@@ -277,14 +277,14 @@ class _Deviations(_with_keys(UNCERTAIN)):  # type: ignore[misc]
 
 
 def _in_percent(value: object) -> bool:
-    """True if a text, or the first of a list, is in percent."""
+    """True if a text, or the first element of a list, is in percent."""
     if isinstance(value, list):
         return bool(value) and _in_percent(value[0])
     return isinstance(value, str) and value.rstrip().endswith("%")
 
 
 def _share(value: Any, item: str) -> Any:
-    """Shares in percent as numbers."""
+    """Percentages as fractions."""
     if isinstance(value, list):
         return [_share(element, f"{item}[{i}]") for i, element in enumerate(value)]
     number = plain_number(value.strip().removesuffix("%")) if _in_percent(value) else None
@@ -294,7 +294,7 @@ def _share(value: Any, item: str) -> Any:
 
 
 class _Calibration(_RobotPart):
-    """The calibration that found some of the numbers."""
+    """Calibration from which some of the values come."""
 
     log: str
     date: str
@@ -307,7 +307,7 @@ class _Calibration(_RobotPart):
 
 
 class RobotEntry(_RobotPart):
-    """A whole robot file. Keys are the robot's fields; what is left out takes the robot's own default."""
+    """A whole robot file. Keys are the fields of `Robot`; missing values are its defaults."""
 
     name: str
     frame_anchors: Any
@@ -331,7 +331,7 @@ class RobotEntry(_RobotPart):
     notes: str = ""
     tolerances: _Deviations | None = None
     calibration: _Calibration | None = None
-    scene: list[ObstacleEntry] = Field(default_factory=list)  # the file's, not the robot's: sagline.files.robot_file
+    scene: list[ObstacleEntry] = Field(default_factory=list)  # not part of the robot: see sagline.files.robot_file
 
     def robot(self) -> Robot:
         """The robot the file describes."""
@@ -350,7 +350,7 @@ class RobotEntry(_RobotPart):
         return self._with_tolerances(Robot(**fields))
 
     def _with_tolerances(self, robot: Robot) -> Robot:
-        """The robot with how far its numbers are to be trusted, which shares of them may say."""
+        """The robot with the tolerances of its values, which may be given in percent."""
         about: dict[str, Any] = {}
         if self.tolerances is not None:
             about["tolerances"] = self.tolerances.of(robot, "tolerances.")

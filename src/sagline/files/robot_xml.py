@@ -1,4 +1,4 @@
-"""XML robot files of other tools: safe reading, checked numbers, and the record of what was lost."""
+"""XML robot files of other tools: safe reading, checked numbers, and the record of lost data."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ _LIMIT: Final = 4.0  # MB; the largest of CASPR's files has 0.1
 _ENCODING = re.compile(r"utf-?8|utf-?16|us-ascii|ascii|latin-?1|iso-8859-1?[0-9]|(windows-|cp)125[0-8]", re.IGNORECASE)
 
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)""")
-_CUT_OFF: Final = (3, 4, 5, 6, 20)  # expat: no element found, a token, character or section that does not end
-# Where a file gives no material: a 4 mm steel rope, as assumed for the preset cogiro.
+_CUT_OFF: Final = (3, 4, 5, 6, 20)  # error codes of expat: no element; incomplete token, character or section
+# Material if a file gives none: a 4 mm steel rope, as assumed for the preset cogiro.
 _STEEL_ROPE: Final = {"linear density": 0.065, "axial stiffness": 700e3}  # kg/m, N
 
 
 def read_xml(path: Path) -> Element:
     """The root element of an XML file."""
-    # A file that declares entities is refused, so that none can grow without bound or name another file; a document
-    # type is skipped, and what it points to is never opened
+    # A file that declares entities is refused, as an entity can grow without bound or refer to another file. A document
+    # type is skipped; the file it refers to is never opened
     data = read_bytes(path, _LIMIT)
     builder, parser = TreeBuilder(), expat.ParserCreate()
     parser.StartElementHandler = builder.start
@@ -52,7 +52,7 @@ def read_xml(path: Path) -> Element:
 
 
 def numbers_of_text(text: str | None, count: int, item: str, unit: str) -> Array:
-    """So many numbers between blanks, shape (count,); InvalidValueError names the item and the unit."""
+    """Numbers separated by blanks, shape (count,); InvalidValueError names the item and the unit."""
     found = [plain_number(word) for word in (text or "").split()[: count + 1]]
     values = [number for number in found if number is not None and within_reach(number)]
     if len(found) != count or len(values) != count:
@@ -80,7 +80,7 @@ def only_child(parent: Element, tag: str, item: str) -> Element:
 def cables_of_file(
     density: Column, stiffness: Column, tool: str, assumed: dict[str, str], diameter: Sequence[float] | None = None
 ) -> Cable:
-    """Cables of a file; what is None becomes that of a 4 mm steel rope, which `assumed` then says."""
+    """Cables of a file; None is replaced by the value of a 4 mm steel rope, and this is noted in `assumed`."""
     given = dict(zip(_STEEL_ROPE, (density, stiffness), strict=True))
     if missing := [name for name, values in given.items() if None in values]:
         assumed["cables"] = f"{' and '.join(missing)} of a 4 mm steel rope; the {tool} file gives none"
@@ -89,7 +89,7 @@ def cables_of_file(
 
 
 def vertical_axis(sideways: float, up: float) -> tuple[float, float, float] | None:
-    """Swivel axis up or down, by the horizontal and the vertical part of a direction; None if it is not vertical."""
+    """Swivel axis (up or down) from the horizontal and vertical parts of a direction; None if it is not vertical."""
     return None if not up or sideways > UPRIGHT * abs(up) else (0.0, 0.0, float(np.sign(up)))
 
 
@@ -120,7 +120,7 @@ def _decodes(data: bytes, encoding: str) -> bool:
 
 
 class _RefusedError(Exception):
-    """Stops the parser: what is wrong, and the next step."""
+    """Stops the parser; its arguments are the reason and the next step."""
 
 
 def _refuse_entity(name: str, *_: object) -> NoReturn:
@@ -134,11 +134,11 @@ def _check_encoding(version: str, encoding: str | None, standalone: int) -> None
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Imported:
-    """A robot read from another tool's file, and what the reading cost.
+    """A robot read from a file of another tool, and the data that were lost.
 
     Attributes:
-        robot: The robot; `robot.assumed` holds what the file does not give, field by field, with the reason, and
-            `robot.notes` what was lost.
+        robot: The robot; `robot.assumed` lists the fields that the file does not give, with the reason, and
+            `robot.notes` the lost data.
         lost: Data of the file that the robot does not contain, one sentence each.
     """
 
@@ -147,5 +147,5 @@ class Imported:
 
 
 def with_losses(robot: Robot, lost: tuple[str, ...]) -> Imported:
-    """Robot and its losses, which its notes repeat so that its file does too."""
+    """Robot and its lost data; they are added to its notes, so that its file contains them."""
     return Imported(robot.replace(notes=" ".join(("Not taken over:", *lost))) if lost else robot, lost)

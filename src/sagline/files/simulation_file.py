@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 TIME: Final = Quantity("time", (), "s", "time")
-# of every sample; a cable that broke has no length any more, and no nodes
+# variables of every sample; a broken cable has neither length nor nodes
 SAMPLES: Final = (
     Quantity("position", ("axis",), "m", "position of the platform origin in the world", "pose.position"),
     Quantity(
@@ -50,13 +50,13 @@ SAMPLES: Final = (
     Quantity("energy_removed", (), "J", "energy that left with broken cables and dropped loads", "energy.removed"),
     Quantity("energy_error", (), "J", "what the integrator has invented since the start", "energy.error"),
 )
-# of every cable, where it is known
+# one value per cable, if known
 LARGEST: Final = Quantity("largest_tension", ("cable",), "N", "largest tension at the frame end at any step", low=0.0)
-# of cables with mass
+# variables of cables with mass
 NODES: Final = Quantity(
     "node_position", ("cable", "node", "axis"), "m", "position of the cables at their nodes", "nodes", SOMEWHERE
 )
-# of each event, as attributes of an `Occurrence`
+# variables of each event: attributes of an `Occurrence`
 EVENT: Final = ("event",)
 WHICH: Final = "which cable or winch, counted from 0; -1 for the platform"
 EVENTS: Final = (
@@ -71,21 +71,21 @@ INTEGRATORS: Final = ("splitting", "runge-kutta", "exact")
 WINDINGS: Final = ("constant", "remembered")
 LAGGING: Final = "second-order"
 WINCHES: Final = ("ideal", "robot", LAGGING)
-# attributes that are numbers, and their units
+# numeric attributes and their units
 LAG: Final = {"bandwidth": "Hz", "damping_ratio": "1"}
 LOSSES: Final = {"loss_time": "s", "air_damping": "N s/m^2", "modal_damping": "1"}
-# events of a cable or winch, of the platform, and of either
+# events of a cable or winch, of the platform, and of both
 OF_CABLES: Final = ("break", "stall", "saturate", "slack")
 OF_PLATFORM: Final = ("drop", "pick up")
 OF_EITHER: Final = ("brake",)
 
 
 ROWS: Final = "time"
-ROUNDING: Final = 1e-12  # of the largest energy
+ROUNDING: Final = 1e-12  # share of the largest energy
 
 
 def _check_simulation(data: Dataset, cables: int) -> None:
-    """Refuse a data set that is no simulation of a robot with this number of cables."""
+    """Refuse a data set that is not a simulation of a robot with this number of cables."""
     _check_settings(data.attrs)
     time = data.variables[TIME.name].values
     sizes = {"cable": cables, ROWS: time.size, **{name: data.sizes.get(name, 0) for name in ("node", "event")}}
@@ -112,7 +112,7 @@ def _has_events(data: Dataset) -> bool:
 
 
 def _check_settings(attributes: Any) -> None:
-    """Refuse settings of the integration that do not exist or do not go together."""
+    """Refuse settings of the integration that are unknown or inconsistent."""
     kinds = {"cable_mass": CABLE_MASS, "integrator": INTEGRATORS, "winches": WINCHES, "winding": WINDINGS}
     for name, allowed in kinds.items():
         choice(attributes[name], name, allowed)
@@ -132,7 +132,7 @@ def _check_times(time: Array) -> None:
 
 
 def _check_events(data: Dataset, time: Array, cables: int) -> Array:
-    """Times at which cables break [s], infinite for those that do not."""
+    """Times at which cables break [s], infinite for cables that do not break."""
     columns = (data.variables[f"event_{name}"].values.tolist() for name in ("time", "kind", "cable"))
     before, broken = float(time[0]), np.full(cables, np.inf)
     for k, (at, kind, cable) in enumerate(zip(*columns, strict=True)):
@@ -155,7 +155,7 @@ def _check_events(data: Dataset, time: Array, cables: int) -> Array:
 
 
 def _check_gaps(name: str, values: Array, gone: Any) -> None:
-    """Refuse values of broken cables, and missing ones of others; `gone` has the shape (samples, cables)."""
+    """Refuse values of broken cables and missing values of intact ones; `gone` has the shape (samples, cables)."""
     missing = np.isnan(values)
     gone = gone.reshape(gone.shape + (1,) * (values.ndim - 2))
     for index in np.argwhere(missing != gone)[:1].tolist():
@@ -176,7 +176,7 @@ def _check_balance(data: Dataset) -> None:
 
 
 def load_simulation(file: os.PathLike[str] | str) -> Simulation:
-    """Read a simulation that its `save` wrote: the same simulation to the last bit.
+    """Read a simulation written by its `save`; all numbers are equal to the last bit.
 
     Args:
         file: The NetCDF file.
@@ -185,8 +185,8 @@ def load_simulation(file: os.PathLike[str] | str) -> Simulation:
         The simulation.
 
     Raises:
-        FileError: If the file is missing, cut off, no NetCDF file, no simulation, of a newer format, or not as it was
-            written: its digest, shapes, units and signs are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a simulation, of a newer format, or changed
+            after it was written: its digest, shapes, units and signs are checked.
 
     Examples:
         >>> import sagline as sl
@@ -230,7 +230,7 @@ def _attributes(simulation: Simulation) -> dict[str, Any]:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Simulation:
-    """Simulation of a data set; its path is for messages."""
+    """Simulation of a data set; the path is used in messages."""
     robot = robot_of(path, data)
     _check_simulation(data, robot.cable_count)
     attributes, found = data.attrs, fields_of(data, (TIME, *SAMPLES, NODES, LARGEST))

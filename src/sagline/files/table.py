@@ -21,12 +21,12 @@ from sagline.core.errors import FileError, InvalidValueError, nearest
 from sagline.files.quantity import LARGEST, REACH, in_si, plain_number
 
 TABLE_LIMIT: Final = 64.0  # MB, about half a million rows
-_TOO_LONG: Final = 100.0  # times the size of what it belongs to: no length in m, but perhaps one in mm
+_TOO_LONG: Final = 100.0  # ratio to the size of the object above which a length is taken to be in mm
 _NONE: Final[Mapping[str, str]] = MappingProxyType({})
 _COLUMN = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")  # name, or name [unit]
 _PLAIN_ROW = re.compile(
     r"(?:[-+.0-9eE \t]*,|nan,)*"
-)  # of these letters float reads plain numbers only, and much faster
+)  # with these characters only, `float` reads plain numbers, and it is much faster
 _DECIMAL_COMMA = re.compile(r"\s*[-+]?[0-9]+,[0-9]+\s*")
 
 
@@ -36,9 +36,9 @@ class CsvTable:
 
     path: FilePath  # the file, for messages
     columns: dict[str, Array]  # name and numbers of each column, shape (rows,)
-    lines: array[int]  # line of each row in the file, from 1
-    header: int  # line of the columns' names
-    plain: frozenset[str]  # the columns whose unit is the SI unit because the header gives none
+    lines: array[int]  # line number of each row in the file, from 1
+    header: int  # line number of the header
+    plain: frozenset[str]  # columns without a unit in the header; they are in SI
 
     @classmethod
     def read(
@@ -80,7 +80,7 @@ class CsvTable:
         return table
 
     def check_columns(self, names: Iterable[str], hint: str) -> None:
-        """Refuse a table without one of the columns; the hint ends the message."""
+        """Refuse a table that lacks one of the columns; the hint is the end of the message."""
         if missing := [name for name in names if name not in self.columns]:
             raise line_error(self.path, self.header, f"missing column {', '.join(missing)}{hint}")
 
@@ -107,7 +107,7 @@ class CsvTable:
 def _factors(
     path: FilePath, line: int, header: list[str], units: Mapping[str, str], strangers: Mapping[str, str]
 ) -> dict[str, float | None]:
-    """Column names, and what to multiply their numbers by to have them in SI; None where no unit is given."""
+    """Factor to SI of each column, by its name; None if no unit is given."""
     if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
         shown = {";": "semicolons", "\t": "tabs"}[other]
         raise line_error(
@@ -132,7 +132,7 @@ def _factors(
 def _factor(path: FilePath, line: int, name: str, unit: str, wanted: str) -> float:
     try:
         if unit.strip():
-            return cast(float, in_si(f"1 {unit.strip()}", wanted, name))  # of one text, so no list
+            return cast(float, in_si(f"1 {unit.strip()}", wanted, name))  # one text gives one number
     except InvalidValueError:
         pass
     allowed = f"a unit that converts to {wanted}" if wanted else "none"
@@ -148,7 +148,7 @@ def _numbers(path: FilePath, line: int, row: list[str], names: tuple[str, ...], 
     if gaps:
         row = [cell if name not in gaps or cell.strip() else "nan" for name, cell in zip(names, row, strict=True)]
     if _PLAIN_ROW.fullmatch(",".join(row) + ","):
-        with contextlib.suppress(ValueError):  # the slow way finds the cell
+        with contextlib.suppress(ValueError):  # on an error, the slow code below finds the cell
             return [float(cell) for cell in row]
     numbers = [plain_number(cell) for cell in row]
     if None in numbers:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 STEP = "Write the file again; it was edited, or damaged."
 NEWER = "Read it with a newer sagline."
-NONE: Final = -1  # of an index or a code: there is none
-# labels along the dimensions beside rows and cable
+NONE: Final = -1  # missing index or code
+# labels along the dimensions other than rows and cable
 PARTS = {
     "axis": ("x", "y", "z"),
     "quaternion_part": ("x", "y", "z", "w"),
@@ -46,14 +46,14 @@ class Quantity(NamedTuple):
     name: str  # name in the file
     parts: tuple[str, ...]  # dimensions after those of the rows: poses, or samples in time
     unit: str  # unit as the file states it; "" for a plain number
-    long_name: str  # description, in a reader's words
-    source: str = ""  # dotted attribute of the result that holds the values; "" for that of the same name
-    # poses at which it has values; a whole number of a record that is known SOMEWHERE is `NONE` elsewhere
+    long_name: str  # description
+    source: str = ""  # dotted attribute of the result that holds the values; "": its name is `name`
+    # poses at which it has values; an integer of a record that is known SOMEWHERE is `NONE` elsewhere
     known: Known = EVERYWHERE
     low: float = -np.inf  # lowest value
-    infinite: bool = False  # whether it may be infinite
+    infinite: bool = False  # true if it may be infinite
     codes: type[IntEnum] | None = None  # status type of the codes it holds, if any
-    # type of the values where they are no codes: float, int, bool or str
+    # type of values that are not codes: float, int, bool or str
     values: type[float | int | bool | str] = float
 
     @property
@@ -67,7 +67,7 @@ class Quantity(NamedTuple):
         return np.dtype(np.int8 if self.codes is not None else object if self.values is str else self.values)
 
     def of(self, result: Any) -> Any:
-        """Values of a result; None where it has none, such as a proof that a plan lacks."""
+        """Values of a result; None if it does not have them, such as the proof of a plan without one."""
         for name in self.place.split("."):
             result = None if result is None else getattr(result, name)
         return result
@@ -94,7 +94,7 @@ def variables_of_result(result: Any, quantities: Iterable[Quantity], rows: tuple
 
 
 def record_variables(records: Sequence[Any], quantities: Iterable[Quantity], width: int = 0) -> dict[str, Any]:
-    """Variables with one row a record, of two dimensions with this width; None is stored as `NONE`."""
+    """Variables with one row per record; lists have a second dimension with this width; None is stored as `NONE`."""
     found: dict[str, Any] = {}
     for one in quantities:
         values = [NONE if (value := one.of(record)) is None else value for record in records]
@@ -109,7 +109,7 @@ def values_of(data: Dataset, name: str) -> Any:
 
 
 def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
-    """Values of the quantities that a data set has, by attribute of the result; those of its parts are nested."""
+    """Values of the quantities in a data set, by attribute of the result; attributes of its parts are nested."""
     found: dict[str, Any] = {}
     for one in quantities:
         if one.name in data.variables:
@@ -122,7 +122,7 @@ def fields_of(data: Dataset, quantities: Iterable[Quantity]) -> dict[str, Any]:
 
 
 def records_of(data: Dataset, quantities: Iterable[Quantity]) -> list[dict[str, Any]]:
-    """Records that `record_variables` wrote, by attribute; whole numbers that are known SOMEWHERE may be None."""
+    """Records written by `record_variables`, by attribute; integers that are known SOMEWHERE may be None."""
     columns: dict[str, list[Any]] = {}
     for one in quantities:
         values = data[one.name].values
@@ -145,7 +145,7 @@ def check_variables(
     # quantities: declared quantities, in the order of the checks
     # sizes: number of entries along each dimension that has no labels
     # rows: dimensions before those of the declaration
-    # solved: rows at which there is a solution; None: all
+    # solved: rows with a solution; None: all
     for name, labels in PARTS.items():
         if name in data.variables and list(data.variables[name].values) != list(labels):
             raise InvalidValueError(name, list(data.variables[name].values), ", ".join(labels), STEP)
@@ -162,7 +162,7 @@ def check_variables(
 
 
 def check_indices(data: Dataset, ranges: Mapping[str, tuple[int, int]]) -> None:
-    """Refuse indices out of range: from the first number of a range to one before the second."""
+    """Refuse indices out of range; each range includes its first number and excludes its second."""
     for name, (low, high) in ranges.items():
         values = data.variables[name].values
         wrong = (values < low) | (values >= high)
@@ -175,7 +175,7 @@ def _check_form(quantity: Quantity, variable: Variable, wanted: Mapping[str, int
     found = dict(zip(map(str, variable.dims), variable.shape, strict=True))
     if list(found.items()) != list(wanted.items()):
         raise InvalidValueError(f"{quantity.name}: shape", _shape(found), _shape(wanted), STEP)
-    # texts may come in several types; each of them is looked at
+    # texts have several types; each text is checked later
     if quantity.values is not str and variable.dtype.newbyteorder("=") != quantity.type:
         raise InvalidValueError(f"{quantity.name}: type", variable.dtype, str(quantity.type), STEP)
     unit = variable.attrs.get("units", "")
@@ -188,7 +188,7 @@ def _shape(sizes: Mapping[str, int]) -> str:
 
 
 def _check_codes(quantity: Quantity, variable: Variable) -> None:
-    """Refuse codes that are unknown, or had another meaning for the writer."""
+    """Refuse codes that are unknown, or that had another meaning when the file was written."""
     assert quantity.codes is not None
     ours = {code.value: code.name.lower() for code in quantity.codes}
     values = np.atleast_1d(variable.attrs.get("flag_values", ())).tolist()

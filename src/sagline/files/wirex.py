@@ -29,28 +29,28 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 
 _AXES: Final = ("x", "y", "z")
-_FLATTEST: Final = 0.1  # least edge of the assumed box over its largest: anchors may lie in a plane, a body does not
+_FLATTEST: Final = 0.1  # smallest ratio of edges of the assumed box; anchors may lie in a plane, a body has thickness
 _VERSIONS: Final = ("0.31", "0.32")
-_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # the last as Windows prints it
+_INFINITE: Final = re.compile(r"\+?(inf|infinity|1\.#inf0*)", re.IGNORECASE)  # 1.#INF is printed by Windows
 
 
 def load_wirex(source: str | os.PathLike[str], cables: Cable | None = None) -> Imported:
     """Read a robot file of WireX (version 0.31 or 0.32 of its format).
 
-    WireX asks for no material, no inertia and no limits: what a file leaves out is assumed, and the robot says so in
-    `assumed`. Moments of inertia that are missing are taken as large as the largest that is given, the others as zero;
-    where none is given, the platform is a box around its anchors. Pulleys that swivel about a vertical axis are the
-    robot's; of a winch its largest force, its drum and the inertia of its motor.
+    WireX does not require material, inertia or limits. Missing values are assumed and listed in the robot's `assumed`.
+    Missing moments of inertia are set to the largest given moment, missing products of inertia to zero. If no inertia
+    is given, the platform is a box around its anchors. Pulleys that swivel about a vertical axis are read. The values
+    read from a winch are its largest force, its drum and the inertia of its motor.
 
     Args:
         source: The `.wcrfx` file.
-        cables: The cables' material; None takes the file's, and that of a 4 mm steel rope where it gives none.
+        cables: The cables' material; None takes that of the file, or a 4 mm steel rope if the file has none.
 
     Returns:
-        Imported: the robot, and what was lost.
+        Imported: the robot, and the data that were lost.
 
     Raises:
-        FileError: If the file cannot be read, has another version, or describes no robot with one platform.
+        FileError: If the file cannot be read, has another version, or does not describe a robot with one platform.
 
     Examples:
         >>> import sagline as sl
@@ -117,7 +117,7 @@ def _robot(root: Element, name: str, cables: Cable | None) -> Imported:
 
 
 def _optional(element: Element | None, key: str, item: str, unit: str) -> float | None:
-    """An attribute's number; None where it is missing, empty, or infinite, which some writers put for unknown."""
+    """Number in an attribute; None if it is missing, empty, or infinite (some programs write this for unknown)."""
     text = "" if element is None else element.get(key, "").strip()
     if not text or _INFINITE.fullmatch(text):
         return None
@@ -135,7 +135,7 @@ def _point(chain: Element, tag: str, k: int) -> list[float]:
 
 
 def _material(root: Element, chain: Element, k: int) -> Element:
-    """The <cable> of a chain: counted from 1 by its cable_id, the first one without; an empty one if there is none."""
+    """The <cable> of a chain, given by its cable_id from 1; the first if it has none; an empty one if none exists."""
     known = root.findall("cable")
     text = chain.get("cable_id", "1")
     if not known:
@@ -155,14 +155,14 @@ def _cables(materials: list[Element], assumed: dict[str, str]) -> Cable:
         radius = _optional(element, "radius", item, "m")
         if radius is not None and radius < 0.0:
             raise InvalidValueError(f"{item}: radius", f"{radius:g} m", ">= 0 m", "Correct it in the file.")
-        density.append(_optional(element, "weight", item, "kg/m") or None)  # zero is no material either
+        density.append(_optional(element, "weight", item, "kg/m") or None)  # zero means unknown
         stiffness.append((modulus or 0.0) * np.pi * (radius or 0.0) ** 2 or None)
         diameter.append(2.0 * (radius or 0.0))
     return cables_of_file(density, stiffness, "WireX", assumed, diameter if all(diameter) else None)
 
 
 def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[str, ...]]:
-    """Pulleys and drums, and what is lost of them."""
+    """Pulleys and drums, and their data that are lost."""
     lost, radii, axes = [], [], []
     for k, chain in enumerate(chains):
         item = f"chain {k + 1}: base"
@@ -188,17 +188,17 @@ def _winches(root: Element, chains: list[Element]) -> tuple[Winch | None, tuple[
 
 
 def _axis(base: Element, item: str) -> tuple[float, float, float] | None:
-    """The way the cable enters its pulley, z of the matrix a11 to a33; up without one, and None if not vertical."""
+    """Direction in which the cable enters its pulley: z axis of the matrix a11 to a33; default up; None if tilted."""
     if base.get("a33") is None:
         return (0.0, 0.0, 1.0)
     upright = _required(base, "a33", item, "")
-    # of a rotation: where z stays vertical, the last row is as bare as the last column, whichever of them is z
+    # in a rotation with vertical z axis, the last row and column are both zero off the diagonal
     sideways = max(abs(_optional(base, key, item, "") or 0.0) for key in ("a13", "a23", "a31", "a32"))
     return vertical_axis(sideways, upright)
 
 
 def _drive(winch: Element) -> dict[str, float]:
-    """Drum and motor; a zero is how a file says that it does not know."""
+    """Drum and motor; zero in a file means unknown."""
     drum, motor = winch.find("drum"), winch.find("motor")
     width, grooves = (_optional(drum, key, "winch: drum", unit) for key, unit in (("l_drum", "m"), ("nr_groove", "")))
     fields = {
@@ -243,7 +243,7 @@ def _center(platform: Element, assumed: dict[str, str]) -> list[float]:
 
 
 def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str]) -> Array:
-    """Symmetric matrix; of two mirrored elements one may be left out, what is missing altogether is assumed."""
+    """Symmetric matrix; one of two mirrored elements may be missing; if both are missing, a value is assumed."""
     matrix = np.full((3, 3), np.nan)
     tensor = platform.find("inertiatensor")
     for (i, row), (j, column) in product(enumerate(_AXES), repeat=2):
@@ -256,7 +256,7 @@ def _inertia(platform: Element, mass: float, size: Array, assumed: dict[str, str
     why = ["taken about the center of mass; the WireX format does not say about which point"]
     missing = [(i, j) for i, j in combinations_with_replacement(range(3), 2) if np.isnan(matrix[i, j])]
     products = [pair for pair in missing if pair[0] != pair[1]]
-    if len(products) not in (0, 3):  # a file with two of them lacks the third
+    if len(products) not in (0, 3):  # one or two given products: the others are missing
         key = "I" + "".join(_AXES[k] for k in products[0])
         raise InvalidValueError(f"inertiatensor: {key}", "missing", "a number in kg m^2", f"Add {key} to the file.")
     if missing:

@@ -46,8 +46,8 @@ CRITERIA: Final[dict[str, type[Criterion]]] = {
     kind.__name__: kind
     for kind in (LeastMargin, MaximumSag, PositionError, LeastStiffness, LeastFrequency, Clearance, InFrame)
 }
-NODES: Final = ("x", "y", "z")  # of the grid
-FINE: Final = ("fine_x", "fine_y", "fine_z")  # of the grid that separates components
+NODES: Final = ("x", "y", "z")  # coordinates of the nodes of the grid
+FINE: Final = ("fine_x", "fine_y", "fine_z")  # coordinates of the finer grid that separates components
 
 QUANTITIES: Final = (
     *(Quantity(name, (name,), "m", f"{name} of the nodes of the grid") for name in NODES),
@@ -82,7 +82,7 @@ KINDS: Final[dict[str, type[Any]]] = {kind.__name__: kind for kind in (Box, Caps
 
 
 def _check_workspace(data: Dataset, cables: int) -> None:
-    """Refuse a data set that is no workspace of a robot with this number of cables."""
+    """Refuse a data set that is not a workspace of a robot with this number of cables."""
     choice(data.attrs["volume_units"], "volume_units", UNITS)
     choice(data.attrs["need"], "need", ("all", "any"))
     for name in ("volume", "volume_error", "box_tilt"):
@@ -111,7 +111,7 @@ def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any],
             del attributes[f"{key}_model"]
             attributes |= choice_attributes(f"{key}_of_model", one.model, MODELS)
         if isinstance(one, Clearance):
-            obstacles: Any = one.obstacles  # a tuple, once they are checked
+            obstacles: Any = one.obstacles  # a tuple after the check
             attributes[f"{key}_obstacles"] = len(obstacles)
             for j, obstacle in enumerate(obstacles):
                 own, parts = _obstacle(f"{key}_obstacle_{j}", obstacle)
@@ -121,7 +121,7 @@ def _criteria_attributes(criteria: Sequence[Criterion]) -> tuple[dict[str, Any],
 
 
 def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
-    """Criteria that `_criteria_attributes` wrote, in their order; the path is for messages."""
+    """Criteria written by `_criteria_attributes`, in order; the path is used in messages."""
     found: list[Criterion] = []
     while (key := f"criterion_{len(found)}") in data.attrs:
         known: dict[str, Any] = {}
@@ -135,7 +135,7 @@ def _criteria_of(path: Path, data: Dataset) -> tuple[Criterion, ...]:
 
 
 def _obstacle(key: str, obstacle: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Obstacle: texts and numbers as attributes, arrays as variables with dimensions of their own."""
+    """Obstacle: texts and numbers as attributes, arrays as variables with separate dimensions."""
     attributes: dict[str, Any] = {key: type(obstacle).__name__}
     variables: dict[str, Any] = {}
     for field in fields(type(obstacle)):
@@ -158,7 +158,7 @@ def _obstacle_of(data: Dataset, key: str) -> Any:
 
 
 def load_workspace(file: os.PathLike[str] | str) -> Workspace:
-    """Read a workspace that its `save` wrote: the same workspace to the last bit.
+    """Read a workspace written by its `save`; all numbers are equal to the last bit.
 
     Args:
         file: The NetCDF file.
@@ -167,8 +167,8 @@ def load_workspace(file: os.PathLike[str] | str) -> Workspace:
         The workspace.
 
     Raises:
-        FileError: If the file is missing, cut off, no NetCDF file, no workspace, of a newer format, or not as it was
-            written: its digest, shapes and units are checked.
+        FileError: If the file is missing, cut off, not a NetCDF file, not a workspace, of a newer format, or changed
+            after it was written: its digest, shapes and units are checked.
 
     Examples:
         >>> import sagline as sl
@@ -209,7 +209,7 @@ def _attributes(space: Workspace) -> dict[str, Any]:
 
 
 def _unpack(path: FilePath, data: Dataset) -> Workspace:
-    """Workspace of a data set; its path is for messages."""
+    """Workspace of a data set; the path is used in messages."""
     robot = parse_robot(str(data.attrs["robot"]), f"{path}, robot")
     _check_workspace(data, robot.cable_count)
 
@@ -244,7 +244,7 @@ def _nearest(text: str) -> Nearest:
 
 
 def field_of(space: Workspace) -> Dataset:
-    """Level, margin, deciding criterion and cable at the nodes of the grid, with dimensions x, y and z [m]."""
+    """Level, margin, limiting criterion and cable at the nodes of the grid, with dimensions x, y and z [m]."""
     from xarray import Dataset
 
     shape = space.level.shape

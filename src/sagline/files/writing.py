@@ -1,8 +1,8 @@
 """Atomic file writing, names of files, and JSON text.
 
-A file is written beside its target and takes the target's name in one step, so that it is complete or absent. Folders,
+A file is written next to its target and then renamed in one step, so that it is complete or absent. Folders,
 devices, pipes, sockets and links are refused as targets; links among the folders above are followed. A file that is
-replaced keeps its permissions; other names of the same file (hard links) keep the former content.
+replaced keeps its permissions; its other hard links keep the old content.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ import numpy as np
 from sagline.core.errors import FileError, is_seen
 from sagline.files.reading import check_regular
 
-LONGEST = 120  # bytes: with the words and the suffix that follow it stays below the 255 of common file systems
+LONGEST = 120  # bytes; with the added words and suffix a name stays below 255, the limit of common file systems
 UNNAMED = "robot"
-LOCK = "lock"  # held as long as the folder is in use: the system frees it, however the process ends
+LOCK = "lock"  # file locked while the folder is in use; the system frees the lock when the process ends
 TRIES = 100
 _finished: ContextVar[list[Path] | None] = ContextVar("finished", default=None)
-_OTHERS = re.compile(r"[^\n -~]+")  # beside ASCII that prints; json escapes what of it is below the space
+_OTHERS = re.compile(r"[^\n -~]+")  # all except printable ASCII and line feed; json escapes control characters
 PREFIX, SUFFIX = ".sagline-", ".part"
-_DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", re.IGNORECASE)  # in every folder of Windows
+_DEVICES = re.compile(r"(con|prn|aux|nul|com[\d¹²³]|lpt[\d¹²³])(\..*)?", re.IGNORECASE)  # reserved names on Windows
 
 
 def file_stem(name: str, *words: str) -> str:
     """A name for files of a robot, without a suffix: never a path, never empty, hidden, too long or a device.
 
-    Letters and digits of all scripts, dots, hyphens and underscores stay, and spaces become hyphens. Where anything
-    else was in the name, or it was too long, eight digits of its digest follow, so that two robots do not share files.
+    Letters and digits of all scripts, dots, hyphens and underscores are kept; spaces become hyphens. If the name has
+    other characters or is too long, eight digits of its digest are added, so that two robots do not share files.
 
     Examples:
         >>> from sagline.files.writing import file_stem
@@ -52,7 +52,7 @@ def file_stem(name: str, *words: str) -> str:
         'evil-0fbfd372-poses'
     """
     plain = unicodedata.normalize("NFC", name)
-    # letters, their marks, numbers
+    # categories: letters, marks, numbers
     spaced = "".join(c if c in "._-" or unicodedata.category(c)[0] in "LMN" else " " for c in plain)
     stem = "-".join(spaced.split()).encode()[:LONGEST].decode(errors="ignore").strip(".-")
     if _DEVICES.fullmatch(stem):
@@ -65,7 +65,7 @@ def file_stem(name: str, *words: str) -> str:
 @contextmanager
 def staging(folder: Path) -> Iterator[Path]:
     """New temporary folder inside a folder, removed when the block ends."""
-    # What processes that were killed have left there is removed first
+    # Folders left by killed processes are removed first
     for left in folder.glob(f"{PREFIX}*{SUFFIX}"):
         _remove_if_left(left)
     place, lock = _new_place(folder)
@@ -103,7 +103,7 @@ def _remove_if_left(place: Path) -> None:
 
 def _open_lock(place: Path) -> int:
     flags = os.O_RDWR | os.O_CREAT
-    for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC"):  # neither a link nor a fifo planted there does harm
+    for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC"):  # protects against a link or a pipe at this path
         flags |= getattr(os, name, 0)
     return os.open(place / LOCK, flags, 0o600)
 
@@ -126,8 +126,8 @@ def try_lock(lock: int, *, if_unknown: bool) -> bool:
 @contextmanager
 def atomic_file(file: os.PathLike[str] | str, size: int = 0) -> Iterator[Path]:
     """Temporary file that replaces a file when the block ends without an error."""
-    # The block writes to a new file beside the real one. When it ends, that file is flushed to the disk and takes the
-    # real one's name in one step; when it fails or is interrupted, it is removed and whatever was there before stays.
+    # The block writes to a new file in the folder of the target. At its end the new file is flushed to the disk and
+    # renamed in one step. If the block fails or is interrupted, the new file is removed and the target is unchanged.
     target = check_file(file)
     with atomic_files(target.parent, [target.name], size) as (partial,):
         yield partial
@@ -147,7 +147,7 @@ def atomic_files(folder: os.PathLike[str] | str, names: Sequence[str], size: int
             for part, target in zip(parts, targets, strict=True):
                 _finish(part, target)
             old, new = [str(part) for part in parts], [str(target) for target in targets]
-            list(map(os.replace, old, new))  # all of it runs in C: Ctrl-C does not get between two names
+            list(map(os.replace, old, new))  # runs in C, so Ctrl-C cannot interrupt it between two names
     except OSError as error:
         target = _target_of(error, targets)
         raise FileError(target, f"cannot be written ({_reason(error)})", _next_step(target)) from error
@@ -182,7 +182,7 @@ def finished_files() -> Iterator[list[Path]]:
 
 
 def check_file(file: os.PathLike[str] | str) -> Path:
-    """Refuse a name that a file could not be written to, without touching it."""
+    """Refuse a path to which no file can be written, without changing it."""
     target = Path(file)
     try:
         mode = target.lstat().st_mode
@@ -200,14 +200,14 @@ def check_file(file: os.PathLike[str] | str) -> Path:
 
 
 def check_files(folder: os.PathLike[str] | str, names: Iterable[str]) -> None:
-    """Refuse files that could not be written to a folder, without touching anything."""
+    """Refuse files that cannot be written to a folder, without changing anything."""
     check_folder(folder)
     for name in names:
         check_file(Path(folder) / name)
 
 
 def check_folder(folder: os.PathLike[str] | str) -> None:
-    """Refuse a folder that files could not be written to, without creating it."""
+    """Refuse a folder to which no files can be written, without creating it."""
     path = Path(folder).absolute()
     nearest = next(place for place in (path, *path.parents) if os.path.lexists(place))
     if not nearest.is_dir():
@@ -224,7 +224,7 @@ def check_folder(folder: os.PathLike[str] | str) -> None:
 
 
 def create_folder(folder: os.PathLike[str] | str) -> Path:
-    """The folder, created with everything above it where it is missing."""
+    """The folder; it and its parent folders are created if missing."""
     path = Path(folder)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -234,7 +234,7 @@ def create_folder(folder: os.PathLike[str] | str) -> Path:
 
 
 def _check_space(file: Path, size: int) -> None:
-    """Check that the disk has space for so many bytes: HDF5 crashes on a full one."""
+    """Check that the disk has `size` bytes free, because HDF5 crashes on a full disk."""
     if size and hasattr(os, "posix_fallocate"):
         with file.open("wb") as handle:
             os.posix_fallocate(handle.fileno(), 0, size)
@@ -250,13 +250,13 @@ def _finish(part: Path, target: Path) -> None:
 
 
 def _target_of(error: OSError, targets: Sequence[Path]) -> Path:
-    """The file that an error is about, by the name of its part; the first if it does not say."""
+    """The target that an error refers to, found by the name of its temporary file; the first if it is unknown."""
     name = Path(str(error.filename)).name.removesuffix(SUFFIX)
     return targets[int(name)] if name.isdecimal() and int(name) < len(targets) else targets[0]
 
 
 def _reason(error: Exception) -> str:
-    reason: str = getattr(error, "strerror", None) or str(error)  # HDF5 gives a text and no number
+    reason: str = getattr(error, "strerror", None) or str(error)  # HDF5 gives a text without an error number
     return next(iter(reason.splitlines()), type(error).__name__)
 
 
@@ -267,7 +267,7 @@ def _next_step(target: Path) -> str:
 
 
 def plain(what: Any) -> Any:
-    """Data as JSON has them: arrays as lists, keys and paths as texts, None for numbers that are not finite."""
+    """Data converted for JSON: arrays as lists, keys and paths as texts, None for numbers that are not finite."""
     match what:
         case dict():
             return {str(key): plain(value) for key, value in what.items()}
@@ -284,6 +284,6 @@ def plain(what: Any) -> Any:
 
 
 def json_text(what: Any) -> str:
-    """One JSON document, for `plain` data and all that `plain` makes so; safe for a terminal, whatever texts hold."""
+    """One JSON document of data that `plain` accepts; control characters are escaped, so it is safe for a terminal."""
     text = json.dumps(plain(what), indent=2, ensure_ascii=False, allow_nan=False)
     return _OTHERS.sub(lambda found: "".join(c if is_seen(c) else json.dumps(c)[1:-1] for c in found[0]), text)

@@ -19,9 +19,9 @@ from sagline.files.reading import error_at_line
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-YAML_LIMIT: Final = 1.0  # MB; thousands of waypoints or cables
-_DEEPEST: Final = 20  # levels of nesting
-_MOST: Final = 25_000  # values; that many take a second
+YAML_LIMIT: Final = 1.0  # MB; enough for thousands of waypoints or cables
+_DEEPEST: Final = 20  # largest number of nesting levels
+_MOST: Final = 25_000  # largest number of values; reading them takes a second
 _TAG: Final = "tag:yaml.org,2002:"
 _WORDS: Final = {
     **dict.fromkeys(("", "~", "null", "Null", "NULL"), f"{_TAG}null"),
@@ -31,7 +31,7 @@ _WORDS: Final = {
 
 
 class YamlEntry(BaseModel):
-    """A mapping in a file: the listed keys and no others, values of the type they are written in."""
+    """A mapping in a file: only the declared keys are allowed, and types are not converted."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
@@ -45,7 +45,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
         return schema.model_validate(data)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
-    # a misspelt key explains the missing one beside it, so it is reported first
+    # a misspelt key is reported first, because it also causes a missing key
     first = next((mistake for mistake in mistakes if mistake["type"] == "extra_forbidden"), mistakes[0])
     key, found, allowed, next_step = _explain(first, schema)
     refused = FileError(origin, f"{key} is {found}{allowed and f'; allowed: {allowed}'}", next_step, item=key)
@@ -54,7 +54,7 @@ def validate(data: Mapping[Any, Any], schema: type[Schema], origin: Path | str) 
 
 
 def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, str, str]:
-    """The key, its value, what is allowed and the next step."""
+    """The key, its value, the allowed values and the next step."""
     where = mistake["loc"]
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in where).removeprefix(".")
     found = reprlib.repr(mistake["input"])
@@ -77,7 +77,7 @@ def _explain(mistake: ErrorDetails, schema: type[YamlEntry]) -> tuple[str, str, 
 
 
 def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry]:
-    """The schema of a mapping inside the file; list indices on the way do not matter."""
+    """The schema of a mapping inside the file; list indices in the path are ignored."""
     for part in (part for part in where if isinstance(part, str)):
         kind = schema.model_fields[part].annotation
         schema = next(k for k in (kind, *get_args(kind)) if isinstance(k, type) and issubclass(k, YamlEntry))
@@ -85,14 +85,14 @@ def _at(schema: type[YamlEntry], where: tuple[int | str, ...]) -> type[YamlEntry
 
 
 def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
-    """A YAML text whose top level is a mapping, no key given twice."""
-    # Text stays text except for plain decimal numbers, true, false and null: no yes that becomes true, no 1:30 that
-    # becomes 90, no dates, no tags. Aliases may be used as long as their expansion is not too large.
+    """Mapping at the top level of a YAML text; duplicate keys are refused."""
+    # Only plain decimal numbers, true, false and null are converted, all else stays text: yes is not true, 1:30 is not
+    # 90, and there are no dates and no tags. Aliases are allowed if their expansion is not too large.
     try:
         data = yaml.load(text, Loader=_PlainLoader)
     except yaml.MarkedYAMLError as error:
         raise error_at_line(origin, *_cause(error, text)) from None
-    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two: \UFFFFFFFF
+    except (yaml.YAMLError, RecursionError, ValueError, OverflowError) as error:  # the last two: for \UFFFFFFFF
         reason = f"is not YAML as read here ({_reason(error, text)})"
         raise error_at_line(origin, reason, "Check that this is the file you mean.") from None
     if data is None:
@@ -103,7 +103,7 @@ def parse_mapping(text: str, origin: Path | str) -> dict[Any, Any]:
 
 
 def dump_mapping(data: Mapping[str, Any]) -> str:
-    """A mapping as YAML text that `parse_mapping` reads as the same: a word it would take for a number is quoted.
+    """Mapping as YAML text that `parse_mapping` reads back unchanged; texts that look like numbers are quoted.
 
     Examples:
         >>> from sagline.files.yaml_text import dump_mapping
@@ -116,7 +116,7 @@ def dump_mapping(data: Mapping[str, Any]) -> str:
 
 
 def _cause(error: yaml.MarkedYAMLError, text: str) -> tuple[str, str]:
-    """Reason why a text is no YAML, and the next step: PyYAML's own words where they are plain."""
+    """Reason why a text is not YAML, and the next step; the message of PyYAML is used if it is clear."""
     mark, problem = error.problem_mark or error.context_mark, str(error.problem or error.context)
     index, place = (len(text), "") if mark is None else (mark.index, f"line {mark.line + 1}: ")
     if isinstance(error, yaml.scanner.ScannerError | yaml.parser.ParserError):
@@ -171,7 +171,7 @@ class _PlainLoader(yaml.SafeLoader):
         return _tag_of(kind, value, implicit)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Hashable, Any]:
-        # PyYAML keeps the last of two equal keys and says nothing; a !!map of something else it refuses itself
+        # PyYAML silently keeps the last of two equal keys, so they are checked here; it refuses a wrong !!map itself
         keys = [key for key, _ in node.value] if node.id == "mapping" else []
         seen = set()
         for key in (key for key in keys if isinstance(key, yaml.ScalarNode)):
@@ -183,13 +183,13 @@ class _PlainLoader(yaml.SafeLoader):
     def construct_number(self, node: yaml.ScalarNode) -> object:
         text = self.construct_scalar(node)
         number = plain_number(text)
-        if number is None:  # for whom the text is meant says what is wrong with it
+        if number is None:  # the code that uses the text reports the error
             return text
         return int(text) if text.lstrip("+-").isdecimal() else number
 
 
 class _PlainDumper(yaml.SafeDumper):
-    """Quotes what either reader, the one above or PyYAML's own, would take for something else than a text."""
+    """Quotes texts that one of the two readers (`_PlainLoader` or PyYAML) would not read as text."""
 
     def resolve(self, kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
         ours = _tag_of(kind, value, implicit)
@@ -208,7 +208,7 @@ def _tag_of(kind: type[yaml.Node], value: str | None, implicit: Any) -> str:
 
 
 def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
-    """Numbers of values and levels of a node with all aliases written out; `known` caches them."""
+    """Number of values and of levels of a node with all aliases expanded; `known` caches them."""
     if id(node) in known:
         found = known[id(node)]
         if found is None:

@@ -187,7 +187,7 @@ def _colors(share: Array) -> list[tuple[float, float, float]]:
 
 
 def _filled(rows: list[Array]) -> Array:
-    """Rows of different lengths as one table, NaN where there is none."""
+    """Rows of different lengths as one table, NaN if there is none."""
     table = np.full((len(rows), max(row.size for row in rows)), np.nan)
     for k, row in enumerate(rows):
         table[k, : row.size] = row

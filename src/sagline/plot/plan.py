@@ -151,7 +151,7 @@ def _format(ax: Axes, plan: Plan, label: str) -> None:
 
 
 def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> None:
-    """One line a cable, and the infeasible poses shaded."""
+    """One line per cable, and the infeasible poses shaded."""
     values, label = _values(plan, quantity, table)
     clock, _ = abscissa(plan)
     for i, course in enumerate(values.T):

@@ -34,16 +34,16 @@ if TYPE_CHECKING:
     from sagline.kinematics.plan import Plan
 
 POINTS = 50  # around each pulley
-FLAT = 1e-6  # of the robot's size: a platform that is thinner casts a line
+FLAT = 1e-6  # a platform that is thinner casts a line, as a share of the robot's size
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 EDGES = tuple(  # of a box: between corners that differ in one direction
     (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
 )
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
-SAME_PLACE = 0.04  # of the robot's size: anchors that are closer share a label
+SAME_PLACE = 0.04  # anchors that are closer share a label, as a share of the robot's size
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
-LABEL_DISTANCE = 0.045  # of the robot's size: how far outside its anchor a label stands
+LABEL_DISTANCE = 0.045  # how far outside its anchor a label stands, as a share of the robot's size
 
 
 def drawn_pose(robot: Robot, pose: Pose | None) -> Pose:

@@ -41,7 +41,7 @@ class SharedMotion:
     robot: Robot
     kind: str  # "run", "simulation" or "log"
     time: Array  # from 0 on [s], shape (N,)
-    position: Array  # of the platform's origin [m], shape (N, 3); NaN where it is not known
+    position: Array  # of the platform's origin [m], shape (N, 3); NaN if it is not known
     quaternion: Array  # its rotation, scalar last, shape (N, 4)
     tension: Array  # for numbers and colors [N], shape (N, m)
     quantity: str  # place of that tension, in words

@@ -19,7 +19,7 @@ from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
 DIGITS: Final = 12  # of the numbers in a page
-FINEST: Final = 1e-5  # of the robot's size: resolution of its solids
+FINEST: Final = 1e-5  # resolution of its solids, as a share of the robot's size
 WIDE: Final = 640.0  # px
 EDGE: Final = 12.0  # px around it
 _RIGHT: Final = np.array([0.9, 0.436, 0.0])

@@ -22,7 +22,7 @@ class PackedColumn(NamedTuple):
     """A quantity over time in a page."""
 
     name: str
-    values: Array  # shape (N,) or (N, k); NaN where there is none
+    values: Array  # shape (N,) or (N, k); NaN if there is none
     step: float  # resolution, in the unit of the values, or relative to the value
     scale: Literal["linear", "relative"] = "linear"  # "linear", or "relative" of values above zero
 

@@ -18,7 +18,7 @@ class Camera(NamedTuple):
     """Position, axes and lens of a camera."""
 
     place: Array  # position [m], shape (3,)
-    axes: Array  # right, down and forward, one a column, shape (3, 3)
+    axes: Array  # right, down and forward, one per column, shape (3, 3)
     reach: Array  # half of the picture's width and height at a distance of 1, shape (2,)
     pixels: Array  # width and height of the picture [px], shape (2,)
 
@@ -51,13 +51,13 @@ class Camera(NamedTuple):
 
 
 def camera_of(server: viser.ViserServer, client: int) -> Camera | None:
-    """The camera of a client by its number; None where there is none."""
+    """The camera of a client by its number; None if there is none."""
     found = server.get_clients().get(client)
     return None if found is None else Camera.of(found.camera)
 
 
 def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
-    """Distance along a ray to a surface, in lengths of its direction; None where it misses.
+    """Distance along a ray to a surface, in lengths of its direction; None if it misses.
 
     Source:
         Moeller & Trumbore, J. Graphics Tools 2, 1997.
@@ -99,7 +99,7 @@ def screen_point(value: Any) -> tuple[float, float] | None:
         x, y = (float(each) for each in value)
     except (TypeError, ValueError, OverflowError):
         return None
-    return (x, y) if abs(x) < 10.0 and abs(y) < 10.0 else None  # NaN neither
+    return (x, y) if abs(x) < 10.0 and abs(y) < 10.0 else None  # also excludes NaN
 
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera

@@ -40,10 +40,10 @@ class View:
     snapshot: Configuration
     settings: Settings
     scale: TensionScale  # colors of tensions
-    ghost: bool  # whether straight cables are drawn beside the real ones
+    ghost: bool  # true if straight cables are drawn beside the real ones
     wrench: Array | None = None  # external wrench on a platform that is dragged, shape (6,)
     played: Played | None = None  # run, simulation or log, if it is shown; None for a pose of the user
-    playing: bool = False  # whether the clock runs
+    playing: bool = False  # true if the clock runs
 
     @property
     def state(self) -> Equilibrium | None:

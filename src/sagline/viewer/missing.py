@@ -35,7 +35,7 @@ class _AtLimit(NamedTuple):
     """A cable at a limit."""
 
     cable: int  # its number
-    lower: bool  # whether it is the lower limit, else the upper
+    lower: bool  # true if it is the lower limit, else the upper
 
     @property
     def name(self) -> str:
@@ -58,7 +58,7 @@ class MissingWrench:
 
     @property
     def moment(self) -> Array:
-        """Its moment [N m], shape (3,); zero where a force alone suffices."""
+        """Its moment [N m], shape (3,); zero if a force alone suffices."""
         return self.wrench[3:]
 
 
@@ -115,7 +115,7 @@ STARTS: Final = 4
 ITERATIONS: Final = 40
 FINEST: Final = 1e-6  # of the region's size
 BLOCK: Final = 250  # positions at once: a few milliseconds, then other threads run
-INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # of the region's size, from the border inward
+INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # from the border inward, as a share of the region's size
 
 
 class NearestFeasible(NamedTuple):
@@ -123,7 +123,7 @@ class NearestFeasible(NamedTuple):
 
     pose: Pose
     distance: float  # [m]
-    turned: bool  # whether the orientation differs too
+    turned: bool  # true if the orientation differs too
 
 
 def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestFeasible | None:

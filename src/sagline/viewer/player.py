@@ -28,8 +28,8 @@ class InMotion:
     robot: Robot
     pose: Pose
     index: int  # of the sample
-    tension: Array  # [N], shape (m,); NaN where there is none
-    length: Array  # unstrained, off the drums [m], shape (m,); NaN where there is none
+    tension: Array  # [N], shape (m,); NaN if there is none
+    length: Array  # unstrained, off the drums [m], shape (m,); NaN if there is none
     verdict: str  # HTML of the state and of the events
     heads: tuple[str, ...]  # of the table of the cables
     columns: Sequence[Sequence[str]]  # of that table, a text for each cable
@@ -123,7 +123,7 @@ class Timeline:
 
     duration: float  # time of the end [s]
     time: float = 0.0  # that is shown [s], 0 to duration
-    playing: bool = False  # whether the clock runs
+    playing: bool = False  # true if the clock runs
 
     def advanced(self, elapsed: float, speed: float) -> Timeline:
         """Clock after an interval of real time [s] at a speed, the ratio of times; it stops at the end."""
@@ -151,9 +151,9 @@ class PlayerState(NamedTuple):
     """State of a player."""
 
     played: Played | None
-    original: bool  # whether the page was opened with it
+    original: bool  # true if the page was opened with it
     clock: Timeline
-    following: bool  # whether it was shown, and not a pose of the user
+    following: bool  # true if it was shown, and not a pose of the user
 
 
 class Player:
@@ -162,7 +162,7 @@ class Player:
     Attributes:
         played: Played motion; None for none.
         clock: Its clock.
-        following: Whether it is shown, and not a pose of the user.
+        following: True if it is shown, and not a pose of the user.
         speed: Ratio of its time to real time.
         number: Number of what is played; a longer version has the same.
     """

@@ -42,8 +42,8 @@ class Reserve(NamedTuple):
     """Largest force in a direction."""
 
     force: float  # its magnitude [N]; infinite where no limit was found
-    cable: int | None = None  # the cable that reaches its limit first; None where not known
-    upper: bool = False  # whether that is its upper limit
+    cable: int | None = None  # the cable that reaches its limit first; None if unknown
+    upper: bool = False  # true if that is its upper limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,11 +52,11 @@ class PushResponse:
 
     push: Push
     state: Equilibrium  # without the force
-    loaded: Equilibrium | None  # with the force; None where none was found
+    loaded: Equilibrium | None  # with the force; None if none was found
     reserve: Reserve  # largest force before a tension is at its limit, the lengths kept
-    # largest force with feasible tensions at this pose; None where not known yet
+    # largest force with feasible tensions at this pose; None until it is known
     redistributed: Reserve | None
-    compliance: Array  # of the point at which it acts, world axes [m/N], shape (3, 3); NaN where not known
+    compliance: Array  # of the point at which it acts, world axes [m/N], shape (3, 3); NaN if unknown
 
     @property
     def force(self) -> float:
@@ -65,14 +65,14 @@ class PushResponse:
 
     @property
     def displacement(self) -> Array:
-        """Displacement of the point at which it acts [m], shape (3,); NaN where not known."""
+        """Displacement of the point at which it acts [m], shape (3,); NaN if unknown."""
         if self.loaded is None:
             return np.full(3, np.nan)
         return np.asarray(self.loaded.pose.transform(self.push.at) - self.state.pose.transform(self.push.at))
 
     @property
     def rotation(self) -> Array:
-        """Rotation vector of the platform [rad], shape (3,); NaN where not known."""
+        """Rotation vector of the platform [rad], shape (3,); NaN if unknown."""
         if self.loaded is None:
             return np.full(3, np.nan)
         return np.asarray((self.loaded.pose.rotation * self.state.pose.rotation.inv()).as_rotvec())
@@ -104,7 +104,7 @@ def push_response(state: Equilibrium, push: Push, *, redistribution: bool = True
 
 
 def semi_axes(compliance: Array) -> tuple[Array, Array]:
-    """Semi-axes of the compliance ellipsoid [m/N], ascending, (3,), and their directions, one a column, (3, 3)."""
+    """Semi-axes of the compliance ellipsoid [m/N], ascending, (3,), and their directions, one per column, (3, 3)."""
     if not np.isfinite(compliance).all():
         return np.full(3, np.nan), np.eye(3)
     axes, values, _ = np.linalg.svd(compliance)

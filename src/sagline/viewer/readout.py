@@ -122,7 +122,7 @@ def color_key(entries: Iterable[tuple[Array | Color, str]]) -> str:
 
 
 def cable_table_html(heads: Iterable[str], columns: Sequence[Sequence[str]], colors: Array | Colors) -> str:
-    """HTML of a table with a row a cable: number with its color, and its texts of each column."""
+    """HTML of a table with a row per cable: number with its color, and its texts of each column."""
     rows = "".join(
         f"<tr><td>{swatch(colors[i])}{i}</td>{''.join(f'<td>{text}</td>' for text in texts)}</tr>"
         for i, texts in enumerate(zip(*columns, strict=True))
@@ -239,7 +239,7 @@ def _listed(frequencies: Array | None) -> str:
 def _pressed(mode: int, frequency: float) -> str:
     """A frequency [Hz] that is pressed to see its mode move, where it has one."""
     text = number_text(frequency, ".2f")
-    if not frequency > 0.0:  # NaN neither
+    if not frequency > 0.0:  # also excludes NaN
         return text
     name = f"{MASSLESS} {mode + 1}"
     return f'<button class="shake" {chosen_by("mode", name)} aria-label="{text} Hz: move mode {name}">{text}</button>'

@@ -129,13 +129,13 @@ WANTED, ACTUAL = PLATFORM, REST  # the paths of these two platforms
 GHOST = (128, 134, 142)
 CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # px
 TRACE_POINTS = 600
-NEAR = 0.03  # of the robot's size: anchors this close have one label
+NEAR = 0.03  # anchors this close have one label, as a share of the robot's size
 FAR = 5.0  # of the robot's size: largest distance of the platform from the middle; larger ones are invalid data
-APART = 0.0035  # of the robot's size: smaller distances between chord and cable are not visible
-_ARM = 0.12  # longest arm of the axes, of the robot's size
-_BELOW: Final = np.array([0.02, 0.07, 0.03])  # space for the axes and their names, of the robot's size
+APART = 0.0035  # smaller distances between chord and cable are not visible, as a share of the robot's size
+_ARM = 0.12  # longest arm of the axes (share of the robot's size)
+_BELOW: Final = np.array([0.02, 0.07, 0.03])  # space for the axes and their names (share of the robot's size)
 _ABOVE: Final = np.array([0.02, 0.0, 0.08])  # space for the names of cables
-_GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, of the robot's size
+_GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo (share of the robot's size)
 
 
 class RobotScene:

@@ -49,11 +49,11 @@ class PlayedLog:
     began: float  # time of the first cycle on the clock of the link [s]
     state: Codes  # of `State`, shape (N,)
     late: Array  # delay of each cycle [s], shape (N,)
-    position: Array  # of the platform's origin, estimated [m], shape (N, 3); NaN where it is not known
+    position: Array  # of the platform's origin, estimated [m], shape (N, 3); NaN if it is not known
     quaternion: Array  # estimated, shape (N, 4)
     planned: Array  # position [m], shape (N, 3); NaN without a plan
     planned_quaternion: Array  # shape (N, 4)
-    true: Array | None  # true position [m], shape (N, 3); None where it is not known
+    true: Array | None  # true position [m], shape (N, 3); None if it is not known
     true_quaternion: Array | None  # shape (N, 4)
     tension: Array  # at the frame ends, as read [N], shape (N, m)
     planned_tension: Array  # [N], shape (N, m)
@@ -149,7 +149,7 @@ class PlayedLog:
 
     @staticmethod
     def _pose(positions: Array | None, quaternions: Array | None, k: int) -> Pose | None:
-        """Pose of a cycle; None where it is not known."""
+        """Pose of a cycle; None if it is not known."""
         if positions is None or quaternions is None or not np.isfinite(positions[k]).all():
             return None
         return Pose.from_quaternion(positions[k], quaternions[k])

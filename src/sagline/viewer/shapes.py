@@ -134,9 +134,9 @@ def segments(points: Array, *, dashed: bool, shown: NDArray[np.bool_] | None = N
 
 Faces = NDArray[np.int64]
 
-_BEAM = 0.0045  # thickness of the frame's beams, of the robot's size
-_DASH = 0.02  # length of a dash of an assumed frame, of the robot's size
-_WINCH = 0.009  # radius of a winch, of the robot's size
+_BEAM = 0.0045  # thickness of the frame's beams (share of the robot's size)
+_DASH = 0.02  # length of a dash of an assumed frame (share of the robot's size)
+_WINCH = 0.009  # radius of a winch (share of the robot's size)
 _THINNEST = 0.08  # thinnest platform, of its largest edge
 _SIDES = 20  # of a winch's drum
 _WHEEL: Final = ((0.8, 0.97), (0.1, 0.26))  # radii of rim and hub, of a pulley's: the cable lies on the rim
@@ -334,7 +334,7 @@ def readable(radius: Array, size: float) -> float:
 
 def ball() -> Solid:
     """A ball of radius 1."""
-    from trimesh.creation import icosphere  # imported only when needed: a fifth of the start time
+    from trimesh.creation import icosphere  # imported only when needed, because it takes a fifth of the start time
 
     mesh = icosphere(subdivisions=2)
     return Solid(np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64))

@@ -102,7 +102,7 @@ class Snapshot:
 
     robot: Robot  # with the changes of the settings
     pose: Pose  # planned pose
-    plan: Plan | None  # the plan for this pose; None where a cable has no chord
+    plan: Plan | None  # the plan for this pose; None if a cable has no chord
     # pose of equilibrium with catenaries of the planned lengths; None if the pose is not feasible or the model is exact
     rest: Pose | None
     refusal: str = ""  # reason why a cable over a pulley has no chord; "" where all have one

@@ -22,7 +22,7 @@ from sagline.robot.pose import Pose
 from sagline.statics.stiffness import modes
 from sagline.viewer import shapes
 
-DRAWN: Final = 0.035  # of the robot's size: largest displacement as drawn
+DRAWN: Final = 0.035  # largest displacement as drawn, as a share of the robot's size
 MOST_TURN: Final = 0.3  # rad: largest rotation of the platform as drawn
 ENERGY: Final = 1.0  # J, of the vibration that the drawing is compared with
 PERIOD: Final = 2.0  # s, of the motion as drawn
@@ -81,6 +81,6 @@ class Swing:
 
 
 def mode_of(vibration: Vibration, name: str) -> ListedMode | None:
-    """The mode of this name, "1" or "massless 1"; None where there is none."""
+    """The mode of this name, "1" or "massless 1"; None if there is none."""
     cleaned = " ".join(name.split())
     return next((mode for mode in listed_modes(vibration) if mode.name == cleaned), None)

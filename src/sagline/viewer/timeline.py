@@ -27,7 +27,7 @@ class ChartLimit(NamedTuple):
 
     value: float  # in the unit of the chart
     name: str
-    upper: bool  # whether it is an upper limit
+    upper: bool  # true if it is an upper limit
 
 
 class Span(NamedTuple):
@@ -43,7 +43,7 @@ class TimelineMark(NamedTuple):
 
     time: float  # [s]
     text: str
-    bad: bool  # whether it is a fault or a failure
+    bad: bool  # true if it is a fault or a failure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +54,7 @@ class Chart:
     unit: str
     decimals: int  # number of decimals
     names: tuple[str, ...]  # names of the lines: numbers of cables, or axes
-    # function that returns the values of some samples, shape (n, k); NaN where there is none
+    # function that returns the values of some samples, shape (n, k); NaN if there is none
     values: Callable[[slice], Array]
     limits: tuple[ChartLimit, ...] = ()  # limits of the values
 
@@ -174,7 +174,7 @@ class _Columns(NamedTuple):
     """Samples, or groups of them."""
 
     time: Array  # start of each [s], shape (C,)
-    low: Array  # least value of each line in it, shape (C, k); NaN where there is none
+    low: Array  # least value of each line in it, shape (C, k); NaN if there is none
     high: Array  # largest value
 
 

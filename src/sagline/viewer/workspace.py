@@ -150,7 +150,7 @@ def region_hull(query: WorkspaceQuery, rough: bool, progress: Callable[[int, int
 
 
 def _around(found: Outline, region: Region) -> Region | None:
-    """The box around a region that fills little of its own, a cell wider; None where it fills it, or is empty."""
+    """The box around a region that fills little of its own, a cell wider; None if it fills it, or is empty."""
     if not len(found.surface.faces) or region.flat is not None:
         return None
     cell = found.grid.step
@@ -198,7 +198,7 @@ def _majority(cables: Indices) -> Indices:
 
 
 BESIDE: Final = 0.01  # of the reach: distance of patches from their wall, which would hide them here and there
-REACH: Final = 0.16  # of the robot's size: patches of a wall nearer than this are drawn
+REACH: Final = 0.16  # patches of a wall nearer than this are drawn, as a share of the robot's size
 _RINGS: Final = (0.0, 0.4, 0.7, 1.0)  # of the reach
 _OPACITIES: Final = (0.6, 0.35, 0.15)  # opacity in each ring, of which two lie behind each other
 
@@ -257,11 +257,11 @@ class FreeTravel:
     """Free travel from a position in directions of the axes, at one orientation."""
 
     start: Array  # position [m], shape (3,)
-    inside: bool  # whether it is within the workspace
+    inside: bool  # true if it is within the workspace
     margin: float  # capacity margin there [N]
     which: Indices  # directions in which this robot can move, indices of `DIRECTIONS`, shape (K,)
     distance: Array  # distance to the boundary, or to the end of the box [m], shape (K,)
-    crossed: Flags  # whether the boundary is reached, shape (K,)
+    crossed: Flags  # true if the boundary is reached, shape (K,)
     cable: Indices  # the cable that limits there, -1 where none does, shape (K,)
 
     @property

@@ -35,12 +35,12 @@ FIELD: Final = "Row of the log"
 TOPIC: Final = "row"  # of the messages with the number of a row that is clicked
 LARGEST: Final = 100.0  # times the factor at first
 OPACITY: Final = 0.55
-_DOT: Final = 0.0055  # radius of a pose, of the robot's size
-_ABOVE: Final = 0.02  # of the robot's size: distance of the label of a pose
+_DOT: Final = 0.0055  # radius of a pose (share of the robot's size)
+_ABOVE: Final = 0.02  # distance of the label of a pose, as a share of the robot's size
 NODES: Final[dict[Anchors, str]] = {"frame_anchors": "", "platform_anchors": "/platform"}
 MOST_POSES: Final = 2000  # drawn poses; of more, a regular selection and all outliers
 MOST_NAMED: Final = 8  # outliers with labels in the scene
-LARGE: Final = 0.04  # of the robot's size: the largest ellipsoid at first
+LARGE: Final = 0.04  # initial size of the largest ellipsoid, as a share of the robot's size
 QUANTILES: Final = (0.95, 0.999)  # of chi squared, between the colors
 COLORS: Final = np.array([PLATFORM, REST, INFEASIBLE], dtype=np.uint8)
 NAMES: Final = ("as expected", "one in 20", "one in 1,000")
@@ -148,7 +148,7 @@ def _direction_text(one: Direction) -> str:
 
 
 def _root_mean_square(values: Array) -> float:
-    """Root mean square; NaN where a value is not finite."""
+    """Root mean square; NaN if a value is not finite."""
     return float(np.sqrt(np.mean(values**2))) if np.isfinite(values).all() else float("nan")
 
 

@@ -88,7 +88,7 @@ class CutFeature(Feature):
         """Build folder and buttons."""
         self._page, self._player, self._nodes = page, page.player, Nodes(page.server.scene)
         self._task = BackgroundTask(page.later)
-        self._is_marked = False  # whether a cable is marked in the scene
+        self._is_marked = False  # true if a cable is marked in the scene
         self._requested = self._playing = 0  # numbers of the last requested cut, and of the played one
         self._number = 0  # of the player, for the played cut
         self._before: list[tuple[Pose, PlayerState]] = []  # states before each of the successive cuts

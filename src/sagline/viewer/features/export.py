@@ -36,14 +36,14 @@ TOPIC: Final = "film"  # description of the film
 CLOCK: Final = "film clock"  # texts of its strip, before each picture
 
 
-_CABLE_RADIUS = 0.0012  # of the robot's size: real cables are too thin
+_CABLE_RADIUS = 0.0012  # share of the robot's size; real cables would be too thin to see
 _DEAD_RADIUS = 0.0006  # of the robot's size, for dead lengths
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
 def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: float = 1.0) -> bytes:
     """Frame, pulleys, winches, platform and cables in meters, with y upward as in glTF."""
-    import trimesh  # imported only when needed: a fifth of the start time
+    import trimesh  # imported only when needed, because it takes a fifth of the start time
     from trimesh.transformations import compose_matrix, quaternion_matrix
 
     robot = snapshot.robot

@@ -58,7 +58,7 @@ def _tensions(robot: Robot, tension: Array) -> str:
     return f"tensions {low} to {high} {unit.name}"
 
 
-STEP: Final = 0.01  # of the robot's size: translation by a key
+STEP: Final = 0.01  # translation by a key, as a share of the robot's size
 TURN: Final = np.radians(1.0)  # rotation by a key
 MOST: Final = 100.0  # steps at once, from keys held while messages were delayed
 
@@ -108,6 +108,6 @@ def _steps(value: Any) -> Array | None:
     """Six numbers within the range of keys; None for anything else."""
     if not isinstance(value, list) or len(value) != 6:
         return None
-    if not all(isinstance(each, int | float) and abs(each) <= MOST for each in value):  # NaN neither
+    if not all(isinstance(each, int | float) and abs(each) <= MOST for each in value):  # also excludes NaN
         return None
     return np.array(value, dtype=np.float64)

@@ -103,7 +103,7 @@ def _moment(missing: MissingWrench) -> str:
 FEASIBLE: Final = (28, 140, 92)  # the platform at the nearest feasible pose
 WIDTH, LINE_WIDTH = 5.0, 2.0  # px
 SMALL: Final = 0.8  # of the size of other labels
-LONG: Final = 0.2  # of the robot's size: length of the arrow
+LONG: Final = 0.2  # length of the arrow, as a share of the robot's size
 _ARROW: Final = np.array([0.006, 0.014, 0.04])  # radii of shaft and head, length of the head; of the robot's size
 ALONG: Final = (0.32, 0.44, 0.56)  # of a cable from its anchor: positions of labels, different for neighbors
 

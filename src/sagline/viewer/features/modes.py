@@ -206,7 +206,7 @@ class ModesFeature(Feature):
     def _highest(self) -> float:
         """Highest frequency of the list [Hz]."""
         value = float(self._up_to.value)
-        return value if 1.0 <= value <= HIGHEST else UP_TO  # NaN neither
+        return value if 1.0 <= value <= HIGHEST else UP_TO  # also excludes NaN
 
     @property
     def _axis(self) -> str:

@@ -212,7 +212,7 @@ def _cells(force: Array, moment: Array, decimals: int, *, turning: bool) -> str:
     return "".join(f"<td>{cell}</td>" for cell in cells)
 
 
-LONG: Final = 0.22  # of the robot's size: the longest arrow in the scene
+LONG: Final = 0.22  # the longest arrow in the scene, as a share of the robot's size
 _ARROW: Final = np.array([0.0045, 0.011, 0.03])  # radii of shaft and head, length of the head; of the robot's size
 NOT_AT_REST: Final = "The force balance is shown for a pose at rest, not for a motion or a log."
 UNKNOWN: Final = "Neither tensions nor a missing force are known here."

@@ -26,14 +26,14 @@ from sagline.viewer.tension_scale import ForceUnit, force_unit
 COLOR: Final = (200, 60, 130)  # contrast 3 : 1 on both backgrounds, not used for platforms
 GHOST_OPACITY, BALL_OPACITY = 0.5, 0.3
 _ARROW: Final = np.array([0.003, 0.009, 0.025])  # radii of shaft and head, length of the head; of the robot's size
-_BELOW: Final = 0.03  # of the robot's size: distance of the label of the reserve below the point
+_BELOW: Final = 0.03  # distance of the label of the reserve below the point, as a share of the robot's size
 FARTHEST: Final = 1e4  # m: largest distance of a point of the platform from its frame
 HELP: Final = sentence("Ctrl-drag the platform, or type a force.")
 TOPIC: Final = "pull"  # of the messages of browser/hand.js
-FAR: Final = 0.25  # of the robot's size: a drag of this length applies the mean of the tension limits
+FAR: Final = 0.25  # share of the robot's size: a drag of this length applies the mean of the tension limits
 NEAR: Final = 12.0  # px: largest distance of a pointer that grabs the platform
-LARGE: Final = 0.06  # of the robot's size: longest semi-axis of the ellipsoid
-LONGEST: Final = 0.6  # of the robot's size: longest arrow of a force that is typed
+LARGE: Final = 0.06  # longest semi-axis of the ellipsoid, as a share of the robot's size
+LONGEST: Final = 0.6  # longest arrow of a force that is typed, as a share of the robot's size
 
 
 def response_text(response: PushResponse, drawn_for: float | None) -> str:

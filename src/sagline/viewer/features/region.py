@@ -79,7 +79,7 @@ class RegionFeature(Feature):
         self._place = np.zeros(3)  # of the platform [m]
         self._scale = MarginScale(1.0)
         self._scale_key: Hashable = None  # of the workspace that the scale is for
-        # key of the workspace, whether the hull is the coarse one, and the hull; None where it cannot be computed
+        # key of the workspace, true if the hull is the coarse one, and the hull; None if it cannot be computed
         self._result: _Result | None = None
         self._hull_key: Hashable = None  # of the hull that is drawn
         self._slice_key: Hashable = None  # of the slice that is drawn

@@ -146,7 +146,7 @@ def _why_not_drawn(snapshot: Snapshot) -> str:
 
 
 def dot_field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
-    """Feasible tensions of a pose, with the sag forces of its cables; None where there are none."""
+    """Feasible tensions of a pose, with the sag forces of its cables; None if there are none."""
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
         return None

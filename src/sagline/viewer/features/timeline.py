@@ -47,7 +47,7 @@ class TimelineFeature(Feature):
         self._clock: Any = None
         self._sent_at = -PERIOD
         self._moved_at = -TURN
-        self._was_playing = False  # whether the clock was running at the last tick
+        self._was_playing = False  # true if the clock was running at the last tick
         self._cable: int | None = None  # that is pointed at
         for topic in ("scrub", "step", "play", "speed", "follow", "chart", "point", "window"):
             channel.on(topic, getattr(self, f"_on_{topic}"))
