@@ -1,1 +1,1 @@
-"""The article's studies, redone from nothing: one study a module, pure functions from numbers to numbers."""
+"""The article's studies, recomputed: one module per study, pure functions of numbers."""

@@ -17,17 +17,17 @@ from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Finding, Panel, Table
 
 COUNTS = ("one parameter", "two parameters", "three parameters")
-SHOWN = 8  # explanations by two, and by three parameters, in the table
-FEW = 6e-3  # m, what a good explanation leaves
+SHOWN = 8  # rows of the table with two and with three parameters
+FEW = 6e-3  # m, largest remaining error of a good explanation
 PRINTING = 1e-3 / np.sqrt(12.0)  # m: scatter of positions printed in whole millimeters
-NOTHING = 0.95  # of the measured error: models with a larger remainder explain nothing
-ALIKE = 0.2  # of the measured slope over height: less is the same everywhere
-AS_MEASURED = 0.15  # of it: nearer is the measured one
+NOTHING = 0.95  # share of the measured error; a model with a larger remaining error explains nothing
+ALIKE = 0.2  # share of the measured slope over height; a smaller slope counts as zero
+AS_MEASURED = 0.15  # relative difference below which a slope counts as equal to the measured one
 LOWEST, HIGHEST = "P8", "P7"
 
 
 def best_explanations(study: TenPoses, draw: Drawings) -> Finding:
-    """The best explanations, and the value of more parameters."""
+    """The best explanations, and the benefit of more parameters."""
     one, two, three = (study.best(count) for count in (1, 2, 3))
     second = study.explanations[1][1]
     alone = {found.parameters[0].name: found for found in study.explanations[0]}
@@ -161,7 +161,7 @@ def _ratio(found: Explanation, name: str) -> float:
 
 
 def single_causes(study: TenPoses) -> Finding:
-    """Every class alone: an example of it, its best value, what that leaves, and why."""
+    """Each class of parameters alone: an example, its best value, the remaining error, and the reason."""
     ranked = study.explanations[0]
     alone = {found.parameters[0].name: found for found in ranked}
     slopes = {name: _slope(study, found) for name, found in alone.items()}
@@ -242,7 +242,7 @@ def _so(study: TenPoses, found: Explanation, slope: float) -> str:
 
 
 def _slope(study: TenPoses, found: Explanation) -> float:
-    """Change of the vertical error with the height, as an explanation predicts it [mm/m]."""
+    """Change of the vertical error with height, predicted by an explanation [mm/m]."""
     return float(fit_line(study.table.desired[:, 2], 1e3 * found.predicted[:, 2]).slope)
 
 

@@ -1,4 +1,4 @@
-"""Small drawings of the article's page, readable on a phone: curves, courses with fits, maps of errors."""
+"""Small drawings of the article's page, readable on a phone: curves, curves with fits, maps of errors."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from matplotlib.contour import ContourSet
     from matplotlib.path import Path
 
-WIDTH, HEIGHT = 4.6, 3.1  # in: drawn at its own size on a desk, at four fifths of it on a phone
-LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins around axes: shares of the width, then in
+WIDTH, HEIGHT = 4.6, 3.1  # in: size on a desktop screen; on a phone it is four fifths of this
+LEFT, RIGHT, BELOW, ABOVE = 0.16, 0.975, 0.5, 0.12  # margins: shares of the width, then in
 POINT = 1.0 / 72.0  # in
-NAME_SIZE = TICK - 0.5  # pt, of legends
+NAME_SIZE = TICK - 0.5  # pt, text size of legends
 SHADES = "viridis"
-MOST_POINTS = 400  # of a course over time: a page is not a data file
+MOST_POINTS = 400  # largest number of points of a curve over time, to limit the size of the page
 
 _remarks = re.compile(r"<metadata>.*?</metadata>|<!--.*?-->|\n\s*(?=\n)", flags=re.DOTALL)
 _size = re.compile(r' (?:width|height)="[^"]*pt"')
@@ -40,22 +40,22 @@ MAP_LEFT, MAP_RIGHT = 0.13, 0.9  # margins: room for a color bar
 
 
 class Drawings:
-    """Turns figures into drawings of one page: every name inside them is used once in it."""
+    """Converts figures to drawings of one page, so that every identifier is unique in the page."""
 
     def __init__(self, page: str) -> None:
-        """Drawings whose names begin with that of their part of the page."""
+        """Prepare drawings whose identifiers begin with the name of their part of the page."""
         self._names = (f"{page}-{k}-" for k in count(1))
 
     def panel(self, figure: Sheet, caption: str) -> Panel:
-        """The figure as a drawing inside the page; the caption is its text for screen readers."""
+        """The figure as a drawing inside the page; the caption is the text for screen readers."""
         svg = svg_text(figure, 200, **{"svg.hashsalt": "sagline", "svg.fonttype": "path"})
-        svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # as large as its place in the page
+        svg = _size.sub("", _remarks.sub("", svg).strip(), count=2)  # the page sets the size
         return Panel(unique_names(svg.replace("<svg ", '<svg role="img" ', 1), next(self._names)), caption)
 
 
 def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
     """A small figure with one pair of axes."""
-    figure = Sheet(figsize=(WIDTH, height))  # fixed margins: half the time of a layout that measures every label
+    figure = Sheet(figsize=(WIDTH, height))  # fixed margins take half the time of an automatic layout
     figure.subplots_adjust(left=LEFT, right=RIGHT, bottom=BELOW / height, top=1.0 - ABOVE / height)
     ax = figure.add_subplot()
     format_axes(ax, x, y)
@@ -63,7 +63,7 @@ def axes(x: str, y: str, height: float = HEIGHT) -> tuple[Sheet, Axes]:
 
 
 def legend_above(ax: Axes, title: str = "") -> None:
-    """A legend above the axes, off the curves, in as many columns as fit; the figure grows by its height."""
+    """Legend above the axes in as many columns as fit; the height of the figure grows by that of the legend."""
     figure = cast(Sheet, ax.get_figure(root=True))
     handles, labels = ax.get_legend_handles_labels()
     widest = max(TextPath((0.0, 0.0), label, size=NAME_SIZE).get_extents().width for label in labels)
@@ -102,15 +102,15 @@ def _grow(figure: Sheet, more: float) -> None:
 
 def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
     """A logarithmic vertical axis that ends at a floor."""
-    # Curves below it run under a shaded strip that says what is there; none is lifted onto the floor. Without any the
-    # axis is an ordinary one.
+    # Curves below the floor are covered by a shaded strip with a text; they are not clipped to the floor. If no curve
+    # is below the floor, the axis is an ordinary one.
     ax.set_yscale("log")
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=np.float64) for line in ax.get_lines()])
     seen = values[np.isfinite(values)]
     if not np.any(seen < floor):
         return
     high = 3.0 * max(float(seen.max()), 10.0 * floor)
-    strip = floor * (floor / high) ** 0.09  # a share of the axis that holds a line of text
+    strip = floor * (floor / high) ** 0.09  # strip as high as a line of text
     ax.set_ylim(strip, high)
     ax.axhspan(strip, floor, facecolor=GAP_COLOR, linewidth=0.0, zorder=3.0)
     ax.text(
@@ -126,20 +126,20 @@ def logarithmic_with_floor(ax: Axes, floor: float, told: str) -> None:
 
 
 def shades(number: int) -> list[tuple[float, float, float, float]]:
-    """As many colors, in order, dark to light, each still seen on white."""
+    """Colors from dark to light, all visible on white."""
     colors = matplotlib.colormaps[SHADES]
     return [colors(0.85 * k / max(number - 1, 1)) for k in range(number)]
 
 
 def thinning(number: int) -> slice:
-    """Every so many samples."""
+    """Samples at equal index steps, at most `MOST_POINTS`."""
     return slice(None, None, max(1, number // MOST_POINTS))
 
 
 def cables_over_time(
     time: Array, values: Array, label: str, width: float, name: str = "", stops: Iterable[float] = ()
 ) -> tuple[Sheet, Axes]:
-    """A line per cable over time, values (N, m); a vertical line at each stop, between which the time is counted."""
+    """One line per cable over time, values (N, m), and a vertical line at each stop."""
     figure, ax = axes("time without stops [s]" if stops else "time [s]", label, height=2.7)
     part = thinning(len(time))
     for i, course in enumerate(values[part].T):
@@ -150,7 +150,7 @@ def cables_over_time(
 
 
 def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
-    """Draw one course, sampled at x, with its fit."""
+    """Draw one curve, sampled at x, with its fit."""
     ax.plot(x, y, "o", color=BLUE, markersize=3.5, label="exact")
     ax.plot(fine, fit, color="black", linewidth=0.9, label="fit")
     legend_above(ax)
@@ -159,7 +159,7 @@ def with_fit(ax: Axes, x: Array, y: Array, fine: Array, fit: Array) -> None:
 def error_panels(
     names: Sequence[str], position: Array, series: Sequence[tuple[str, Array, float, str]], caption: str, draw: Drawings
 ) -> list[Panel]:
-    """Areas of errors at positions (N, 3) in the x-z and y-z planes; of each series label, errors, scale and color."""
+    """Errors as circle areas at positions (N, 3), seen along y and along x; series: label, errors, scale and color."""
     panels = []
     for column, name in ((0, "x"), (1, "y")):
         figure, ax = axes(f"${name}$ [m]", "$z$ [m]")
@@ -178,14 +178,14 @@ def error_panels(
 class Courses(NamedTuple):
     """Several curves with their fits."""
 
-    x: Array  # where they are sampled, shape (n,)
+    x: Array  # abscissae of the samples, shape (n,)
     rows: Array  # the samples, shape (k, n)
-    fine: Array  # where the fits are drawn, shape (l,)
+    fine: Array  # abscissae of the drawn fits, shape (l,)
     fits: Array  # the fits, shape (k, l)
-    names: list[str]  # what the courses are called in the legend
+    names: list[str]  # names of the curves in the legend
 
     def draw(self, ax: Axes, title: str) -> None:
-        """All of them, dark to light."""
+        """Draw all curves, from dark to light."""
         for row, fit, name, color in zip(self.rows, self.fits, self.names, shades(len(self.names)), strict=True):
             ax.plot(self.x, row, "o", color=color, markersize=2.6, label=name)
             ax.plot(self.fine, fit, color=color, linewidth=0.9)
@@ -194,7 +194,7 @@ class Courses(NamedTuple):
     def panels(
         self, labels: tuple[str, str, str], one: int, captions: tuple[str, str], draw: Drawings
     ) -> tuple[Panel, Panel]:
-        """One of them alone, and all; labels of both axes and of the legend."""
+        """Draw one curve alone, and all; labels of both axes and of the legend are given."""
         figure, ax = axes(*labels[:2])
         with_fit(ax, self.x, self.rows[one], self.fine, self.fits[one])
         second, bx = axes(*labels[:2])
@@ -213,9 +213,9 @@ def map_axes(x: str, y: str) -> tuple[Sheet, Axes]:
 def draw_errors(
     ax: Axes, x: Array, y: Array, error: Array, edges: Array, ticks: tuple[float, ...], lines: tuple[float, ...]
 ) -> None:
-    """Fill a map between round errors and draw some errors as lines, interpolated between the samples."""
-    # An error with a sign is followed through zero: bands around it are as narrow as they are. What is below the first
-    # edge is gray, which the color bar says.
+    """Fill a map between round values of the error and draw contour lines of some values."""
+    # Signed errors are interpolated through zero, so that bands around zero keep their true width. Values below the
+    # first edge are gray, as shown in the color bar.
     colors = matplotlib.colormaps["magma_r"](np.linspace(0.04, 0.92, len(edges)))
     filled = [*colors[::-1], matplotlib.colors.to_rgba(GAP_COLOR), *colors]
     ax.contourf(x, y, error, levels=[*-edges[::-1], *edges], colors=filled, extend="both").set_rasterized(True)
@@ -235,7 +235,7 @@ def draw_errors(
 
 
 def _number_lines(ax: Axes, drawn: ContourSet) -> None:
-    """Numbers in the middle of the lines, with a halo so that they are read on the darkest ground."""
+    """Numbers in the middle of the lines, with a halo to be readable on a dark background."""
     middles = [middle for path in drawn.get_paths() if (middle := _middle(ax, path)) is not None]
     names = ax.clabel(
         drawn, manual=middles, fmt=lambda level: n(abs(level), ".3g", "m"), fontsize=TICK - 0.5, inline_spacing=3

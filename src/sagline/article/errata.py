@@ -1,4 +1,4 @@
-"""The eleven errata of the article, each shown by a computation: 1 to 4 the platform, 5 to 9 the cable, then slips."""
+"""The eleven errata of the article, each shown by a computation: 1 to 4 platform, 5 to 9 cable, 10 and 11 misprints."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from sagline.core.arrays import Array
 from sagline.core.numbers import n
 from sagline.present.page import Chapter, Finding, Table
 
-POSE = (2.0, 1.0, 1.5)  # m: any pose of the simulated robots off their symmetry
-PATH_RATE = 5.0  # samples per second: the errors change slowly
-TAUT = 1e4  # N: a cable so taut that only the leading terms are left
+POSE = (2.0, 1.0, 1.5)  # m: a pose of the simulated robots outside their planes of symmetry
+PATH_RATE = 5.0  # samples per second; enough because the errors change slowly
+TAUT = 1e4  # N: so large that only the leading terms matter
 
 
 LONG = 15.0  # m, the simulated frame
-TAUTER = 20.0  # times the sampled tensions: so that only the leading terms are left
+TAUTER = 20.0  # factor on the sampled tensions, so that only the leading terms matter
 NEARLY = 1e-6  # rad from vertical or level
 TURN = (0.3, 0.2, 0.1)  # rad, about z, y, x
 
@@ -33,14 +33,14 @@ Number: TypeAlias = tuple[str, float, str] | tuple[str, float, str, float]
 
 
 def _erratum(number: int, numbers: Sequence[Number]) -> Finding:
-    """Erratum of docs/errata.md with the numbers that show it."""
+    """Erratum of docs/errata.md with the numbers that prove it."""
     rows = [(label, n(value, ".5g", unit, size=size[0] if size else 0.0)) for label, value, unit, *size in numbers]
     table = Table("Computed", ("quantity", "value"), rows)
     return finding(f"erratum-{number}", {label: value for label, value, *_ in numbers}, data=(table,))
 
 
 def sign_of_intercept() -> Finding:
-    """Erratum 1: the intercept of pi at the platform end is +wD/2, and the printed sign costs centimeters."""
+    """Erratum 1: the intercept of pi at the platform end is +wD/2, the printed sign causes errors of centimeters."""
     cable, chord = sl.load_robot(ROBOTS[0]).cables, 10.0
     angle = 0.754  # rad, the article's
     state = sl.Catenary().from_tension(cable, chord * np.cos(angle), chord * np.sin(angle), TAUT, GRAVITY)
@@ -74,7 +74,7 @@ def gravity_twice() -> Finding:
 
 
 def euler_rates() -> Finding:
-    """Erratum 3: (5) with Euler-angle rates, and its term M W x', against Newton and Euler."""
+    """Erratum 3: (5) with Euler-angle rates, and its term M W x', compared with Newton-Euler."""
     robot = sl.load_robot(ROBOTS[0])
     angles, rates, curvatures = np.array([0.4, 0.3, -0.2]), np.array([0.5, -0.6, 0.4]), np.array([0.3, 0.2, -0.5])
     still, velocity = np.zeros(3), np.array([1.0, 0.0, 0.0])
@@ -151,7 +151,7 @@ def _angular(angles: Array, rates: Array, curvatures: Array) -> tuple[Array, Arr
 
 
 def _reversed(angles: Array) -> Array:
-    """(alpha, beta, gamma) about z, y, x as a vector along x, y, z: the reading that favors the article."""
+    """(alpha, beta, gamma) about z, y, x as a vector along x, y, z: most favorable interpretation."""
     return angles[::-1]
 
 
@@ -160,7 +160,7 @@ def _largest(vector: Array) -> float:
 
 
 def stretch_by_end_tension() -> Finding:
-    """Erratum 5: the elongation of (36) is that of the tension at B, not of the mean."""
+    """Erratum 5: the elongation of (36) follows from the tension at B, not from the mean tension."""
     cable = simulated_cable()
     end = End.at_angle(LONG)
     study = stretch_study(cable, end, np.array([500.0]))
@@ -219,7 +219,7 @@ def sign_in_bound() -> Finding:
 
 
 def vertical_and_level() -> Finding:
-    """Erratum 8: no pose under an anchor, and none with a level cable."""
+    """Erratum 8: poses below an anchor, and poses with a level cable, are excluded."""
     robot = sl.load_robot(ROBOTS[0])
     under = robot.frame_anchors[0] - robot.platform_anchors[0] - [0.0, 0.0, 2.0]
     cable, chord = simulated_cable(), 10.0

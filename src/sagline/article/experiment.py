@@ -1,8 +1,8 @@
-"""The experiment of ten points, done again: home, the ten poses of Table 2, home, with a controller and a machine.
+"""The experiment of ten points, repeated: home, the ten poses of Table 2, home, with a controller and a machine.
 
-The article orders its prototype from point to point "with low speed", stops at each while its place is measured, and
-takes about 14 minutes; speed and stops are ours, chosen so that it takes as long. The machine is one whose place is
-known: a twin.
+In the article the prototype moves from point to point "with low speed", and stops at each point while its position is
+measured; this takes about 14 minutes. Speed and stops here are assumed so that the duration is equal. The machine is a
+twin, so its true position is known.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from sagline.core.arrays import Array, locked
 from sagline.core.status import Status
 
 PROTOTYPE: Final = "article-prototype"
-SPEED: Final = 0.06  # m/s of the platform at most: the fastest winch then has 61 mm/s
-STOP: Final = 14.0  # s at each point, home twice among them: the whole takes 13.9 minutes
-LOOK: Final = 1.0  # s at the end of a stop, whose mean is taken for what is measured there
-BIAS: Final = 2.0  # N, 0.1 % of a cell of 2 kN
+SPEED: Final = 0.06  # m/s, largest speed of the platform; the fastest winch then has 61 mm/s
+STOP: Final = 14.0  # s at each point, including home twice; the total is 13.9 minutes
+LOOK: Final = 1.0  # s at the end of a stop; measured values are means over this time
+BIAS: Final = 2.0  # N, 0.1 % of the range of a 2 kN load cell
 NEXT: Final = "Correct that, and start again."
-EVERY: Final = 10  # cycles between two points of a course: drawn, not filed
+EVERY: Final = 10  # cycles between two points of a drawn curve
 
 Where = Callable[[], Array]  # the true position of the platform's origin [m], shape (3,)
-Tell = Callable[[float], None]  # share of the experiment that is over
+Tell = Callable[[float], None]  # completed share of the experiment
 
 
 class StopObserver:
-    """Observer of stops, and of the courses between them; used as a `sagline.control.Recorder`."""
+    """Observer of stops and of the motions between them; used as a `sagline.control.Recorder`."""
 
     def __init__(self, where: Where, tell: Tell | None = None) -> None:
         """No observations yet."""
-        self.stopped = ""  # nothing stops it
+        self.stopped = ""  # it is never stopped
         self.farthest = self.misjudged = 0.0
         self.courses: list[Array] = []
         self.cycles = self.acted = self.stood = 0
@@ -53,7 +53,7 @@ class StopObserver:
         self._before: Array | None = None
 
     def begins(self, plan: sl.Plan) -> None:
-        """Take the plan of a leg; the first cycle still belongs to the stop before it."""
+        """Take the plan of a motion; the first cycle still belongs to the previous stop."""
         self._plan, self._begun = plan, False
 
     def ends(self, status: Status, reason: str) -> None:
@@ -104,30 +104,30 @@ class Experiment:
     """Result of the experiment: K points of the time series, m winches."""
 
     table: Table2
-    robot: sl.Robot  # as the controller knew it
-    true: Array  # where the platform was at the ten stops [m], shape (10, 3)
-    estimated: Array  # where the encoders put it [m], shape (10, 3)
-    tension: Array  # what the load cells read there, mean of a second [N], shape (10, m)
-    planned_tension: Array  # what was planned there [N], shape (10, m)
-    # what of their error lengths can correct that do not move the platform: largest of a cable [N], (10,)
+    robot: sl.Robot  # robot used by the controller
+    true: Array  # true positions of the platform at the ten stops [m], shape (10, 3)
+    estimated: Array  # positions estimated from the encoders there [m], shape (10, 3)
+    tension: Array  # measured tensions there, mean of a second [N], shape (10, m)
+    planned_tension: Array  # planned tensions there [N], shape (10, m)
+    # part of the tension error that lengths can correct without moving the platform: largest of a cable [N], (10,)
     null_error: Array
-    correction: Array  # what the tension loop had in the lengths there [m], shape (10, m)
-    back: Array  # where the platform was at home in the end, less where it began [m], shape (3,)
-    time: Array  # of the courses, without the stops [s], shape (K,)
-    cells: Array  # what the load cells read [N], shape (K, m)
-    planned: Array  # what they should have read by the plan [N], shape (K, m)
-    lengths: Array  # less those at home [m], shape (K, m)
-    stops: Array  # when the ten stops were, in the same time [s], shape (10,)
+    correction: Array  # correction of the lengths by the tension loop there [m], shape (10, m)
+    back: Array  # final minus initial position of the platform at home [m], shape (3,)
+    time: Array  # time of motion, without the stops [s], shape (K,)
+    cells: Array  # measured tensions [N], shape (K, m)
+    planned: Array  # planned tensions [N], shape (K, m)
+    lengths: Array  # lengths minus those at home [m], shape (K, m)
+    stops: Array  # times of the ten stops, in the scale of `time` [s], shape (10,)
     duration: float  # from home to home, stops included [s]
-    winch_speed: float  # of the fastest winch [m/s]
-    farthest: float  # largest distance of the true position from the set point, under way [m]
+    winch_speed: float  # largest speed of a winch [m/s]
+    farthest: float  # largest distance of the true position from the set point in motion [m]
     misjudged: float  # largest distance of the true position from the estimate [m]
     acting: float  # share of the cycles at stops in which the tension loop changed the lengths
-    events: tuple[control.Event, ...]  # what the controller had to say
+    events: tuple[control.Event, ...]  # events of the controller
 
     @property
     def error(self) -> Array:
-        """True less desired position [m], shape (10, 3)."""
+        """True minus desired position [m], shape (10, 3)."""
         return self.true - self.table.desired
 
     @property
@@ -154,7 +154,7 @@ def pair(robot: sl.Robot, errors: Errors) -> tuple[sl.Robot, sl.Robot]:
 
 
 def with_cells(robot: sl.Robot) -> sl.Robot:
-    """A robot whose load cells are off by 2 N, half of them up and half of them down, unless it says how they are."""
+    """Robot with load cell offsets of +2 N and -2 N alternately, unless the robot has its own offsets."""
     winches = robot.winches
     if winches is None or winches.load_cell_bias.any():
         return robot
@@ -179,7 +179,7 @@ def in_process(
 
 
 def experiment(controller: control.Controller, watch: StopObserver) -> Experiment:
-    """Run the experiment; RefusedError if it cannot be connected or homed, or ends on the way."""
+    """Run the experiment; RefusedError if it cannot be connected or homed, or ends early."""
     legs = _legs(controller.period)
     controller.connect()
     controller.home(level_poses(HOME))
@@ -200,10 +200,10 @@ def experiment(controller: control.Controller, watch: StopObserver) -> Experimen
 
 
 def _executed(controller: control.Controller, leg: sl.Path, name: str) -> control.Execution:
-    """The execution of a leg; refused if it did not reach the end."""
+    """Execution of a motion; RefusedError if it did not reach the end."""
     try:
         done = controller.execute(leg)
-    except control.RefusedError as error:  # a fault while it was planned, which takes its time
+    except control.RefusedError as error:  # a fault during planning, which takes some time
         raise (
             error if controller.state is control.State.IDLE else _ended(controller, f"before its way to {name}")
         ) from None
@@ -213,7 +213,7 @@ def _executed(controller: control.Controller, leg: sl.Path, name: str) -> contro
 
 
 def _stand(controller: control.Controller, name: str) -> None:
-    """Stop, for as long as the place is measured."""
+    """Stop for the duration of a measurement."""
     for _ in range(round(STOP / PERIOD)):
         controller.cycle()
         if controller.state is not control.State.IDLE:
@@ -221,7 +221,7 @@ def _stand(controller: control.Controller, name: str) -> None:
 
 
 def _ended(controller: control.Controller, where: str) -> control.RefusedError:
-    """The error of an experiment that a fault has ended."""
+    """Error of an experiment that was ended by a fault."""
     faults = [event.text for event in controller.events if event.kind is control.EventKind.FAULT]
     reason = faults[-1] if faults else controller.events[-1].text
     return control.RefusedError(f"the experiment, {where}", reason.rstrip("."), NEXT)
@@ -267,13 +267,13 @@ def _result(
 
 
 def _legs(period: float) -> list[sl.Path]:
-    """The straight ways from point to point, of the fifth order as the article's, with a sample a cycle."""
+    """Straight paths from point to point, quintic as in the article, with one sample per cycle."""
     places = level_poses(points())
     return [sl.quintic_path([places[k], places[k + 1]], speed=SPEED, rate=1.0 / period) for k in range(len(places) - 1)]
 
 
 def duration() -> float:
-    """Duration of the experiment, stops included [s]; home has one before and one after."""
+    """Duration of the experiment, stops included [s]; there is a stop at home before and after."""
     path = sl.quintic_path(points(), speed=SPEED, rate=10.0)
     return float(path.time[-1] - path.time[0]) + STOP * len(points())
 
@@ -284,7 +284,7 @@ def points() -> Array:
 
 
 def level_poses(position: ArrayLike) -> sl.Pose:
-    """Poses at positions (..., 3), the platform not turned, as all of the article's."""
+    """Poses at positions (..., 3), the platform is not rotated, as in the article."""
     return sl.Pose.from_euler(np.asarray(position, dtype=np.float64), 0.0, 0.0, 0.0)
 
 

@@ -1,4 +1,4 @@
-"""The page of an experiment: Table 2 and figures 25 to 27 beside the article's."""
+"""Page of an experiment: Table 2 and figures 25 to 27, compared with those of the article."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from sagline.present.page import Chapter, Finding, Panel, Table, page, table_of,
 NAMES = ("experiment.html", "experiment.json")
 TITLE = "The experiment, done again"
 NOTATION = "Errors are true less desired positions. A twin's true position is known; a prototype's has to be measured."
-JERK = 2.0  # s, as long as the article's lasts
-AREA = 600.0  # pt^2 of the largest error of a figure
+JERK = 2.0  # s, duration of the jerk in the article
+AREA = 600.0  # pt^2, circle area of the largest error of a figure
 
 
 def write_experiment(result: Experiment, folder: Path | str, how: str) -> Path:
-    """Write an HTML page that needs nothing else, and its numbers as JSON."""
+    """Write a self-contained HTML page, and its numbers as JSON."""
     chapter = experiment_chapter(result, how)
     lead = (
         "Gia Luan & Truong Thinh, Appl. Sci. 2020, 10(15), 5318, section 7: home, ten points, home, with a stop at "

@@ -12,29 +12,29 @@ import sagline as sl
 from sagline.article.machine import Errors, Parameter
 from sagline.core.arrays import Array, Flags
 
-STEP = 0.01  # of a plausible error, for the slopes
+STEP = 0.01  # share of a plausible error, step of the difference quotients
 ITERATIONS = 20
-CONVERGED = 1e-5  # m, by which a step moves the platform; the positions are printed in millimeters
-NEAR = 1e-3  # of a plausible error: what is nearer to a limit has run into it
+CONVERGED = 1e-5  # m, change of the platform position in the last step; positions are printed in millimeters
+NEAR = 1e-3  # share of a plausible error: a value closer to its limit than this counts as at the limit
 
 Model: TypeAlias = tuple[Parameter, ...]
-ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual less desired positions [m], (K, N, 3), of K machines
+ErrorOf: TypeAlias = Callable[[Sequence[Errors]], Array]  # actual minus desired positions [m], (K, N, 3), of K machines
 
 
 class Explanation(NamedTuple):
-    """The errors of some parameters, none beyond what we think plausible, that fit the measured positions best."""
+    """Best fit to the measured positions by errors of some parameters, within their plausible limits."""
 
     parameters: Model  # the parameters, k of them
-    values: Array  # their errors, each in its unit, shape (k,)
-    deviation: Array  # their standard deviations, each in its unit, shape (k,); NaN for one at a limit
-    at_limit: Flags  # whether each has run into the limit of what is plausible, shape (k,)
-    predicted: Array  # actual less desired position with these errors [m], shape (N, 3)
-    rms: float  # root mean square of measured less predicted position, over all coordinates [m]
+    values: Array  # errors of the parameters, each in its unit, shape (k,)
+    deviation: Array  # standard deviations of the errors, each in its unit, shape (k,); NaN at a limit
+    at_limit: Flags  # true for errors at their plausible limit, shape (k,)
+    predicted: Array  # actual minus desired position with these errors [m], shape (N, 3)
+    rms: float  # root mean square of measured minus predicted position, over all coordinates [m]
     worst: float  # largest distance of measured and predicted position [m]
-    # Akaike's information criterion, corrected for few measurements: smaller is better, and 2 more is little
+    # Akaike's information criterion, corrected for few measurements: smaller is better; a difference of 2 is small
     aicc: float
-    # root mean square of measured less predicted position, over all coordinates, where each pose is predicted by the
-    # fit to the others [m]
+    # root mean square of measured minus predicted position over all coordinates; each pose is predicted by the fit to
+    # all other poses [m]
     left_out: float
 
     @property
@@ -44,14 +44,14 @@ class Explanation(NamedTuple):
 
 
 class _Tangent(NamedTuple):
-    """Positions about some errors of a model's parameters, to first order."""
+    """First-order model of the positions about given errors of a model's parameters."""
 
-    error: Array  # actual less desired, shape (3 N,) [m]
-    slopes: Array  # its change with each parameter, shape (3 N, k) [m by the parameter's unit]
+    error: Array  # actual minus desired position, shape (3 N,) [m]
+    slopes: Array  # derivatives with respect to each parameter, shape (3 N, k) [m per unit of the parameter]
 
 
 def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[Explanation, ...]:
-    """Fit models to measured positions: least squares within what is plausible, by Gauss-Newton, all at once."""
+    """Fit models to measured positions: least squares within plausible limits by Gauss-Newton, all models together."""
     values, slopes = _start(error_of, measured, models)
     steps = [np.zeros(len(model)) for model in models]
     moving = list(range(len(models)))
@@ -61,7 +61,7 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
         for i, one in zip(moving, near, strict=True):
             right = measured.ravel() - one.error + one.slopes @ values[i]
             step = _bounded_least_squares(models[i], one.slopes, right) - values[i]
-            if step @ steps[i] < 0.0:  # it swings about where it should end
+            if step @ steps[i] < 0.0:  # the step reverses: it oscillates about the solution
                 step *= 0.5
             values[i], steps[i], slopes[i] = values[i] + step, step, one.slopes
             if np.abs(one.slopes @ step).max() > CONVERGED:
@@ -82,12 +82,12 @@ def explanations(error_of: ErrorOf, measured: Array, models: Sequence[Model]) ->
 
 
 def subsets(parameters: Sequence[Parameter], most: int) -> list[Model]:
-    """All models of one parameter, of two, and so on."""
+    """All models with one parameter, with two, and so on."""
     return [model for count in range(1, most + 1) for model in combinations(parameters, count)]
 
 
 def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]) -> list[_Tangent]:
-    """Each model about its values, by differences away from the limits."""
+    """First-order model of each model about its values; finite differences are taken away from the limits."""
     points, steps = [], []
     for model, x in zip(models, values, strict=True):
         high = limits(model)[1]
@@ -103,13 +103,13 @@ def tangents(error_of: ErrorOf, models: Sequence[Model], values: Sequence[Array]
 
 
 def limits(model: Model) -> tuple[Array, Array]:
-    """The least and the largest plausible errors of a model's parameters, each in its unit, shape (k,)."""
+    """Lower and upper limits of the plausible errors of a model's parameters, each in its unit, shape (k,)."""
     high = np.array([parameter.plausible for parameter in model])
     return np.where([parameter.positive for parameter in model], 0.0, -high), high
 
 
 def _bounded_least_squares(model: Model, slopes: Array, right: Array) -> Array:
-    """Least squares within the limits; each unknown is counted in its upper one, which makes them comparable."""
+    """Least squares within the limits; each unknown is scaled by its upper limit."""
     from scipy.optimize import lsq_linear
 
     low, high = limits(model)
@@ -131,7 +131,7 @@ def _errors(model: Model, values: Array) -> Errors:
 
 
 def _start(error_of: ErrorOf, measured: Array, models: Sequence[Model]) -> tuple[list[Array], list[Array]]:
-    """Values and slopes of every model from slopes at zero, which the models have in common."""
+    """Initial values of every model, and its first-order model, from the derivatives at zero common to all models."""
     alone: list[Model] = [(parameter,) for parameter in dict.fromkeys(p for model in models for p in model)]
     near = {
         model[0]: one for model, one in zip(alone, tangents(error_of, alone, [np.zeros(1)] * len(alone)), strict=True)
@@ -163,7 +163,7 @@ def _explanation(model: Model, values: Array, slopes: Array, predicted: Array, m
 
 
 def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
-    """Standard deviations of values, from the residuals; NaN for those at a limit."""
+    """Standard deviations of the values, from the residuals; NaN for values at a limit."""
     normal = slopes[:, free].T @ slopes[:, free]
     scatter = np.sum(rest**2) / (rest.size - free.sum())
     deviation = np.full(free.size, np.nan)
@@ -172,7 +172,7 @@ def _deviation(slopes: Array, free: Flags, rest: Array) -> Array:
 
 
 def _left_out(model: Model, values: Array, slopes: Array, rest: Array) -> float:
-    """Cross-validation: root mean square residual of each pose by the fit to the others, linearized [m]."""
+    """Cross-validation: rms residual of each pose, predicted by the fit to all other poses, linearized [m]."""
     right, pose = rest.ravel() + slopes @ values, np.arange(rest.size) // rest.shape[1]
     left = [
         right[pose == k] - slopes[pose == k] @ _bounded_least_squares(model, slopes[pose != k], right[pose != k])

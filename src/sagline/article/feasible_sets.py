@@ -16,13 +16,13 @@ from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Finding
 
-CORNERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)])  # of |x| + |z| = 1
+CORNERS = np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)])  # corners of |x| + |z| = 1
 CHORD = 10.0  # m
 TOLERANCES = (0.01, 0.001, 0.0001)  # m
 TENSIONS = np.linspace(10.0, 500.0, 200)  # N
 PSI_TENSIONS = np.array([30.0, 60.0, 120.0, 200.0, 300.0, 400.0])  # N
-SHOWN = 2  # of the lengths: the one whose set psi is drawn alone
-LOW_PART = 50.0  # N: below it the article ignores the curve
+SHOWN = 2  # index of the length whose set psi is drawn alone
+LOW_PART = 50.0  # N: the article ignores the curve below this tension
 
 
 class End(NamedTuple):
@@ -47,13 +47,13 @@ class _FeasibleSets:
     """The sets psi for some lengths, the curve Psi over all, and the line pi through its projection."""
 
     cable: sl.Cable  # material
-    end: End  # the wanted position B_d
+    end: End  # desired position B_d
     tolerance: float  # epsilon_max of (20) [m]
     psi_lengths: Array  # lengths L of the sets psi [m], shape (s,)
-    psi: Array  # their outlines in the (T_x, T_z) plane [N], shape (s, points, 2)
+    psi: Array  # outlines of the sets psi in the (T_x, T_z) plane [N], shape (s, points, 2)
     tensions: Array  # T_x along the curve Psi [N], shape (t,)
-    vertical: Array  # T_z along it [N], shape (t,)
-    lengths: Array  # L along it [m], shape (t,)
+    vertical: Array  # T_z along the curve Psi [N], shape (t,)
+    lengths: Array  # L along the curve Psi [m], shape (t,)
     line: FittedLine  # the line pi of least squares through (T_x, T_z): slope a_pi, intercept b_pi [N]
 
     @property
@@ -70,9 +70,9 @@ class _FeasibleSets:
 def feasible_sets(
     cable: sl.Cable, end: End, tolerance: float, tensions: Array, psi_tensions: Array, points: int = 80
 ) -> _FeasibleSets:
-    """The article's psi and Psi, exactly."""
-    # The map from (T, L) to B is one to one at a given L, so the outline of psi is the image of the outline of the
-    # tolerance, |dx| + |dz| = epsilon_max around B_d, under its inverse: no search is needed
+    """Exact sets psi and curve Psi of the article."""
+    # The map from (T, L) to B is one to one at a given L, so the outline of psi is the image, under the inverse
+    # map, of the outline of the tolerance |dx| + |dz| = epsilon_max around B_d; no search is needed
     # source: Gia Luan & Truong Thinh 2020, (20), (21), figures 3 to 5, statements 1 and 2
     if points % 4:
         raise sl.InvalidValueError("points", points, "a multiple of 4", "The outline has four edges.")
@@ -95,14 +95,14 @@ def feasible_sets(
 
 
 def _diamond(points: int) -> Array:
-    """Points on |x| + |z| = 1, the first again as the last, shape (points + 1, 2)."""
+    """Points on |x| + |z| = 1; the last point equals the first, shape (points + 1, 2)."""
     share = np.linspace(0.0, 4.0, points + 1)
     edges = np.arange(5.0)
     return np.stack([np.interp(share, edges, CORNERS[:, k]) for k in range(2)], axis=-1)
 
 
 def feasible_chapter() -> Chapter:
-    """Tensions that reach a point, with a tolerance and without."""
+    """Tensions for which the cable ends at a point, with and without a tolerance."""
     end = End.at_angle(CHORD)
     studies = [feasible_sets(simulated_cable(), end, e, TENSIONS, PSI_TENSIONS) for e in TOLERANCES]
     draw = Drawings("feasible")

@@ -19,11 +19,11 @@ RISES = np.linspace(-5.0, 4.0, 10)  # m
 TENSIONS = np.linspace(20.0, 400.0, 77)  # N
 TOLERANCES = (1e-3, 2e-3, 5e-3, 10e-3)  # m
 EDGES, TICKS = np.outer(10.0 ** np.arange(-4.0, -1.0), (1.0, 2.0, 5.0)).ravel(), (1e-4, 1e-3, 1e-2)  # of the map [m]
-LINES = (1e-3, 5e-3, 1e-2)  # m, drawn in it
-SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # of the made-up measurements: m, N
+LINES = (1e-3, 5e-3, 1e-2)  # m, contour lines of the map
+SAMPLES, LENGTH_ERROR, TENSION_ERROR, SEED = 60, 1e-3, 1.0, 2020  # of the synthetic measurements: m, N
 BOTH = ("linear_density", "axial_stiffness")
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-CASES = (  # lowest and highest chord tension [N], what is sought
+CASES = (  # lowest and highest chord tension [N], unknowns
     ("loose and taut", 30.0, 600.0, BOTH),
     ("taut only", 300.0, 600.0, BOTH),
     ("loose only", 15.0, 40.0, BOTH),
@@ -32,7 +32,7 @@ CASES = (  # lowest and highest chord tension [N], what is sought
 
 
 def identify_chapter() -> Chapter:
-    """identify_empirical on the simulation's cable, identify_cable on made-up measurements of it."""
+    """Apply identify_empirical to the simulation's cable, and identify_cable to synthetic measurements of it."""
     fit = identify_empirical(simulated_cable(), SPANS, RISES, TENSIONS)
     draw = Drawings("identify")
     return chapter("identify", (_constants(fit, draw), _limits(fit, draw), _measured()))

@@ -1,4 +1,4 @@
-"""The article's identification for a cable and a working range of one's own."""
+"""The article's identification for any cable and working range."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ POINT_BYTES = 400.0  # memory of each combination of span, rise and tension duri
 class Estimate(NamedTuple):
     """A fitted constant and its confidence interval.
 
-    The interval is that of least squares. Its scatter is no measuring noise but what the model's form cannot
-    follow in the working range, so it says how far the constant moves within the range, not how exact the fit is.
+    The interval is that of least squares. The residuals are not noise but the model error within the working range.
+    The interval therefore shows the variation of the constant within the range, not the accuracy of the fit.
     """
 
     value: float  # the constant
@@ -38,10 +38,10 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EmpiricalFit(Result):
-    """An empirical model for one cable and working range, and how good it is there.
+    """An empirical model for one cable and working range, and its errors.
 
-    Axes of the maps: s spans, r rises, t tensions, as given, ascending. A position error is that of the article's
-    (20), |dx| + |dz|: how far from B_d the end of the exact cable comes to rest under the model's force and length.
+    Axes of the maps: s spans, r rises, t tensions, in ascending order. The position error is (20) of the article,
+    |dx| + |dz|: distance from B_d to the end of the exact cable with the force and length of the model.
 
     Attributes:
         model: The model to use.
@@ -52,8 +52,8 @@ class EmpiricalFit(Result):
         spans: [m], shape (s,).
         rises: [m], shape (r,).
         tensions: T_x [N], shape (t,).
-        force_residual: T_z of the model less the exact one [N], shape (s, r, t).
-        length_residual: L of the model less the exact one [m], shape (s, r, t).
+        force_residual: T_z of the model minus the exact value [N], shape (s, r, t).
+        length_residual: L of the model minus the exact value [m], shape (s, r, t).
         position_error: [m], shape (s, r, t).
         cable_weight: w L [N], shape (s, r, t).
     """
@@ -72,7 +72,7 @@ class EmpiricalFit(Result):
     cable_weight: Array
 
     def tension_min(self, tolerance: float) -> float:
-        """The article's T_x,min [N]: from this sampled T_x on, every sampled cable keeps a position error [m].
+        """T_x,min of the article [N]: for this and larger T_x, the position error of every sampled cable is allowed.
 
         Args:
             tolerance: Allowed position error [m], > 0.
@@ -84,11 +84,11 @@ class EmpiricalFit(Result):
         return _first_of_good_tail(self.tensions, worst <= _tolerance(tolerance))
 
     def weight_max(self, tolerance: float, tension: float | None = None) -> float:
-        """The article's w_max [N]: up to this weight w L, every sampled cable keeps a position error [m].
+        """w_max of the article [N]: up to this weight w L, the position error of every sampled cable is allowed.
 
         Args:
             tolerance: Allowed position error [m], > 0.
-            tension: Count only sampled T_x from this one on [N]; None for all of them.
+            tension: Lower limit of the considered T_x [N]; None for all.
 
         Returns:
             The largest such sampled weight; NaN if even the lightest cable is too heavy.
@@ -103,10 +103,10 @@ class EmpiricalFit(Result):
 def identify_empirical(
     cable: Cable, spans: ArrayLike, rises: ArrayLike, tensions: ArrayLike, gravity: float = 9.81
 ) -> EmpiricalFit:
-    """Find the empirical model's constants for a cable and the range in which it will work.
+    """Find the constants of the empirical model for a cable and its working range.
 
-    Both constants enter their equations linearly, so that one least-squares step each is enough: k_h from T_z, with
-    the slope tan phi given; k_p from L by (48), with that k_h.
+    Both constants enter their equations linearly, so one least-squares step each is sufficient: first k_h from T_z with
+    given slope tan phi, then k_p from L by (48) with this k_h.
 
     Args:
         cable: Material, a single one of positive density.
@@ -119,7 +119,7 @@ def identify_empirical(
         The fit; `.model` is ready for `inverse`.
 
     Raises:
-        InvalidValueError: If the cable is none or weighs nothing, or a value is out of range.
+        InvalidValueError: If `cable` is not a cable or has no weight, or a value is out of range.
         CableGeometryError: If a span and a rise are both zero.
 
     Examples:
@@ -177,7 +177,7 @@ def identify_empirical(
 
 
 def end_position_error(state: CableState) -> Array:
-    """The article's (20): how far from B_d exact cables of a state's forces and lengths end, |dx| + |dz| [m]."""
+    """Position error (20) of the article, |dx| + |dz| [m]: distance from B_d to the ends of exact cables."""
     # state: of any model, shape (...)
     # returns shape (...)
     shape = state.shape
@@ -198,7 +198,7 @@ def end_position_error(state: CableState) -> Array:
 
 
 def _estimate(shape: Array, value: Array) -> Estimate:
-    """The factor of least squares in value = factor * shape, with its confidence interval."""
+    """Least-squares factor in value = factor * shape, with its confidence interval."""
     from scipy.stats import t
 
     x, y = shape.ravel(), value.ravel()
@@ -214,7 +214,7 @@ def _tolerance(tolerance: float) -> float:
 
 
 def _first_of_good_tail(values: Array, good: Flags) -> float:
-    """The value from which on, to the end of the array, all is good; NaN if the last one is not."""
+    """First value from which all later ones are good; NaN if the last one is not good."""
     bad = np.flatnonzero(~good)
     first = int(bad[-1]) + 1 if bad.size else 0
     return float(values[first]) if first < values.size else float("nan")

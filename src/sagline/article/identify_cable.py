@@ -19,10 +19,10 @@ from sagline.core.results import Result
 
 TensionAt = Literal["frame_end", "platform_end", "chord"]
 UNITS = {"linear_density": "kg/m", "axial_stiffness": "N", "length_offset": "m"}
-TOO_LOOSE = 0.5  # relative standard error from which on a value is not determined
-TOO_CLOSE = 0.95  # correlation above which two values are not separated
-ITERATIONS = 30  # of the tension at the chord from that at an end
-WEIGHTINGS = 3  # the weights depend on the answer, but little
+TOO_LOOSE = 0.5  # relative standard error above which a value is not determined
+TOO_CLOSE = 0.95  # correlation above which two values cannot be separated
+ITERATIONS = 30  # iterations to compute the chord tension from the tension at an end
+WEIGHTINGS = 3  # iterations of the weights, which depend slightly on the solution
 _ADVICE = {
     "linear_density": "measure at lower tensions or longer spans, where the cable sags more",
     "axial_stiffness": "measure at higher tensions, where it stretches more",
@@ -36,12 +36,12 @@ class CableFit(Result):
     Attributes:
         cable: The cable to use.
         names: Unknowns, in the order of the arrays below: "linear_density" [kg/m], "axial_stiffness" [N],
-            "length_offset" [m], by which the measured lengths are too long.
+            "length_offset" [m], positive if the measured lengths are too long.
         values: Estimates, shape (k,).
-        covariance: Of the values, shape (k, k), from the given measuring errors.
-        residuals: Measured less predicted length [m], shape (n,).
+        covariance: Covariance of the values, shape (k, k), from the given measurement errors.
+        residuals: Measured minus predicted length [m], shape (n,).
         chi_squared: Sum of squares of the residuals in units of their standard errors, per degree of freedom;
-            about 1 where cable and measuring errors are as supposed, far more where they are not.
+            about 1 if the cable model and the measurement errors are correct, much larger otherwise.
     """
 
     cable: Cable
@@ -53,12 +53,12 @@ class CableFit(Result):
 
     @property
     def standard_error(self) -> Array:
-        """Of each value, in its unit, shape (k,)."""
+        """Standard error of each value, in its unit, shape (k,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
     def correlation(self) -> Array:
-        """Between the values, shape (k, k)."""
+        """Correlations between the values, shape (k, k)."""
         error = self.standard_error
         correlation: Array = self.covariance / np.outer(error, error)
         return correlation
@@ -98,13 +98,13 @@ def identify_cable(
 ) -> CableFit:
     """Find a cable's density and stiffness from measured lengths and tensions by weighted least squares.
 
-    The exact cable predicts each length from the measured tension; a residual counts in units of the standard error
-    that both measurements together give it.
+    The exact cable predicts each length from the measured tension. Each residual is divided by its standard error, the
+    combined error of length and tension.
 
     Args:
         span: Horizontal distance of the ends [m], shape (n,), > 0.
         rise: Height of the platform end above the frame end [m], shape (n,).
-        unstrained_length: Measured L, as an encoder counts it [m], shape (n,), > 0.
+        unstrained_length: Measured L from an encoder [m], shape (n,), > 0.
         tension: Measured tension [N], shape (n,), > 0.
         length_error: Standard error of a length [m], > 0.
         tension_error: Standard error of a tension [N], > 0.
@@ -168,12 +168,12 @@ class _Measured:
             )
 
     def predicted(self, cable: Cable, tension: Array) -> Array:
-        """Lengths of exact cables whose tension, where it is measured, is as given [m]."""
+        """Lengths of exact cables with the given tension at the place of measurement [m]."""
         chord = np.hypot(self.span, self.rise)
         half = 0.5 * cable.linear_density * self.gravity * chord
         side = {"frame_end": 1.0, "platform_end": -1.0, "chord": 0.0}[self.tension_at]
         across = half * self.span / chord if side else 0.0
-        floor = 1e-3 * tension  # a tension below half the cable's weight is none; the search must survive it
+        floor = 1e-3 * tension  # lower bound: half the cable's weight can exceed the measured tension
         tau = np.maximum(side * half * self.rise / chord + np.sqrt(np.maximum(tension**2 - across**2, 0.0)), floor)
         state = Catenary().from_tension(cable, self.span, self.rise, tau, self.gravity)
         for _ in range(ITERATIONS if side else 0):
@@ -214,7 +214,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
     jacobian = found.jac
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
     values = np.array([offset if name == "length_offset" else float(getattr(cable, name)) for name in names])
-    unit = np.where(scale < 1.0, scale, values)  # of d value/d unknown
+    unit = np.where(scale < 1.0, scale, values)  # derivative d value/d unknown
     freedom = max(data.length.size - len(names), 1)
     rest = residuals(unknown)
     return CableFit(
@@ -228,7 +228,7 @@ def _fit(data: _Measured, names: tuple[str, ...], known: Cable, length_error: fl
 
 
 def _bounds(names: tuple[str, ...]) -> tuple[list[float], list[float]]:
-    """Bounds beyond any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
+    """Bounds wider than any rope: 1 mg/m to 1 t/m, 1 N to 1 PN."""
     low = {"linear_density": np.log(1e-6), "axial_stiffness": 0.0, "length_offset": -np.inf}
     high = {"linear_density": np.log(1e3), "axial_stiffness": np.log(1e15), "length_offset": np.inf}
     return [low[name] for name in names], [high[name] for name in names]

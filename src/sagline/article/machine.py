@@ -1,4 +1,4 @@
-"""A robot as it is rather than as it was planned: parameters that are off, and where the platform then rests."""
+"""A robot with errors of its parameters, and the resulting equilibria of the platform."""
 
 from __future__ import annotations
 
@@ -15,18 +15,16 @@ MODULUS, DENSITY, LOAD = "Young's modulus E", "linear density ρ", "load"
 ANCHORS, DRUM, ZERO = "anchor height", "drum radius", "zero of the lengths"
 PULLEY, DEAD = "pulley radius", "dead cable"
 WIDTH, HEIGHT = "platform anchors, outward", "platform anchors, up and down"
-Errors: TypeAlias = Mapping[
-    str, float
-]  # of parameters by name, each in its unit; those that are left out are as planned
+Errors: TypeAlias = Mapping[str, float]  # errors of parameters by name, each in its unit; missing ones are zero
 
 
 class Parameter(NamedTuple):
-    """Parameter of the prototype that may deviate from Table 1, for all cables alike."""
+    """Parameter of the prototype that may deviate from Table 1, equally for all cables."""
 
     name: str
     unit: str  # unit of its error
     typical: float  # typical error, in that unit
-    plausible: float  # the largest error we think possible, in that unit; ours, the article says nothing of it
+    plausible: float  # largest plausible error, in that unit; our assumption, not given in the article
     positive: bool = False  # true if it can only be larger than planned
 
 
@@ -48,7 +46,7 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
     """Robot with errors of some parameters: anchors, cables, routing and load."""
     off = {parameter.name: 0.0 for parameter in PARAMETERS} | dict(errors)
     cables, winches, outward = robot.cables, robot.winches, np.sign(robot.platform_anchors)
-    changes: dict[str, Any] = {}  # unchanged parts are not made again: a fit makes a thousand robots
+    changes: dict[str, Any] = {}  # unchanged parts are reused, because a fit creates a thousand robots
     if off[MODULUS] or off[DENSITY]:
         changes["cables"] = cables.replace(
             axial_stiffness=cables.axial_stiffness * (1.0 + 0.01 * off[MODULUS]),
@@ -68,15 +66,15 @@ def robot_with_errors(robot: sl.Robot, errors: Errors) -> sl.Robot:
 
 
 def wound_lengths(plan: sl.Plan, home: sl.Plan, errors: Errors) -> Array:
-    """Lengths that the winches wind when planned lengths are commanded."""
+    """Lengths wound by the winches when planned lengths are commanded."""
     from_home = plan.unstrained_length - home.unstrained_length
     return plan.unstrained_length + 0.01 * errors.get(DRUM, 0.0) * from_home + 1e-3 * errors.get(ZERO, 0.0)
 
 
 def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequence[Errors]) -> Array:
-    """Equilibria of robots with errors, whose winches wind the lengths of a plan of the robot without."""
-    # Encoders are set while the platform rests in its home pose, held as planned: what pulleys and dead length add to
-    # the lengths there is not counted
+    """Equilibria of robots with errors; their winches wind the lengths planned for the robot without errors."""
+    # Encoders are set with the platform at rest in its home pose with planned lengths, so additional lengths of pulleys
+    # and dead length at home are not counted
     robots = [robot_with_errors(robot, one) for one in errors]
     off_drum = np.stack([wound_lengths(plan, home, one) for one in errors]) + _not_counted(robots, home)[:, None]
     count, poses, m = off_drum.shape
@@ -94,7 +92,7 @@ def rest_positions(robot: sl.Robot, plan: sl.Plan, home: sl.Plan, errors: Sequen
 
 
 def _not_counted(robots: Sequence[sl.Robot], home: sl.Plan) -> Array:
-    """By how much pulleys and dead length lengthen the cables that hold the platform at home [m], shape (K, m)."""
+    """Additional cable lengths due to pulleys and dead length at the home pose [m], shape (K, m)."""
     added = np.zeros((len(robots), home.unstrained_length.shape[-1]))
     behind = [index for index, robot in enumerate(robots) if has_routing(robot)]
     if behind:

@@ -1,4 +1,4 @@
-"""Errors of the five cable models, and the range in which each is good enough."""
+"""Errors of the five cable models, and the range in which each is sufficient."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ MODELS: tuple[sl.CableModel, ...] = (
     sl.Empirical(),
     sl.Parabolic(),
     sl.Catenary(),
-)  # coarse to exact
+)  # from coarse to exact
 CHORDS = np.geomspace(1.0, 30.0, 41)  # m
 TENSIONS = np.geomspace(5.0, 2000.0, 61)  # N
 TOLERANCE = 1e-3  # m
 FLOOR = 1e-9  # m: errors below a nanometer are not drawn
-EDGES, LINES = 10.0 ** np.arange(-9.0, 1.0), (1e-4, 1e-3, 1e-2)  # of the maps: fillings and drawn lines [m]
+EDGES, LINES = 10.0 ** np.arange(-9.0, 1.0), (1e-4, 1e-3, 1e-2)  # filled contours and contour lines of the maps [m]
 TICKS = (1e-9, 1e-6, 1e-3, 1.0)  # m
 FINE_CHORDS, FINE_TENSIONS = np.geomspace(1.0, 30.0, 140), np.geomspace(5.0, 2000.0, 180)  # abscissae of the maps
 FINE_DENSITIES = np.geomspace(0.01, 1.0, 140)  # kg/m
@@ -46,11 +46,11 @@ USES = ((3.0, 300.0), (10.0, 300.0), (10.0, 50.0), (10.0, 15.0), (25.0, 100.0)) 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ModelErrors:
-    """Errors of the five models for every combination of four quantities of a cable, against the exact one.
+    """Errors of the five models relative to the exact one, for every combination of four quantities of a cable.
 
-    All models are asked for the same horizontal tension, so a length error is what a winch would wind wrongly, and a
-    position error, |dx| + |dz| of (20), is how far the end of an exact cable with the model's force and length is
-    from where it should be.
+    All models have equal horizontal tension. The length error is therefore the error of the length wound by a winch.
+    The position error, |dx| + |dz| of (20), is the distance from the desired position to the end of an exact cable with
+    the force and length of the model.
     """
 
     models: tuple[sl.CableModel, ...]  # the models, shape (5,)
@@ -59,12 +59,12 @@ class _ModelErrors:
     angles: Array  # phi [rad], shape (a,)
     densities: Array  # rho [kg/m], shape (r,)
     tensions: Array  # chord tension tau [N], shape (t,)
-    length_error: Array  # L of the model less the exact one [m], shape (5, c, a, r, t)
-    force_error: Array  # T_z of the model less the exact one [N], shape (5, c, a, r, t)
-    position_error: Array  # [m], shape (5, c, a, r, t)
+    length_error: Array  # L of the model minus the exact value [m], shape (5, c, a, r, t)
+    force_error: Array  # T_z of the model minus the exact value [N], shape (5, c, a, r, t)
+    position_error: Array  # position error [m], shape (5, c, a, r, t)
 
     def sufficient(self, tolerance: float) -> Array:
-        """The coarsest model that will do."""
+        """The coarsest sufficient model."""
         within = np.abs(self.length_error) <= tolerance
         coarsest: Array = np.argmax(within, axis=0).astype(np.float64)
         return coarsest
@@ -95,7 +95,7 @@ def model_errors(
 
 
 def models_chapter() -> Chapter:
-    """The page an engineer opens to decide which model a controller needs."""
+    """Page that helps to choose the cable model of a controller."""
     cable = simulated_cable()
     draw = Drawings("models")
     return chapter(
@@ -111,7 +111,7 @@ def _name(model: object) -> str:
 
 
 def _study(**varied: Array) -> _ModelErrors:
-    """Errors with the given quantities varied and the others at their reference."""
+    """Errors for varied given quantities; all other quantities have their reference values."""
     at = (varied.get(name, np.array([REFERENCE[name]])) for name in ("chord", "angle", "density", "tension"))
     return model_errors(float(simulated_cable().axial_stiffness), *at)
 
@@ -163,7 +163,7 @@ def _choice(label: str, heights: Array, errors: Array, caption: str, draw: Drawi
     colors = matplotlib.colormaps["viridis_r"](0.9 * np.arange(len(names)) / (len(names) - 1))
     figure, ax = map_axes("chord tension [N]", label)
     ax.add_patch(Rectangle((0.0, 0.0), 1.0, 1.0, transform=ax.transAxes, color=colors[-1], zorder=0.5))
-    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # the coarser over the better
+    for error, color in zip(errors[-2::-1], colors[-2::-1], strict=True):  # coarser models are drawn over better ones
         band = ax.contourf(FINE_TENSIONS, heights, error, levels=[-TOLERANCE, TOLERANCE], colors=[color])
         band.set_rasterized(True)
     if heights is FINE_CHORDS:

@@ -15,11 +15,11 @@ from sagline.core.numbers import n
 from sagline.plot.sheet import BLUE, COLORS
 from sagline.present.page import Chapter, Finding, Table, table_of
 
-AREA = 2e4  # pt^2 a meter of error
+AREA = 2e4  # pt^2 per meter of error
 
 
 def poses_chapter() -> Chapter:
-    """The ten poses of the prototype, and what could be wrong with it."""
+    """The ten poses of the prototype, and possible causes of the errors."""
     study = ten_poses()
     draw = Drawings("poses")
     return chapter(

@@ -17,20 +17,20 @@ PUBLISHED_K_H = 4.845  # m/s^2, in magnitude: Gia Luan & Truong Thinh 2020, sect
 PUBLISHED_K_P = 4.385  # m^2/s^4: section 5.2.4
 SHALLOW_K_H = GRAVITY / 2.0
 SHALLOW_K_P = GRAVITY**2 / 24.0
-LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # N: where the range of the article is looked for
+LOWEST, HIGHEST = (20.0, 400.0), (500.0, 200_000.0)  # N: search intervals of the tension range of the article
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterceptStudy:
-    """Intercepts b_pi of the forces on one end of the cable, and what the article regresses from them."""
+    """Intercepts b_pi of the forces on one end of the cable, and the regressions of the article."""
 
     sampling: Sampling  # the cables, a angles, c chords, r densities
     slope: Array  # a_pi of the fitted lines, shape (a, c, r)
     intercept: Array  # b_pi of the fitted lines [N], shape (a, c, r)
-    r_squared: Array  # how well the lines fit, shape (a, c, r)
+    r_squared: Array  # quality of the fit of the lines, shape (a, c, r)
     h_b: Array  # factor of D in b_pi = h_b D [N/m], shape (a, r)
-    k_h_of_angle: Array  # factor of rho in h_b = k_h rho, angle by angle [m/s^2], shape (a,)
-    k_h: float  # the same over all angles [m/s^2]
+    k_h_of_angle: Array  # factor of rho in h_b = k_h rho, one per angle [m/s^2], shape (a,)
+    k_h: float  # factor of rho in h_b = k_h rho over all angles [m/s^2]
 
 
 def intercept_studies(sampling: Sampling) -> tuple[InterceptStudy, InterceptStudy]:
@@ -63,7 +63,7 @@ class StretchStudy:
     """The adjusting length d = L - D of one cable over its tension."""
 
     cable: sl.Cable  # material
-    end: End  # where its platform end is
+    end: End  # its platform end
     tensions: Array  # T_x [N], shape (t,)
     magnitude: Array  # |T| on the platform end of the unstretchable cable [N], shape (t,)
     unstretchable: Array  # d of a cable that does not stretch [m], shape (t,)
@@ -121,7 +121,7 @@ def density_shape(density: Array) -> Array:
 
 
 def stretch_study(cable: sl.Cable, end: End, tensions: Array) -> StretchStudy:
-    """Take the stretch out of a cable's adjusting length, as (36) and (38) do, and as they should."""
+    """Remove the elongation from a cable's adjusting length, by (36) and (38), and correctly."""
     # The elongation under the force at the platform end, |T| L/EA, is too large by half the cable's weight along the
     # chord, w L^2 sin(phi)/(2 EA) (erratum 5)
     # source: Gia Luan & Truong Thinh 2020, (33) to (38), figures 8 and 9
@@ -174,11 +174,11 @@ class ConstantsStudy:
     """The constants over the range of tensions."""
 
     sampling: Sampling  # the cables; only their tensions change
-    over_lowest: tuple[Constants, ...]  # from each lowest tension to the same highest one
-    over_highest: tuple[Constants, ...]  # from the same lowest tension to each highest one
+    over_lowest: tuple[Constants, ...]  # from each lowest tension to the highest one of the article
+    over_highest: tuple[Constants, ...]  # from the lowest tension of the article to each highest one
     # both ends of the article's range multiplied by 1, 2, 4, ...: the limit of taut cables
     scaled: tuple[Constants, ...]
-    published: Constants  # the range in which the frame end gives the published |k_h|, and k_p comes out as published
+    published: Constants  # the range that gives the published |k_h| (at the frame end) and k_p
 
 
 def constants(sampling: Sampling) -> Constants:
@@ -202,7 +202,7 @@ def constants_study(sampling: Sampling, lowest: Array, highest: Array, factors: 
 
 @cache
 def published_sampling() -> Sampling:
-    """The article's sampling as we choose it, with the tensions that give its constants."""
+    """Assumed sampling of the article, with the range of tensions that gives its constants."""
     sampling = article_sampling()
     found = published_range(sampling)
     return sampling.between(found.lowest, found.highest)

@@ -21,7 +21,7 @@ from sagline.files.writing import check_files, plain
 from sagline.plot.sheet import BLUE, VERMILLION
 from sagline.present.page import Chapter, Panel, page, write_page
 
-NAMES = ("article.html", "article.json")  # both or neither is written
+NAMES = ("article.html", "article.json")  # both files are written, or none
 TITLE = "The article, redone"
 LEAD = (
     "Gia Luan & Truong Thinh, “Empirical Quasi-Static and Inverse Kinematics of Cable-Driven Parallel Manipulators "
@@ -36,8 +36,8 @@ NOTATION = (
 Progress = Callable[[int, int, str], None]
 _numbers = re.compile(r"(\d+)(?:-(\d+))?")
 REDONE = "3-15, 17-22 and 25-27; the others are drawings and photographs without data"
-KEY = "five-models"  # of the finding whose numbers it shows
-FIRST, LAST = 1e-3, 1e4  # mm, of the axis; what is smaller is written at its edge
+KEY = "five-models"  # key of the finding whose numbers the drawing shows
+FIRST, LAST = 1e-3, 1e4  # mm, ends of the axis; smaller values are written at its edge
 ROBOTS = (("suspended", BLUE, -0.16), ("mixed", VERMILLION, 0.16))
 
 
@@ -47,8 +47,8 @@ class ArticleReport:
 
     page: Path  # the HTML file
     data: Path  # the JSON file of its numbers
-    chapters: tuple[Chapter, ...]  # what is in it
-    numbers: dict[str, dict[str, Any]]  # chapter -> finding -> the numbers behind it, plain
+    chapters: tuple[Chapter, ...]  # chapters in it
+    numbers: dict[str, dict[str, Any]]  # chapter -> finding -> its numbers, unformatted
 
 
 def write_article(folder: Path | str, parts: Sequence[str] = (), progress: Progress | None = None) -> ArticleReport:
@@ -72,9 +72,9 @@ class ReportPart(NamedTuple):
     """A chapter that can be selected."""
 
     key: str  # its name
-    figures: tuple[int, ...]  # the article's figures that it redoes
-    tables: tuple[int, ...]  # the article's tables that it redoes
-    module: str  # where it is built; loaded only when it is
+    figures: tuple[int, ...]  # figures of the article in it
+    tables: tuple[int, ...]  # tables of the article in it
+    module: str  # module that builds it, loaded on demand
     function: str  # the function that builds it
 
     def build(self) -> Chapter:
@@ -99,11 +99,11 @@ PARTS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Selection:
-    """Chapters, figures and tables that are requested."""
+    """Requested chapters, figures and tables."""
 
-    whole: frozenset[str]  # keys of chapters that are wanted whole
-    figures: frozenset[int]  # numbers of figures that are wanted
-    tables: frozenset[int]  # numbers of tables that are wanted
+    whole: frozenset[str]  # keys of chapters requested completely
+    figures: frozenset[int]  # numbers of requested figures
+    tables: frozenset[int]  # numbers of requested tables
 
     @property
     def parts(self) -> tuple[ReportPart, ...]:
@@ -121,7 +121,7 @@ class _Selection:
 
 
 def selection(words: Sequence[str]) -> _Selection:
-    """Selected chapters, figures and tables; all for no words."""
+    """Selected chapters, figures and tables; without words, all of them."""
     if not words:
         return _Selection(frozenset(part.key for part in PARTS), frozenset(), frozenset())
     whole: set[str] = set()

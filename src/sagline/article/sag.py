@@ -30,7 +30,7 @@ from sagline.present.page import Chapter, Finding
 
 CHORD = 10.0  # m
 TENSIONS = np.linspace(10.0, 500.0, 150)  # N
-MIDDLE, DENSE = 2, -1  # of the sampled angles: the article's; of the densities: the heaviest
+MIDDLE, DENSE = 2, -1  # index of the article's angle, and index of the heaviest density
 PICKED = (1, 3, 5, 7)  # chords that are drawn
 DRAWN = (1, 3, 5, 7, 9)  # densities that are drawn
 
@@ -179,5 +179,5 @@ def _middle_and_dense(study: SagStudy) -> str:
 
 
 def _away(fit: Array, values: Array) -> float:
-    """Largest distance of a fit, over the largest value along the fitted axis, the last but one."""
+    """Largest distance of a fit divided by the largest value along the fitted axis (the last but one)."""
     return float((np.abs(fit - values).max(axis=-2) / values.max(axis=-2)).max())

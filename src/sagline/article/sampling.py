@@ -1,4 +1,4 @@
-"""The cables that the article's empirical study samples, and its least squares."""
+"""Cables sampled in the article's empirical study, and its least-squares fits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagline.core.fields import given, rule
 
 GRAVITY = 9.81  # m/s^2, everywhere in the article's studies
 ANGLE = 0.754  # rad, of the article's figure 10
-UNSTRETCHABLE = 1e20  # N: strains below the rounding of a length
+UNSTRETCHABLE = 1e20  # N: strains are below the rounding error of a length
 
 
 class FittedLine(NamedTuple):
@@ -26,7 +26,7 @@ class FittedLine(NamedTuple):
 
 
 def fit_line(x: Array, y: Array) -> FittedLine:
-    """The line of least squares through samples along the last axis."""
+    """Least-squares line through samples along the last axis."""
     x, y = np.broadcast_arrays(x, y)
     away_x = x - x.mean(axis=-1, keepdims=True)
     away_y = y - y.mean(axis=-1, keepdims=True)
@@ -38,8 +38,8 @@ def fit_line(x: Array, y: Array) -> FittedLine:
 
 
 def fit_factor(shape: Array, y: Array, axis: int = -1) -> Array:
-    """The factor a of least squares in y = a * shape, along one axis."""
-    # Every regression of the article but that of the line is of this form, with the shape 1/T_x^2, D^3, cos^4(phi),
+    """Least-squares factor a in y = a * shape, along one axis."""
+    # Every regression of the article except for the line has this form, with the shape 1/T_x^2, D^3, cos^4(phi),
     # rho^2, D or rho
     shape, y = np.broadcast_arrays(shape, y)
     factor: Array = np.sum(shape * y, axis=axis) / np.sum(shape**2, axis=axis)
@@ -61,7 +61,7 @@ class Sampling:
     axial_stiffness: float = UNSTRETCHABLE  # EA of all of them [N]
 
     def __attrs_post_init__(self) -> None:
-        """Check the four."""
+        """Check the four quantities."""
         for about in (about for about in attrs.fields(Sampling) if about.metadata):
             object.__setattr__(self, about.name, checked(getattr(self, about.name), about.name, **about.metadata))
 
@@ -75,13 +75,13 @@ class Sampling:
         return sl.Catenary().from_tension(cable, chord * cosine, chord * np.sin(angle), tension / cosine, GRAVITY)
 
     def between(self, lowest: float, highest: float) -> Sampling:
-        """The same with as many tensions, evenly spaced between two others."""
+        """This sampling with an equal number of tensions, evenly spaced between two limits."""
         tensions = np.linspace(lowest, highest, self.tensions.size)
         return Sampling(self.angles, self.chords, self.densities, tensions, self.axial_stiffness)
 
 
 def article_sampling() -> Sampling:
-    """Our choice of what the article samples: it gives phi = 0.754 rad and rho in (0, 2), and no other number."""
+    """Assumed samples; the article gives phi = 0.754 rad and rho in (0, 2), and no other number."""
     # Chords from 2 to 16 m, as in the frames of its Table 1; five angles around its 0.754 rad; ten densities; sixty
     # tensions from 100 N to 10 kN, evenly spaced
     # source: Gia Luan & Truong Thinh 2020, figures 6 to 15

@@ -13,8 +13,8 @@ from sagline.article.models import MODELS
 from sagline.core.arrays import Array
 
 ROBOTS = ("article-suspended", "article-mixed")  # the article's first and second configuration
-# The article describes (55), closest to the set before, but its figures show cables near their minimum wherever they
-# are not needed and curves that return to where they began: the least norm, in its variable T_x.
+# The article describes (55), closest to the previous tensions. Its figures, however, show unneeded cables near their
+# minimum, and curves that return to their initial values. This is the minimum norm of its variable T_x.
 METHOD = sl.MinimumNorm("horizontal")
 ERROR_BAND = 6e-3  # m, the article's "(-6, 6) mm"
 
@@ -22,7 +22,7 @@ ERROR_BAND = 6e-3  # m, the article's "(-6, 6) mm"
 class Figures(NamedTuple):
     """A run in numbers, over its feasible poses."""
 
-    error_max: float  # largest distance of the platform from where it was planned [m]
+    error_max: float  # largest distance of the platform from the planned position [m]
     error_mean: float  # mean distance [m]
     axis_error_max: float  # largest error along one axis [m]
     tension_min: float  # smallest T_x [N]
@@ -30,15 +30,15 @@ class Figures(NamedTuple):
     vertical_max: float  # largest |T_z| [N]
     step_max: float  # largest change of T_x from one sample to the next [N]
     slope_max: float  # largest |dT_x/dt| [N/s]
-    # largest change of dT_x/dt from one step to the next [N/s]: it stays, however small the step, where a course has a
-    # corner
+    # largest change of dT_x/dt from one step to the next [N/s]; at a corner of a curve it does not vanish with smaller
+    # steps
     slope_jump: float
     length_min: float  # smallest L [m]
     length_max: float  # largest L [m]
     adjusting_min: float  # smallest d [m]
     adjusting_max: float  # largest d [m]
     feasible: float  # share of feasible poses
-    held: float  # share of poses that the lengths hold in a stable equilibrium
+    held: float  # share of poses with a stable equilibrium for the planned lengths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +48,8 @@ class PathStudy:
     Attributes:
         path: The path, N samples.
         models: The cable models, shape (k,).
-        suspended: Plan and exact equilibria of the first configuration, model by model.
-        mixed: The same of the second configuration.
+        suspended: Plan and exact equilibria of the first configuration, one per model.
+        mixed: Plan and exact equilibria of the second configuration, one per model.
     """
 
     path: sl.Path
@@ -71,20 +71,20 @@ class PathStudy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LowTension:
-    """The empirical model's position error over the lowest tension that is allowed."""
+    """Position error of the empirical model as a function of the lower tension limit."""
 
     tension_min: Array  # lower limit of the chord tension [N], shape (k,)
     suspended: Array  # largest error along one axis of the first configuration [m], shape (k,)
-    mixed: Array  # the same of the second [m], shape (k,)
-    suspended_bound: Figures  # with the article's bound (54) in its place, T_adj = 0, and the share of feasible poses
-    mixed_bound: Figures  # the same of the second configuration
+    mixed: Array  # largest error along one axis of the second configuration [m], shape (k,)
+    suspended_bound: Figures  # first configuration with the bound (54) as the lower limit, T_adj = 0
+    mixed_bound: Figures  # second configuration with this bound
 
 
 def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) -> PathStudy:
-    """Plan both robots along the article's path and wind the lengths onto exact cables.
+    """Plan both robots along the article's path and apply the lengths to exact cables.
 
-    The article's "simple controller", tensions in and lengths out, is the plan; where the platform then is, is the
-    equilibrium on exact cables under the same inertia.
+    The plan is the article's "simple controller", from tensions to lengths. The resulting pose of the platform is the
+    equilibrium on exact cables under equal inertial forces.
 
     Source:
         Gia Luan & Truong Thinh 2020, section 7.1, figures 17 to 22.
@@ -96,7 +96,7 @@ def path_study(rate: float = 100.0, models: Sequence[sl.CableModel] = MODELS) ->
 
 
 def low_tension_study(limits: Array, rate: float = 10.0) -> LowTension:
-    """The empirical model where cables may become slack."""
+    """The empirical model at low tensions, where cables may become slack."""
     path, robots = sl.article_path(rate), [sl.load_robot(name) for name in ROBOTS]
     suspended, mixed = (
         [figures(_run(robot.replace(tension_min=low), path, sl.Empirical(), METHOD)).axis_error_max for low in limits]

@@ -1,4 +1,4 @@
-"""Table 2: ten poses of the prototype, wanted and measured."""
+"""Table 2: ten poses of the prototype, desired and measured."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Table2:
 
     @property
     def error(self) -> Array:
-        """Actual less desired position [m], shape (10, 3)."""
+        """Actual minus desired position [m], shape (10, 3)."""
         return self.actual - self.desired
 
     @property
@@ -32,7 +32,7 @@ class Table2:
 
 
 def table2() -> Table2:
-    """Read the table that comes with the package."""
+    """Read the table from the package."""
     # source: Gia Luan & Truong Thinh 2020, Table 2
     text = files("sagline.article").joinpath("data/table2.csv").read_text(encoding="utf-8")
     rows = list(csv.reader(line for line in text.splitlines() if not line.startswith("#")))[1:]

@@ -1,4 +1,4 @@
-"""Table 2 and figure 27: ten measured poses of the prototype, and what could be wrong with it."""
+"""Table 2 and figure 27: ten measured poses of the prototype, and possible causes of their errors."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from sagline.motion.segments import QUINTIC
 
 HOME = (0.0, 0.0, 1.5)  # m, the prototype's home position
 METHOD = sl.MinimumNorm("horizontal")
-TOUR_SPEED = 0.2  # m/s, ours: the article says "low speed"
+TOUR_SPEED = 0.2  # m/s, assumed: the article states "low speed"
 
 
 class Trend(NamedTuple):
-    """One parameter off by a typical error."""
+    """Effect of a typical error of one parameter."""
 
     parameter: Parameter
-    error: Array  # predicted actual less desired position [m], shape (10, 3)
+    error: Array  # predicted actual minus desired position [m], shape (10, 3)
     # change of the vertical error with the height of the pose, mm per m; the measured one is negative
     height_slope: float
 
@@ -47,20 +47,20 @@ class TenPoses:
     table: Table2
     plan: sl.Plan  # the prototype's plan for them, with the empirical model
     home: sl.Plan  # the plan of its home pose
-    model_error: Array  # error that the empirical model itself makes at the ten poses [m], shape (10, 3)
-    height_line: FittedLine  # line of least squares of the measured vertical error over the height of the pose
-    trends: tuple[Trend, ...]  # one parameter off at a time
-    # all explanations by one, by two and by three parameters, those that leave least first within each
+    model_error: Array  # error of the empirical model at the ten poses [m], shape (10, 3)
+    height_line: FittedLine  # least-squares line of the measured vertical error over the height of the pose
+    trends: tuple[Trend, ...]  # effects of single parameters
+    # all explanations by one, by two and by three parameters, each group sorted by the remaining error
     explanations: tuple[tuple[Explanation, ...], ...]
-    # part of a pulley radius's effect on the positions that a zero of the lengths and an anchor height reproduce
-    # together: length of the projection over length of the whole
+    # part of the effect of a pulley radius on the positions that an offset of the lengths and an anchor height together
+    # can reproduce: length of the projection divided by the length of the whole vector
     imitated: float
-    single_zero: Array  # standard deviation of the zero of each cable if every cable had its own [m], shape (m,)
-    dead_meter: Array  # predicted actual less desired position with 1 m of dead length [m], shape (10, 3)
+    single_zero: Array  # standard deviation of each length offset, with one offset per cable [m], shape (m,)
+    dead_meter: Array  # predicted actual minus desired position with 1 m of dead length [m], shape (10, 3)
     measured_rms: float  # root mean square of the measured errors, over all coordinates [m]
 
     def best(self, count: int) -> Explanation:
-        """The explanation by so many parameters that leaves least."""
+        """Explanation with the smallest remaining error for a number of parameters."""
         return self.explanations[count - 1][0]
 
     def explanation(self, *names: str) -> Explanation:
@@ -69,7 +69,7 @@ class TenPoses:
 
 
 def ten_poses(most: int = 3) -> TenPoses:
-    """Plan the prototype at the ten poses, and look for what explains its measured errors."""
+    """Plan the prototype at the ten poses, and search for causes of its measured errors."""
     # Every model of up to three of the parameters is fitted with the exact machine, within what we think plausible.
     # Positions are printed in whole millimeters: no fit can be better than 0.3 mm.
     table, robot = table2(), sl.load_robot("article-prototype")
@@ -98,7 +98,7 @@ def ten_poses(most: int = 3) -> TenPoses:
 
 
 def tour(rate: float = 10.0) -> tuple[sl.Plan, Array]:
-    """The prototype's way from its home position through the ten poses and back, from rest to rest, without stops."""
+    """Path of the prototype from home through the ten poses and back, from rest to rest, without stops."""
     stops = [HOME, *table2().desired, HOME]
     path = sl.quintic_path(stops, speed=TOUR_SPEED, rate=rate)
     plan = sl.inverse(sl.load_robot("article-prototype"), path, sl.Empirical(), METHOD)

@@ -14,7 +14,7 @@ from sagline.present.page import Chapter, Finding, Panel, Table, Verdict
 
 
 class _Numbers(Formatter):
-    """Formatter of numbers for readers: {extent:.3g mm}, {100*share:.1f %}, {errors[2]:.2f}; texts stay as they are."""
+    """Formatter of numbers for readers: {extent:.3g mm}, {100*share:.1f %}, {errors[2]:.2f}; texts are unchanged."""
 
     def get_field(self, field_name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> tuple[Any, Any]:
         """Value of a name, times a factor before it."""
@@ -42,7 +42,7 @@ def finding(
     data: Sequence[Table] = (),
     **words: Any,
 ) -> Finding:
-    """Finding of a key; its texts take their numbers from `numbers`, which are filed too, and from `words`."""
+    """Finding of a key; its texts use the numbers in `numbers`, which are also saved, and in `words`."""
     entry, known = _texts()["findings"][key], numbers or {}
     statement, measured = (_Numbers().format(entry.get(part, ""), **{**known, **words}) for part in _PARTS)
     return Finding(
@@ -60,7 +60,7 @@ def finding(
 
 
 def chapter(key: str, findings: Sequence[Finding], **words: Any) -> Chapter:
-    """Chapter of a key; its lead takes its numbers from `words`."""
+    """Chapter of a key; its lead text uses the numbers in `words`."""
     entry = _texts()["chapters"][key]
     return Chapter(key, entry["title"], _Numbers().format(entry["lead"], **words), tuple(findings))
 

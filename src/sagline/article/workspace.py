@@ -17,7 +17,7 @@ from sagline.present.page import Chapter, Finding, Panel, table_of
 from sagline.workspaces.region import Plane, slice_of
 
 CELLS = 24  # along the longest edge of the frame
-HEIGHT = 3.0  # m: half the frame's
+HEIGHT = 3.0  # m: half the height of the frame
 POINTS = 121  # along each side of a slice
 
 

@@ -1,7 +1,7 @@
-"""Figures for papers: every function draws on given Axes or makes a figure of its own, without `matplotlib.pyplot`.
+"""Figures for papers: every function draws on given Axes or creates a new figure, without `matplotlib.pyplot`.
 
-A notebook shows a returned figure; of Axes, show `ax.figure`. `save` writes either to a file. `with style("ieee"):`
-sets width, fonts and sizes of a journal.
+A notebook shows a returned figure; for returned Axes, show `ax.figure`. `save` writes a figure or Axes to a file.
+`with style("ieee"):` sets width, fonts and sizes of a journal.
 """
 
 from sagline.plot.calibration import calibration

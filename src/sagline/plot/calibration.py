@@ -30,14 +30,14 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 PARTS: Final = ("all", "residuals", "correlation", "errors")
-BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # standard deviations, and how dense
+BANDS: Final = ((2.0, 0.35), (1.0, 0.55))  # half widths in standard deviations, and opacity
 REACH: Final = 5.0  # standard deviations; larger residuals are drawn at the edge
-MOST_POSES: Final = 1500  # whose residuals are drawn; of more poses evenly chosen ones and all outliers
-MOST_NAMED: Final = 8  # outliers that are named
-POINTS: Final = 25  # of a map, along each side
+MOST_POSES: Final = 1500  # largest number of drawn poses; of more, evenly chosen ones and all outliers
+MOST_NAMED: Final = 8  # largest number of named outliers
+POINTS: Final = 25  # points along each side of a map
 MARKS: Final = ("o", "s", "^", "D")
 PANEL, MATRIX, BESIDE, MAP = 0.95, 3.2, 1.2, 2.7  # in: heights of a panel, of the matrix, beside a map; its width
-LINE: Final = 0.048  # of the matrix: height of a name beside it
+LINE: Final = 0.048  # height of a name next to the matrix, as a share of its height
 LEADER: Final[dict[str, Any]] = {"arrowstyle": "-", "linewidth": 0.5, "relpos": (1.0, 0.5), "shrinkB": 0.0}
 ROUND: Final = FuncFormatter(lambda value, _: f"{value:g}")
 PER_METER: Final = 1e3  # mm
@@ -58,18 +58,18 @@ def calibration(found: Calibration, part: str = "all", *, height: float | None =
     Residuals are in standard deviations of their sensors, by rows of the log; the bands are one and two standard
     deviations, outliers have a ring, and values off the scale are triangles at the edge. The correlations are those of
     all estimated parameters, by kinds. The maps show the expected position error on a level slice, before (from the
-    priors) and after the calibration; without shifts and turns of the world if the readings do not observe them.
+    priors) and after the calibration; without translations and rotations of the world if these are not observable.
 
     Args:
         found: From `calibrate`.
         part: "residuals", "correlation" or "errors"; "all" for all of them.
-        height: Of the slice [m]; None for the middle of the calibration's poses.
+        height: Height of the slice [m]; None for the middle of the calibration's poses.
 
     Returns:
         The figure.
 
     Raises:
-        InvalidValueError: If it is no calibration, or there is no such part.
+        InvalidValueError: If `found` is not a calibration, or `part` does not exist.
 
     Examples:
         >>> import sagline as sl
@@ -192,7 +192,7 @@ def _correlation(figure: SubFigure, found: Calibration) -> None:
 
 
 def _apart(places: Array, least: float, end: float) -> Array:
-    """Ascending places between 0 and an end, moved apart to a least distance."""
+    """Ascending positions between 0 and an end, moved apart to a minimum distance."""
     moved = np.array(places)
     for k in range(1, len(moved)):
         moved[k] = max(moved[k], moved[k - 1] + least)
@@ -233,7 +233,7 @@ def _errors(figure: SubFigure, found: Calibration, at: float | None) -> None:
 
 
 def _height_of_maps(found: Calibration) -> float:
-    """Height of two maps side by side [in]."""
+    """Height of a figure of two maps side by side [in]."""
     x, y, _ = _slice(found, None)
     high = BESIDE + MAP * float(np.clip(np.ptp(y) / max(float(np.ptp(x)), 1e-9), 0.3, 1.3))
     return 2.0 * high if current().narrow else high

@@ -45,19 +45,19 @@ AZIMUTH, ELEVATION = np.radians(-60.0), np.radians(24.0)
 USUAL: Final = view_axes(float(AZIMUTH), float(ELEVATION))
 FRAME, GROUND, BODY, WHEEL = "0.45", (0.5, 0.5, 0.5, 0.12), (0.835, 0.369, 0.0, 0.16), "0.4"
 CABLE_WIDTH, FRAME_WIDTH, BODY_WIDTH, THIN, GAP = 1.2, 0.7, 1.1, 0.6, 1.3  # pt
-SPECK: Final = 1.5  # pt: what is left of a line between two gaps and shorter looks like dirt
-SPARE: Final = 0.05  # of the picture, around it
-WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # in; of the width, that the drawing is tall
-PLACES: Final = np.linspace(0.12, 0.72, 31)  # along a cable from the frame, where its number may stand
-BESIDE, ROOM = 0.8, 0.8  # of the size of the text: from a cable to its number, and from a number to other lines
-CLEAR = 1.15  # the same beside its cable
-FROM_ANCHOR = 1.6  # of the size of the text, from the end of a cable at the frame, which is to be seen
-ARROW: Final = 0.16  # of the picture's width: at most the length of the axes
-END_ON: Final = 0.12  # of its length: an axis seen so short has no name
+SPECK: Final = 1.5  # pt: shorter pieces of a line between two gaps are left out
+SPARE: Final = 0.05  # margin as a share of the picture
+WIDTH, LEAST, MOST = 5.6, 0.35, 1.1  # in; smallest and largest ratio of height to width
+PLACES: Final = np.linspace(0.12, 0.72, 31)  # positions of the number along a cable, from the frame
+BESIDE, ROOM = 0.8, 0.8  # distances in text sizes: from a cable to its number, and from a number to other lines
+CLEAR = 1.15  # distance in text sizes from a number next to its cable to other lines
+FROM_ANCHOR = 1.6  # in text sizes: distance of a number from the frame end, which stays visible
+ARROW: Final = 0.16  # largest length of the axes, as a share of the picture's width
+END_ON: Final = 0.12  # share of its length: an axis that appears shorter has no name
 
 
 class _Stroke(NamedTuple):
-    """A line of the drawing: points in the world (P, 3) [m], look, width [pt], and True if it hides lines behind it."""
+    """A line of the drawing: points in the world (P, 3) [m], style, width [pt], true if it hides lines behind it."""
 
     points: Array
     color: Any
@@ -75,20 +75,20 @@ def drawing(
 ) -> Axes:
     """The robot at rest as a line drawing for print, with hidden lines removed.
 
-    Hidden parts are computed, not painted over: a cable that passes behind another one, the frame or the platform is
-    interrupted there. Every cable has its number and the color of its chord tension. The projection is parallel; the
-    three axes at the ground have one length, which is written there.
+    Hidden parts are computed, not painted over: a cable is interrupted where it passes behind another cable, the frame
+    or the platform. Every cable has its number and the color of its chord tension. The projection is parallel; the
+    three axes at the ground have equal lengths, and this length is written next to them.
 
     Args:
         robot: The robot.
-        pose: Pose of the platform; None for the middle of the robot's test box. Where no tensions carry the platform
+        pose: Pose of the platform; None for the middle of the robot's test box. At an infeasible pose
             the cables are straight, dashed and gray.
         azimuth: Azimuth of the viewer, from the x axis toward the y axis [rad].
         elevation: Elevation of the viewer [rad], 0 to pi / 2.
-        ax: Axes to draw on, as large as they will be; None for a new figure.
+        ax: Axes to draw on, with their final size; None for a new figure.
 
     Returns:
-        The axes; their coordinates are those of the picture, to the right and up [m].
+        The axes; their coordinates are to the right and up in the picture [m].
 
     Raises:
         InvalidValueError: If no pose is given and the robot has no test box, the pose is a batch, or the viewer looks
@@ -151,7 +151,7 @@ class _Scene(NamedTuple):
 
     @property
     def points(self) -> Array:
-        """All of it, shape (n, 3)."""
+        """All points, shape (n, 3)."""
         return np.concatenate([stroke.points for stroke in (*self.cables, *self.others)] + [self.flat[0]])
 
 
@@ -206,7 +206,7 @@ def _draw(ax: Axes, scene: _Scene, view: Array) -> None:
 
 
 def _length(part: Array) -> float:
-    """Of a line in the picture [m]."""
+    """Length of a line in the picture [m]."""
     return float(np.linalg.norm(np.diff(part[:, :2], axis=0), axis=1).sum())
 
 
@@ -217,7 +217,7 @@ def _seen_from_outside(face: Array) -> bool:
 
 
 def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: float) -> list[Array]:
-    """Positions of the cable numbers: on the cable, or close beside it if another cable is too near."""
+    """Positions of the cable numbers: on the cable, or next to it if another cable is too close."""
     starts = np.concatenate([course[:-1] for course in courses])
     steps = np.concatenate([course[1:] for course in courses]) - starts
     owners = np.repeat(np.arange(len(courses)), [len(course) - 1 for course in courses])
@@ -231,7 +231,7 @@ def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: f
         candidates = np.concatenate((on, on + across, on - across))
         other = owners != k
         beside = np.arange(len(candidates)) >= len(on)
-        space = np.where(beside, CLEAR, ROOM) * size  # so that it is nearer to its own cable than to any other
+        space = np.where(beside, CLEAR, ROOM) * size  # so that its own cable is the nearest
         free = np.minimum(_distances(candidates, starts[other], steps[other]) / space, 1.0)
         free = np.minimum(free, np.linalg.norm(candidates - cable[0], axis=1) / (FROM_ANCHOR * size))
         for place in chosen:
@@ -242,7 +242,7 @@ def _number_positions(cables: Sequence[Array], courses: Sequence[Array], size: f
 
 
 def _distances(points: Array, starts: Array, steps: Array) -> Array:
-    """From points (n, 2) to the nearest of segments (S, 2), shape (n,)."""
+    """Distances from points (n, 2) to the nearest of segments (S, 2), shape (n,)."""
     square = np.einsum("sc,sc->s", steps, steps)
     away = points[:, None] - starts
     share = np.einsum("nsc,sc->ns", away, steps) / np.where(square > 0.0, square, 1.0)
@@ -257,7 +257,7 @@ def _label_boxes(places: Sequence[Array], size: float) -> list[Array]:
 
 
 def _free_axes(occupied: Array, view: Array, limits: Array, size: float) -> tuple[Array, Array, str]:
-    """The world's axes in the corner of the picture that is farthest from everything; their place means nothing."""
+    """World axes in the emptiest corner of the picture; their position has no meaning."""
     width = float(np.ptp(limits[0]))
     decade = 10.0 ** floor(log10(ARROW * width))
     length = max(step * decade for step in (1.0, 2.0, 5.0) if step * decade <= ARROW * width)
@@ -271,7 +271,7 @@ def _free_axes(occupied: Array, view: Array, limits: Array, size: float) -> tupl
 
 
 def _draw_axes(ax: Axes, start: Array, ends: Array, length: str, look: Style) -> None:
-    """Three arrows with their names, and how long they are."""
+    """Three arrows with their names, and their length."""
     longest = float(np.linalg.norm(ends - start, axis=1).max())
     arrow: dict[str, Any] = {"arrowstyle": "-|>", "mutation_scale": 5.0 * look.line, "linewidth": 0.6 * look.line}
     arrow |= {"color": "black", "shrinkA": 0.0, "shrinkB": 0.0}

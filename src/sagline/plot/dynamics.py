@@ -49,20 +49,20 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 ENERGY_STYLES = ("-", DASHED, (0, (1.0, 1.2)), (0, (5.0, 1.5, 1.0, 1.5)), (0, (7.0, 2.0)))
-ROUNDING = 1e-12  # of the energy that there is: an error below it is the arithmetic's
-THIN, WIDE = 0.6, 3.6  # pt: a mode in which only cables swing, one in which only the platform does
-FAINT = 0.4  # opacity of the thin ones
-SHARES = (1.0, 0.5, 0.0)  # in the legend
-PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # heights that are drawn -> panels beside each other; none stays empty
-HIGHEST, LOWEST = 2e2, 1e-3  # over the answer at rest: undamped peaks have no top, and zeros no bottom
-MARK = 0.035  # longest mark of a mode, of the axes' height
-FAINTEST = 0.15  # mark of a mode in which the platform stands still
+ROUNDING = 1e-12  # share of the energy; smaller errors are rounding errors
+THIN, WIDE = 0.6, 3.6  # pt: width of a mode of the cables only, and of the platform only
+FAINT = 0.4  # opacity of thin lines
+SHARES = (1.0, 0.5, 0.0)  # platform shares in the legend
+PANELS: Final = {6: 3, 4: 2, 3: 3, 2: 2, 1: 1}  # number of heights -> panels per row, so that no panel is empty
+HIGHEST, LOWEST = 2e2, 1e-3  # limits relative to the static response, because undamped peaks and zeros are unbounded
+MARK = 0.035  # longest mark of a mode, as a share of the axes' height
+FAINTEST = 0.15  # opacity of the mark of a mode without platform motion
 
 
 def energy(simulation: Simulation) -> Figure:
     """Kinetic and potential energy, work supplied and energy lost over time, and the error of the balance below.
 
-    The potential energy is drawn less its value at the start.
+    The potential energy is drawn minus its initial value.
 
     Args:
         simulation: The simulation.
@@ -113,23 +113,23 @@ def _largest(*courses: Array) -> float:
 def frequencies(
     vibrations: Iterable[Vibration], time: ArrayLike | None = None, label: str = "time [s]", ax: Axes | None = None
 ) -> Axes:
-    """Natural frequencies along a path, as in a diagram of Campbell: with cable mass, and massless (dashed).
+    """Natural frequencies along a path (Campbell diagram): with cable mass, and massless (dashed).
 
-    A line is as wide and as dense as the platform's share of the mode's kinetic energy: where a wide line fades and
-    its neighbor grows, platform and cable pass the motion on to each other.
+    Width and opacity of a line show the platform's share of the mode's kinetic energy. Where a wide line fades and its
+    neighbor grows, platform and cable exchange the motion.
 
     Args:
-        vibrations: Of N states in a row, from `vibration`.
+        vibrations: Vibrations of N successive states, from `vibration`.
         time: Abscissae of the states, ascending, shape (N,), times of a path [s] for instance;
             None for their numbers.
-        label: Of that axis, with its unit.
+        label: Label of the time axis, with its unit.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
         The axes.
 
     Raises:
-        InvalidValueError: If there are less than two, or the times do not fit them.
+        InvalidValueError: If there are fewer than two, or the number of times is wrong.
 
     Examples:
         >>> import sagline as sl
@@ -161,7 +161,7 @@ def frequencies(
 
 
 def _swinging(states: tuple[Vibration, ...], clock: Array) -> LineCollection:
-    """A segment between every two neighbors, of the mean of both shares."""
+    """Segments between neighbors, with the mean share of both."""
     pieces, shares = [], []
     for (first, one), (second, other) in pairwise(zip(clock, states, strict=True)):
         count = min(one.frequency.size, other.frequency.size)
@@ -180,14 +180,14 @@ def _widths(share: Array) -> Array:
 
 
 def _colors(share: Array) -> list[tuple[float, float, float]]:
-    """On white; not by opacity, in which round ends would show."""
+    """Colors mixed with white; with opacity, overlapping line ends would be visible."""
     dense = FAINT + (1.0 - FAINT) * share
     red, green, blue = (1.0 - dense * (1.0 - part) for part in to_rgb(BLUE))
     return list(zip(red.tolist(), green.tolist(), blue.tolist(), strict=True))
 
 
 def _filled(rows: list[Array]) -> Array:
-    """Rows of different lengths as one table, NaN if there is none."""
+    """Rows of different lengths as one table, filled with NaN."""
     table = np.full((len(rows), max(row.size for row in rows)), np.nan)
     for k, row in enumerate(rows):
         table[k, : row.size] = row
@@ -227,14 +227,14 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     """One quantity of a map over a grid of poses, a panel for each of some heights.
 
     Args:
-        found: From `frequency_map`, of poses that are a grid along x, y and z.
+        found: Map from `frequency_map`, of poses on a grid along x, y and z.
         quantity: "frequency", "massless_frequency", "platform_share", "peak" or "peak_frequency".
 
     Returns:
         The figure; gray without a solution.
 
     Raises:
-        InvalidValueError: If there is no such quantity, or the poses are no grid.
+        InvalidValueError: If the quantity does not exist, or the poses are not on a grid.
 
     Examples:
         >>> import sagline as sl
@@ -248,7 +248,7 @@ def frequency_map(found: FrequencyMap, quantity: str = "frequency") -> Figure:
     name, label, logarithmic = MAP_QUANTITIES[choice(quantity, "quantity", MAP_QUANTITIES)]
     x, y, z, values = _gridded(instance(found, FrequencyMap, "found"), getattr(found, name))
     shown = max(count for count in PANELS if count <= z.size)
-    rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # the lowest, the highest, and some between
+    rows = np.linspace(0, z.size - 1, shown).astype(np.intp)  # the lowest, the highest, and some in between
     known = values[:, :, rows][np.isfinite(values[:, :, rows])]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.5, 1.0)
     scale = LogNorm(low, max(high, 1.01 * low)) if logarithmic and low > 0.0 else Normalize(low, high)
@@ -285,17 +285,17 @@ def response(
     Marks at the bottom are the modes with cable mass; darker marks have a larger platform share.
 
     Args:
-        vibration: Of a stable state, from `vibration`; its damping is that of both curves. Or what `frequency_response`
-            found, which is drawn at its own frequencies and marks no modes.
+        vibration: Vibration of a stable state, from `vibration`; both curves have its damping. Or the result of
+            `frequency_response`, drawn at its own frequencies without marks of modes.
         force: "x", "y", "z": a force along it; "about x", ...: a moment [N m].
-        motion: In the same words, what is drawn; None for the motion of the force.
+        motion: Drawn motion, named like `force`; None for the motion along or about the force.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
         The axes, both logarithmic.
 
     Raises:
-        InvalidValueError: If the vibration has no modes or the response no frequencies, or there is no such motion.
+        InvalidValueError: If the vibration has no modes or the response no frequencies, or the motion does not exist.
 
     Examples:
         >>> import sagline as sl

@@ -41,21 +41,21 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
 
 PER_METER: Final = 1e3  # mm
-BESIDE: Final[dict[str, Any]] = {  # the axes, in two columns: the band of the states is low
+BESIDE: Final[dict[str, Any]] = {  # layout: the band of the states is low
     "loc": "upper left", "bbox_to_anchor": (1.01, 1.6), "borderaxespad": 0.0, "frameon": False,
 }  # fmt: skip
-STATES: Final = {  # that have a color of their own
+STATES: Final = {  # states with a separate color
     State.HOMING: ORANGE, State.MOVING: BLUE, State.JOGGING: SKY, State.PAUSING: GREEN, State.STOPPING: PURPLE,
     State.FAULT: VERMILLION, State.EMERGENCY: "#8B0000",
 }  # fmt: skip
 
 
 def execution(done: Execution) -> Figure:
-    """An execution at a glance: states, tensions, their error, and the estimated place of the platform.
+    """Overview of an execution: states, tensions, their error, and the estimated position of the platform.
 
-    From top to bottom: the states, with a line at each fault; the measured tensions, and dashed the planned ones; the
-    part of their error that lengths can correct without moving the platform, filtered as the tension loop does; and the
-    estimated position less the planned one.
+    From top to bottom: the states, with a line at each fault; the measured tensions, and the planned ones (dashed);
+    the part of their error that lengths can correct without moving the platform, filtered as in the tension loop; and
+    the estimated position minus the planned one.
 
     Args:
         done: The execution.
@@ -64,7 +64,7 @@ def execution(done: Execution) -> Figure:
         A figure of four panels.
 
     Raises:
-        InvalidValueError: If the execution is none.
+        InvalidValueError: If `done` is not an execution.
 
     Examples:
         >>> import sagline as sl
@@ -119,7 +119,7 @@ def states(done: Execution, ax: Axes | None = None) -> Axes:
 
 
 def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
-    """Tensions at the frame ends as the load cells read them, and dashed as they were planned.
+    """Tensions at the frame ends: measured by the load cells, and planned (dashed).
 
     Args:
         done: The execution.
@@ -145,7 +145,7 @@ def measured_tensions(done: Execution, ax: Axes | None = None) -> Axes:
 
 
 def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
-    """The part of the tension errors that lengths can correct without moving the platform, as the tension loop sees it.
+    """Part of the tension errors that lengths can correct without moving the platform, filtered as in the tension loop.
 
     Args:
         done: The execution.
@@ -167,7 +167,7 @@ def mendable_tensions(done: Execution, ax: Axes | None = None) -> Axes:
 
 
 def place_errors(done: Execution, ax: Axes | None = None) -> Axes:
-    """The estimated position of the platform's origin less the planned one, along x, y and z.
+    """Estimated minus planned position of the platform's origin, along x, y and z.
 
     Args:
         done: The execution.

@@ -23,25 +23,25 @@ from sagline.viewer.swing import PERIOD, Swing
 if TYPE_CHECKING:
     from sagline.core.progress import Progress
 
-SECONDS = 10.0  # of the film: whole periods, so that it repeats without a jump
-PICTURES = 25  # of one swing
-WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # in, in, dots an inch
+SECONDS = 10.0  # s, duration of the film: whole periods, so that it repeats without a jump
+PICTURES = 25  # pictures per period
+WIDTH, HEIGHT, DOTS = 6.4, 3.8, 100  # in, in, dots per inch
 COLORS = 48
-LEAST_SHARE = 0.01  # of a cable in the energy that is shown
+LEAST_SHARE = 0.01  # smallest share of a cable in the energy that is written
 
 
 def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, progress: Progress | None = None) -> None:
     """Film a mode with cable mass for ten seconds, as a GIF that repeats.
 
     Args:
-        vibration: From `vibration`.
-        number: Of the mode, 1 for the lowest.
-        file: The file, "mode.gif" for instance; one that exists is replaced.
+        vibration: Vibration, from `vibration`.
+        number: Number of the mode, 1 for the lowest.
+        file: The file, "mode.gif" for instance; an existing file is replaced.
         progress: Function of the number of pictures drawn and their total.
 
     Raises:
-        InvalidValueError: If there is no such mode.
-        FileError: If the file cannot be written, or is no .gif.
+        InvalidValueError: If the mode does not exist.
+        FileError: If the file cannot be written, or its suffix is not .gif.
 
     Examples:
         >>> import sagline as sl
@@ -70,7 +70,7 @@ def film(vibration: Vibration, number: int, file: os.PathLike[str] | str, *, pro
 
 
 def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
-    """One swing, picture by picture, all of the same colors."""
+    """Pictures of one period, with a common color table."""
     robot, mode = swing.state.one_robot, swing.mode
     figure = sheet(HEIGHT, WIDTH)
     canvas: Any = FigureCanvasAgg(figure)
@@ -83,7 +83,7 @@ def _pictures(swing: Swing, progress: Progress | None) -> list[Image.Image]:
     edges = [ax.plot([0.0], [0.0], [0.0], color=VERMILLION, linewidth=1.6)[0] for _ in EDGES]
     ax.scatter(*robot.frame_anchors.T, color="black", s=7.0, depthshade=False)
     for artist in ax.get_children():
-        artist.set_clip_on(False)  # the axes are square, the picture is wider
+        artist.set_clip_on(False)  # the axes are square, but the picture is wider
     _frame(ax, swing)
     ax.set_title(f"{robot.name}, mode {mode.number}: {mode.frequency:.3f} Hz {mode.kind}", fontsize=LABEL, y=0.97)
     figure.text(0.5, 0.02, f"{energy_shares(mode)}; {swing.text}", fontsize=TICK, ha="center")

@@ -22,19 +22,19 @@ EACH = 3.2  # in, the height of a panel
 
 
 def front(front: Front) -> Figure:
-    """The best robots found by `design`, beside all candidates.
+    """The best robots found by `design`, and all candidates.
 
-    With one goal the progress of the search: each candidate, and the best so far. With several the first goal against
-    each of the others: better robots are joined, the start is marked.
+    With one goal, the progress of the search: each candidate, and the best so far. With several goals, the first goal
+    against each other goal: the best robots are joined by a line, and the start is marked.
 
     Args:
-        front: From `design`.
+        front: Result of `design`.
 
     Returns:
         The figure.
 
     Raises:
-        InvalidValueError: If it is no front.
+        InvalidValueError: If `front` is not a front.
 
     Examples:
         >>> import sagline as sl
@@ -86,7 +86,7 @@ def _label_of(goal: Goal) -> str:
 
 
 def best_until(values: Array, *, highest: bool) -> Array:
-    """The best of all values up to each, NaN before the first that is one."""
+    """Best value up to each index; NaN before the first finite value."""
     sign = 1.0 if highest else -1.0
     found = np.maximum.accumulate(np.where(np.isfinite(values), sign * values, -np.inf))
     return np.asarray(np.where(np.isfinite(found), sign * found, np.nan))

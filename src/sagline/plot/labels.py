@@ -36,16 +36,16 @@ LENGTHS = {
     "adjusting_length": (r"adjusting length $d = L - D$ [mm]", 1e3),
 }
 POINT = 1.0 / 72.0  # in
-WIDE = {SANS: 0.58, SERIF: 0.48}  # of the size of the text, that a letter takes
-SHARE = 0.9  # of a figure's width, that a heading may take
-MOST = 0.3  # of a figure's width, that names beside the axes may take
-SPACING = 1.15  # of the size of the text, from name to name
-END = 0.02  # of the width of the axes: a line that ends farther from their right side carries no name there
-LEADER = 8.0  # pt, from the end of a line to its name
+WIDE = {SANS: 0.58, SERIF: 0.48}  # mean width of a letter in text sizes
+SHARE = 0.9  # largest width of a heading, as a share of the figure's width
+MOST = 0.3  # largest width of names next to the axes, as a share of the figure's width
+SPACING = 1.15  # distance of names in text sizes
+END = 0.02  # share of the axes' width: a line that ends farther from the right side has no name there
+LEADER = 8.0  # pt, distance from the end of a line to its name
 
 
 def name_lines(ax: Axes, title: str = "") -> None:
-    """Name the lines of axes: in a legend at the right, or, in styles of journals and slides, at their ends."""
+    """Name the lines of axes: in a legend at the right, or, in the styles of journals and slides, at their ends."""
     if not current().direct:
         _beside(ax, title)
         return
@@ -60,7 +60,7 @@ def name_lines(ax: Axes, title: str = "") -> None:
 
 
 def figure_legend(figure: FigureBase, panels: Iterable[Axes], place: Any, narrow: Any = "outside upper center") -> None:
-    """One legend of all lines of some axes, at a place of the figure; at another in the styles of narrow figures."""
+    """One legend of all lines of some axes; its position is different in the styles of narrow figures."""
     look, columns = current(), 1
     handles = {label: line for ax in panels for line, label in zip(*ax.get_legend_handles_labels(), strict=True)}
     if look.direct:
@@ -89,19 +89,19 @@ def _legend_columns(labels: Sequence[str], width: float, size: float) -> int:
 
 
 def set_heading(target: FigureBase | Axes, text: str) -> None:
-    """A heading of a figure, or of axes, in as many lines as its width needs."""
+    """Add a heading of a figure or of axes, broken into lines to fit the width."""
     size = current().label
     (target.suptitle if isinstance(target, FigureBase) else target.set_title)(wrap_heading(text, size), fontsize=size)
 
 
 def wrap_heading(text: str, size: float) -> str:
-    """A heading in as many lines as the width of figures of the current style needs."""
+    """Heading broken into lines to fit the figure width of the current style."""
     look = current()
     return text if look.width is None else fill(text, int(SHARE * look.width / POINT / (WIDE[look.font] * size)))
 
 
 def break_labels(figure: Figure) -> None:
-    """Break the upright labels of axes in two where they are longer than their axes."""
+    """Break vertical axis labels into two lines if they are longer than their axes."""
     for ax in figure.axes:
         words = ax.yaxis.get_label_text().split(" ")
         length, height = ax.yaxis.label.get_window_extent().height, ax.bbox.height
@@ -113,7 +113,7 @@ def break_labels(figure: Figure) -> None:
 
 
 class _End(NamedTuple):
-    """End of a line that carries its name there, with its place in the data and its height in the axes, 0 to 1."""
+    """End of a line with its name; position in data units, and height in the axes from 0 to 1."""
 
     name: str
     color: Any
@@ -134,7 +134,7 @@ def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_E
     longest = max((len(label) for handle, label in zip(handles, labels, strict=True) if _is_line(handle)), default=0)
     if longest * WIDE[look.font] * look.tick * POINT > MOST * figure.get_figwidth():
         return []
-    figure.draw_without_rendering()  # now it is known how tall the axes are
+    figure.draw_without_rendering()  # the height of the axes is known after this
     found = []
     for handle, label in zip(handles, labels, strict=True):
         if not _is_line(handle):
@@ -152,13 +152,13 @@ def _ends(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> list[_E
 
 
 def _spacing(ax: Axes) -> float:
-    """From name to name, of the height of the axes."""
+    """Distance of names, as a share of the height of the axes."""
     figure = cast(Figure, ax.get_figure(root=True))
     return SPACING * current().tick * figure.dpi * POINT / ax.bbox.height
 
 
 def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
-    """Write the names beside the ends of the lines, apart from each other; their common beginning is above them."""
+    """Write the names next to the ends of the lines without overlap; their common prefix is above them."""
     look, names = current(), [end.name for end in ends]
     if not title and len(names) > 1 and len({name.rpartition(" ")[0] for name in names}) == 1:
         title, names = names[0].rpartition(" ")[0], [name.rpartition(" ")[2] for name in names]
@@ -178,12 +178,12 @@ def _write(ax: Axes, ends: Sequence[_End], title: str) -> None:
 
 
 def _points(ax: Axes) -> float:
-    """Points a pixel."""
+    """Points per pixel."""
     return 1.0 / (cast(Figure, ax.get_figure(root=True)).dpi * POINT)
 
 
 def spread_heights(heights: Array, spacing: float) -> Array:
-    """Heights of names: as near as can be, by least squares, to those of the ends, in their order, and apart."""
+    """Heights of names: least-squares closest to those of the line ends, in order, with a minimum distance."""
     order = np.argsort(heights, kind="stable")
     steps = spacing * np.arange(heights.size)
     placed = np.asarray(isotonic_regression(heights[order] - steps).x)

@@ -1,7 +1,7 @@
 """Hidden line removal in parallel projection: parts behind surfaces and behind nearer lines are cut away.
 
-Sorting by distance cannot do this: three cables can each pass before the next. In parallel projection all is linear
-along a segment, so that the ends of hidden parts are crossings of straight lines, without approximation.
+Sorting by distance is not sufficient: each of three cables can pass in front of the next. In parallel projection all
+quantities are linear along a segment, so the ends of hidden parts are exact intersections of straight lines.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ import numpy as np
 
 from sagline.core.arrays import Array, Indices
 
-FLAT = 1e-9  # of the size of the picture: a surface seen from its edge, or a line from its end, hides nothing
-TOUCHING = 1e-6  # of the size of the picture: so near a line lies on a surface, not behind it
+FLAT = 1e-9  # share of the picture's size; a surface seen from its edge, or a line from its end, hides nothing
+TOUCHING = 1e-6  # share of the picture's size; a line closer than this to a surface lies on it, not behind it
 CHUNK = 2_000_000  # pairs of segments and limits at a time
-FAR = 1e3  # of the size of the picture: before everything
-ALONG = 3.0  # times as far along a line as beside it what crosses it is hidden, where both run nearly the same way
+FAR = 1e3  # in picture sizes: in front of everything
+ALONG = 3.0  # limit for nearly parallel lines: ratio of hidden length along the line to the width of the strip
 
 
 class FlatLine(NamedTuple):
     """A line in the picture.
 
     Attributes:
-        points: To the right, up, and toward the viewer [m], shape (P, 3).
+        points: Coordinates to the right, up, and toward the viewer [m], shape (P, 3).
         half_width: Half of its width [m]; it hides lines behind it within this distance; 0 if it hides nothing.
-        gap: Additional distance at crossings [m]. Lines less than half_width + gap behind it are not hidden, as cables
-            that meet at an anchor.
+        gap: Additional distance at crossings [m]. Lines less than half_width + gap behind it are not hidden, such as
+            cables that meet at an anchor.
     """
 
     points: Array
@@ -40,11 +40,11 @@ class _Covers(NamedTuple):
 
     Attributes:
         normals: Outward normals of the limits in the picture, shape (R, K, 2).
-        offsets: Upper bounds of normal times place inside, shape (R, K).
-        planes: Depth as planes[:, :2] times place plus planes[:, 2], shape (R, 3).
-        behind: Least distance behind the piece of a hidden point, shape (R,).
-        owners: Numbers of their lines, -1 for surfaces, shape (R,).
-        hides: Numbers of the lines that they hide, -1 for all but their owners, shape (R,).
+        offsets: Upper bounds of the product of normal and position inside, shape (R, K).
+        planes: Depth is planes[:, :2] times position plus planes[:, 2], shape (R, 3).
+        behind: Smallest distance of a hidden point behind the piece, shape (R,).
+        owners: Indices of their lines, -1 for surfaces, shape (R,).
+        hides: Indices of the lines that they hide, -1 for all except their owners, shape (R,).
     """
 
     normals: Array
@@ -56,7 +56,7 @@ class _Covers(NamedTuple):
 
 
 class _Crossing(NamedTuple):
-    """A crossing of a line in front and another one behind; place on it and unit direction there, shapes (3,)."""
+    """A crossing of a front line and a line behind it; position and unit direction of the front line, shapes (3,)."""
 
     line: int
     behind: int
@@ -65,7 +65,7 @@ class _Crossing(NamedTuple):
 
 
 def view_axes(azimuth: float, elevation: float) -> Array:
-    """To the right, up, and toward the viewer, as rows, in the world's axes, shape (3, 3)."""
+    """Unit vectors to the right, up, and toward the viewer in world axes, as rows, shape (3, 3)."""
     around, above = np.array([np.cos(azimuth), np.sin(azimuth)]), np.array([np.cos(elevation), np.sin(elevation)])
     toward = np.array([above[0] * around[0], above[0] * around[1], above[1]])
     right = np.array([-around[1], around[0], 0.0])
@@ -75,7 +75,7 @@ def view_axes(azimuth: float, elevation: float) -> Array:
 def visible_parts(
     lines: Sequence[FlatLine], surfaces: Sequence[Array], labels: Sequence[Array] = ()
 ) -> list[list[Array]]:
-    """The parts of lines that are seen."""
+    """Visible parts of lines."""
     if not lines:
         return []
     everything = np.concatenate([line.points for line in lines])
@@ -121,7 +121,7 @@ def _hidden(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> lis
 
 
 def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers) -> list[Array]:
-    """Within all limits and behind the plane: where k + 1 linear functions of the place along a segment are <= 0."""
+    """Spans within all limits and behind the plane: all k + 1 linear functions along a segment are <= 0."""
     steps = ends - starts
     outside = np.einsum("sc,rkc->srk", starts[:, :2], covers.normals) - covers.offsets
     rise = np.einsum("sc,rkc->srk", steps[:, :2], covers.normals)
@@ -141,7 +141,7 @@ def _hidden_at_once(starts: Array, ends: Array, owners: Indices, covers: _Covers
 def _covers(
     lines: Sequence[FlatLine], surfaces: Sequence[Array], crossings: Sequence[_Crossing], size: float
 ) -> _Covers:
-    """Strips along the lines, wider ones where others cross, and the surfaces."""
+    """Strips along the lines, wider at crossings, and the surfaces."""
     corners, behind, owners, hides = [], [], [], []
     for number, line in enumerate(lines):
         long = np.linalg.norm(np.diff(line.points[:, :2], axis=0), axis=1) > FLAT * size
@@ -168,7 +168,7 @@ def _covers(
     padded = np.array([np.concatenate((each, np.repeat(each[-1:], most - len(each), axis=0))) for each in corners])
     padded = padded.reshape(len(corners), most, 3)
     along = np.roll(padded[..., :2], -1, axis=1) - padded[..., :2]
-    normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # of corners counter-clockwise: outward
+    normals = np.stack((along[..., 1], -along[..., 0]), axis=-1)  # outward for counter-clockwise corners
     offsets = np.einsum("rkc,rkc->rk", normals, padded[..., :2])
     planes = np.array([_plane(each) for each in corners]).reshape(-1, 3)
     numbers = np.array([owners, hides], dtype=np.int64)
@@ -176,7 +176,7 @@ def _covers(
 
 
 def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: Indices) -> list[_Crossing]:
-    """Crossings at which a line that hides something passes before another."""
+    """Crossings at which a line that hides others passes in front of another line."""
     steps = ends - starts
     hides = np.array([line.half_width + line.gap for line in lines])[owners]
     front = np.flatnonzero(hides > 0.0)
@@ -184,7 +184,7 @@ def _crossings(lines: Sequence[FlatLine], starts: Array, ends: Array, owners: In
     turn = _cross(steps[None, front, :2], steps[:, None, :2])
     crossing = np.abs(turn) > 0.0
     safe = np.where(crossing, turn, 1.0)
-    here = _cross(away, steps[:, None, :2]) / safe  # along the one in front
+    here = _cross(away, steps[:, None, :2]) / safe  # along the front line
     there = _cross(away, steps[None, front, :2]) / safe
     inside = crossing & (np.minimum(here, there) >= 0.0) & (np.maximum(here, there) <= 1.0)
     inside &= owners[:, None] != owners[None, front]
@@ -212,13 +212,13 @@ def _strip(start: Array, end: Array, half_width: float) -> Array:
 
 
 def _area(corners: Array) -> float:
-    """In the picture, positive for corners counter-clockwise."""
+    """Area in the picture, positive for counter-clockwise corners."""
     x, y = corners[:, 0] - corners[0, 0], corners[:, 1] - corners[0, 1]
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def _plane(corners: Array) -> Array:
-    """Depth over the picture: a, b and c of a x + b y + c."""
+    """Depth in the picture as a plane: a, b and c of a x + b y + c."""
     middle = corners.mean(axis=0)
     slopes, *_ = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - middle[2], rcond=None)
     return np.array([*slopes, middle[2] - slopes @ middle[:2]])

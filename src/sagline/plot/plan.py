@@ -39,14 +39,14 @@ if TYPE_CHECKING:
 OVERVIEW = ("unstrained_length", "adjusting_length", "horizontal_tension", "vertical_force")
 INFEASIBLE = "infeasible"
 LEAST_ERROR = 1e-3  # mm: rounding errors are drawn as a flat line
-FLAT = 0.01  # of the axis: smaller errors look like a flat line
+FLAT = 0.01  # share of the axis: smaller errors look like a flat line
 UNCONFIRMED = "not confirmed"  # planned lengths without a stable equilibrium
 OTHER_CABLES = "0.82"  # color of the other cables behind each
-ROW_HEIGHT = 1.45  # in, that a row of panels is tall
+ROW_HEIGHT = 1.45  # in, height of a row of panels
 LIMITED = {"chord_tension": "chord", "frame_end_tension": "frame_end"}
 START_COLOR = "#A84300"  # vermillion, dark enough for text
 MOST_ARROWS = 100  # arrows along a path
-LEVEL = 1e-9  # m: a path that rises less lies in a plane
+LEVEL = 1e-9  # m: a path with a smaller change of height lies in a plane
 
 
 def tensions(plan: Plan, quantity: str = "chord_tension", ax: Axes | None = None) -> Axes:
@@ -151,7 +151,7 @@ def _format(ax: Axes, plan: Plan, label: str) -> None:
 
 
 def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str, float]]) -> None:
-    """One line per cable, and the infeasible poses shaded."""
+    """One line per cable, with infeasible poses shaded."""
     values, label = _values(plan, quantity, table)
     clock, _ = abscissa(plan)
     for i, course in enumerate(values.T):
@@ -162,8 +162,8 @@ def _draw_cables(ax: Axes, plan: Plan, quantity: str, table: dict[str, tuple[str
 def error(confirmation: Confirmation, ax: Axes | None = None) -> Axes:
     """Position error along x, y and z over time: confirmed position minus planned position.
 
-    Poses without a plan, and poses whose lengths lead to no stable equilibrium that was found, are shaded. Errors too
-    small for the axis are written as numbers.
+        Poses without a plan, and poses for which no stable equilibrium was found, are shaded. Errors too small for the
+    axis are written as numbers.
 
     Args:
         confirmation: A confirmed plan.
@@ -196,7 +196,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         A figure of one panel each, titled with the robot.
 
     Raises:
-        InvalidValueError: If there is none, or one is no confirmation.
+        InvalidValueError: If there are no confirmations, or one is of another type.
 
     Examples:
         >>> import sagline as sl
@@ -217,7 +217,7 @@ def errors(*confirmations: Confirmation) -> Figure:
         ax.set_title(confirmation.plan.state.one_robot.name, fontsize=current().tick)
         ax.label_outer()
     for ax, confirmation in zip(panels, confirmations, strict=True):
-        _write_flat_error(ax, confirmation)  # on the scale that they have found together
+        _write_flat_error(ax, confirmation)  # on the common scale of all panels
     figure_legend(figure, panels, "outside right upper")
     return figure
 
@@ -244,7 +244,7 @@ def _write_flat_error(ax: Axes, confirmation: Confirmation) -> None:
 
 
 def small_multiples(plan: Plan, quantity: str = "chord_tension") -> Figure:
-    """One quantity over time, a panel for each cable on one scale, before all others in gray.
+    """One quantity over time: one panel per cable on one scale, with all other cables in gray behind it.
 
     This is easier to read than one panel with many crossing lines, also without color. The robot's limits of this
     quantity are dotted if they are in the range of the axis.
@@ -350,7 +350,7 @@ def velocity(path: Path, ax: Axes | None = None) -> Axes:
 
 
 def _arrow_samples(path: Path) -> list[int]:
-    """Samples of the arrows, before the middle of each motion between two rests; of many motions evenly chosen ones."""
+    """Samples of the arrows, before the middle of each motion between two rests; of many motions, an even selection."""
     speed = np.linalg.norm(path.twist[:, :2], axis=1)
     moving = np.concatenate(([False], speed > 1e-3 * speed.max(initial=0.0), [False]))
     edges = np.flatnonzero(np.diff(moving.astype(np.int8))).reshape(-1, 2)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 MARKERS = "osD^v<>pPX*h"
 POINT = 1.0 / 72.0  # in
-TRIES, SPARE = 5, 0.03  # at axes in which all names are; what they grow by in excess, of their size
-SHORT = 1e-9  # of the longest side: one shorter has no direction
+TRIES, SPARE = 5, 0.03  # largest number of iterations of the axes' size, and its extra growth (relative)
+SHORT = 1e-9  # share of the longest side; a shorter side has no direction
 GAP = 4.0  # pt between a side and its name
 
 
@@ -34,14 +34,14 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
 
     Args:
         shape: The polygon, of `tension_polygon`, for two redundant cables.
-        points: Name -> chord tensions (m,), drawn where they lie in it; NaN are left out. None for none.
+        points: Name -> chord tensions (m,), drawn at their position in the polygon; NaN are left out. None: no points.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
         The axes.
 
     Raises:
-        InvalidValueError: If there is no polygon to draw, or points are no tensions of its cables.
+        InvalidValueError: If there is no polygon to draw, or points are not tensions of its cables.
 
     Examples:
         >>> import sagline as sl
@@ -65,7 +65,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
     fresh = ax is None
     ax = axes_or_new(ax, height=4.5)
     if fresh:
-        cast(Figure, ax.get_figure(root=True)).set_layout_engine("compressed")  # for axes of equal scales
+        cast(Figure, ax.get_figure(root=True)).set_layout_engine("compressed")  # needed for axes of equal scales
     corners = np.asarray(shape.vertices)
     ax.fill(*corners.T, facecolor=GAP_COLOR, alpha=0.25, edgecolor="none")
     for k, side in enumerate(shape.sides):
@@ -77,7 +77,7 @@ def polygon(shape: TensionPolygon, points: Mapping[str, ArrayLike] | None = None
             ax.plot(*place, marker, color=color, markersize=6.0, markeredgecolor="white", label=name, linestyle="none")
     format_axes(ax, r"$\lambda_1$ [N]", r"$\lambda_2$ [N]")
     ax.set_aspect("equal")
-    ax.margins(x=0.33, y=0.16)  # room for names
+    ax.margins(x=0.33, y=0.16)  # space for names
     if any(np.isfinite(place).all() for place in places.values()):
         name_lines(ax)
     _name_sides(ax, shape, corners)
@@ -95,11 +95,11 @@ class _Name(NamedTuple):
 
 
 def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
-    """Write the names; the axes grow until all are in them."""
+    """Write the names; the axes are enlarged until all names are inside."""
     figure = cast(Figure, ax.get_figure(root=True))
     for _ in range(TRIES):
-        figure.draw_without_rendering()  # now it is known how large the polygon is on the sheet
-        scale = ax.bbox.width / (figure.dpi * POINT) / float(np.ptp(ax.get_xlim()))  # points a newton
+        figure.draw_without_rendering()  # the size of the polygon on the sheet is known after this
+        scale = ax.bbox.width / (figure.dpi * POINT) / float(np.ptp(ax.get_xlim()))  # points per newton
         names = _names(shape, corners, scale)
         reach = np.array([name.middle + (name.offset + sign * name.half) / scale for name in names for sign in (-1, 1)])
         seen = np.array([ax.get_xlim(), ax.get_ylim()]).T
@@ -124,7 +124,7 @@ def _name_sides(ax: Axes, shape: TensionPolygon, corners: Array) -> None:
 
 
 def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
-    """Each name beyond its side, where a convex polygon has no other line; names that would meet move outward."""
+    """Place each name outside of its side, where a convex polygon has no other line; overlapping names move outward."""
     names: list[_Name] = []
     size = current().tick
     normals = _normals(corners)
@@ -134,7 +134,7 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
         text, middle = f"cable {side.cable} {side.limit}", 0.5 * (corners[k] + corners[(k + 1) % len(corners)])
         out = normals[k]
         half = 0.5 * np.array([TextPath((0.0, 0.0), text, size=size).get_extents().width + 4.0, 1.3 * size])
-        away = least = GAP + half @ np.abs(out)  # then the whole box is beyond the line
+        away = least = GAP + half @ np.abs(out)  # distance at which the whole box is outside of the line
         while any(
             np.all(np.abs(scale * (middle - name.middle) + away * out - name.offset) < half + name.half + 1.0)
             for name in names
@@ -145,7 +145,7 @@ def _names(shape: TensionPolygon, corners: Array, scale: float) -> list[_Name]:
 
 
 def _normals(corners: Array) -> Array:
-    """Outward directions of the sides (h, 2); a side without length has one between its neighbors', or from the tip."""
+    """Outward directions of the sides (h, 2); for a side of zero length the mean of its neighbors."""
     along = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(along, axis=1)
     long = np.flatnonzero(lengths > SHORT * lengths.max())

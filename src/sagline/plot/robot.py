@@ -33,17 +33,17 @@ if TYPE_CHECKING:
     from sagline.core.arrays import Array
     from sagline.kinematics.plan import Plan
 
-POINTS = 50  # around each pulley
-FLAT = 1e-6  # a platform that is thinner casts a line, as a share of the robot's size
+POINTS = 50  # points around each pulley
+FLAT = 1e-6  # share of the robot's size: the shadow of a thinner platform is a line
 _SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
-EDGES = tuple(  # of a box: between corners that differ in one direction
+EDGES = tuple(  # edges of a box: between corners that differ in one direction
     (a, b) for a, b in combinations(range(8), 2) if np.count_nonzero(_SIGNS[a] != _SIGNS[b]) == 1
 )
 FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 FRAME_COLOR, FLOOR_COLOR, SHADOW_COLOR, WHEEL_COLOR = "0.6", "0.955", "0.82", "0.35"
-SAME_PLACE = 0.04  # anchors that are closer share a label, as a share of the robot's size
+SAME_PLACE = 0.04  # share of the robot's size: closer anchors have a common label
 HALO = [patheffects.withStroke(linewidth=2.0, foreground="white")]
-LABEL_DISTANCE = 0.045  # how far outside its anchor a label stands, as a share of the robot's size
+LABEL_DISTANCE = 0.045  # distance of a label outward from its anchor, as a share of the robot's size
 
 
 def drawn_pose(robot: Robot, pose: Pose | None) -> Pose:
@@ -57,7 +57,7 @@ def drawn_pose(robot: Robot, pose: Pose | None) -> Pose:
 
 
 def catenary_points(robot: Robot, pose: Pose, plan: Plan) -> Array:
-    """Points of the cables in the world as a feasible plan of the pose has them [m], shape (m, points, 3)."""
+    """Points of the cables in the world for a feasible plan of the pose [m], shape (m, points, 3)."""
     contact = plan.state.contact
     wraps = shapes.wraps(robot, pose, None if contact is None else contact.wrap_angle)
     free = shapes.catenaries(shapes.chords(robot, pose, wraps[:, -1]), plan.state.cables, 1.0)
@@ -83,7 +83,7 @@ def pulleys_and_drums(robot: Robot, pose: Pose) -> tuple[list[Array], list[tuple
 
 
 def _rims(ends: Array, radius: float) -> Array:
-    """Both rims of a level drum, from one end of its axis to the other (2, 3), as one line."""
+    """Both rims of a horizontal drum as one line; its axis is given by two end points (2, 3)."""
     axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     turn = np.linspace(0.0, 2.0 * np.pi, POINTS)[:, None]
     rim = radius * (np.cos(turn) * np.cross(axis, [0.0, 0.0, 1.0]) + np.sin(turn) * [0.0, 0.0, 1.0])
@@ -91,7 +91,7 @@ def _rims(ends: Array, radius: float) -> Array:
 
 
 def frame_box(robot: Robot) -> Array | None:
-    """Corners of the frame, shape (8, 3). Frames stand: their top is where the highest anchors are."""
+    """Corners of the frame, shape (8, 3). The top of the frame is at the highest anchors."""
     if robot.frame_size is None:
         return None
     top = robot.frame_anchors.max(axis=0)
@@ -101,7 +101,7 @@ def frame_box(robot: Robot) -> Array | None:
 
 
 def platform_box(robot: Robot, pose: Pose) -> Array:
-    """Corners of the platform in the world, shape (8, 3): of its size, or of the box around its anchors."""
+    """Corners of the platform in the world, shape (8, 3): a box of its size, or the box around its anchors."""
     low, high = robot.platform_anchors.min(axis=0), robot.platform_anchors.max(axis=0)
     size = high - low if robot.platform_size is None else robot.platform_size
     corners: Array = pose.position + _box_corners(0.5 * (low + high), size) @ pose.matrix.T
@@ -127,15 +127,15 @@ def ground(points: Array, platform: Array) -> tuple[Array, Array]:
 
 
 def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> Axes3D:
-    """The robot in space at rest: frame, platform, and its cables as exact catenaries that carry it.
+    """The robot in space at rest: frame, platform, and its cables as exact catenaries.
 
     Cables have the color of their chord tension, on the scale of the robot's limits as in `sagline view`, and their
     numbers at the frame. Pulleys are turned into the planes of their cables. Dead length is drawn as a vertical line of
-    its rise, dotted if its length is another one. The ground with the platform's shadow is at z = 0 or lower.
+    its rise, dotted if rise and length differ. The ground with the platform's shadow is at z = 0 or lower.
 
     Args:
         robot: The robot.
-        pose: Pose of the platform; None for the middle of the robot's test box. Where no tensions carry the platform
+        pose: Pose of the platform; None for the middle of the robot's test box. At an infeasible pose
             the cables are straight, dashed and without color.
         ax: Axes to draw on, made with `projection="3d"`; None for a new figure.
 
@@ -164,10 +164,10 @@ def robot(robot: Robot, pose: Pose | None = None, ax: Axes3D | None = None) -> A
 
 def draw_robot(ax: Axes3D, robot: Robot, where: Pose, color: str | None = None) -> tuple[Plan, Array]:
     """Frame, platform, cables and ground, without labels of the axes."""
-    ax.computed_zorder = False  # by the middles of objects, which would draw the floor over objects on it
+    ax.computed_zorder = False  # the computed order uses object centers and would draw the floor over objects on it
     plan = inverse(robot, where)
     courses = catenary_points(robot, where, plan) if plan.feasible else straight_points(robot, where)
-    colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray where there is no tension
+    colors = TensionScale.of(robot).colors(plan.chord_tension) / 255.0  # gray without a tension
     for line, own in zip(courses, colors, strict=True):
         style = "-" if plan.feasible else (0, (3.0, 2.0))
         ax.plot(*line.T, color=own if color is None else color, linewidth=1.4, linestyle=style, zorder=2.0)
@@ -206,7 +206,7 @@ def _draw_ground(ax: Axes3D, points: Array, platform: Array) -> None:
 
 
 def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
-    """The number of each cable above and outside its anchor; anchors close to each other share a place."""
+    """The number of each cable above and outside its anchor; close anchors have a common label."""
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     left = list(range(len(anchors)))
     while left:
@@ -214,14 +214,14 @@ def _number_cables(ax: Axes3D, anchors: Array, points: Array) -> None:
         left = [k for k in left if k not in together]
         place = anchors[together].mean(axis=0)
         out = (place - points.mean(axis=0)) * (1.0, 1.0, 0.0)
-        out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have their numbers below
+        out = 0.5 * out / (np.linalg.norm(out) or 1.0) + (0.0, 0.0, 0.85)  # upward: the axes have numbers below
         place = place + LABEL_DISTANCE * size * out
         text = ", ".join(map(str, together))
         ax.text(*place, text, fontsize=current().tick, ha="center", va="center", path_effects=HALO, zorder=5.0)
 
 
 def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["left", "right"]) -> None:
-    """A bar that says what the colors of cables mean."""
+    """Color bar of the cable tensions."""
     steps = np.geomspace(scale.low, scale.high, 128)
     shown = ScalarMappable(LogNorm(scale.low, scale.high), ListedColormap(scale.colors(steps) / 255.0))
     below, above = tension.min() < scale.low * (1.0 - 1e-6), tension.max() > scale.high * (1.0 + 1e-6)
@@ -236,7 +236,7 @@ def tension_bar(ax: Axes, scale: TensionScale, tension: Array, place: Literal["l
 
 
 def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
-    """Limit axes to a box, none of its sides below a tenth of the longest one; returns the sides."""
+    """Limit axes to a box whose sides are at least a tenth of the longest one; returns the sides."""
     size: Array = np.maximum(high - low, 0.1 * np.max(high - low))
     middle = 0.5 * (low + high)
     ax.set(**{f"{name}lim": (m - 0.5 * s, m + 0.5 * s) for name, m, s in zip("xyz", middle, size, strict=True)})
@@ -244,7 +244,7 @@ def fit_space(ax: Axes3D, low: Array, high: Array) -> Array:
 
 
 def format_space_axes(ax: Axes3D, points: Array, title: str) -> None:
-    """Labels, and ticks as far apart as their numbers are wide, none where two axes meet."""
+    """Labels, and ticks spaced by the width of their numbers, without ticks where two axes meet."""
     ax.set_title(title, fontsize=current().label, y=0.97)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(0.0, low[2])

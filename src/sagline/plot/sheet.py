@@ -40,27 +40,27 @@ BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072B2", "#D55E00", "#009E73", 
 COLORS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 GAP_COLOR = "#BBBBBB"
 DASHED: Final[Any] = (0, (4.0, 1.6))  # a line style of Matplotlib
-COMPONENT_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)))  # of lines along x, y and z
-MAP_COLORS: Final = "cividis"  # the same for all kinds of color vision
-MOST_POINTS: Final = 4000  # of a line; a longer line is drawn through the extrema of its parts
-WIDTH = 7.0  # in, of a page with margins
-LABEL, TICK = PLAIN.label, PLAIN.tick  # pt, of a page of documentation
-RESOLUTION = 200  # dots an inch
+COMPONENT_STYLES: Final[Any] = ("-", DASHED, (0, (1.0, 1.2)))  # line styles of the x, y and z components
+MAP_COLORS: Final = "cividis"  # readable with all kinds of color vision
+MOST_POINTS: Final = 4000  # largest number of points of a line; a longer line is drawn through the extrema of its parts
+WIDTH = 7.0  # in, width of a page with margins
+LABEL, TICK = PLAIN.label, PLAIN.tick  # pt, text sizes in the documentation
+RESOLUTION = 200  # dots per inch
 
 
 _reference = re.compile(r'(href="#|url\(#)([^")]+)')
 _name = re.compile(r' id="([^"]+)"')
 SVG = "{http://www.w3.org/2000/svg}"
 FAMILY = re.compile(r"font-family:\s*([^;]+)")
-OWN = frozenset({SANS, SERIF})  # come with Matplotlib, under licenses that let them be passed on inside documents
+OWN = frozenset({SANS, SERIF})  # fonts of Matplotlib, whose licenses allow embedding in documents
 _Face = tuple[str, str, str]  # family, style and weight
 
 
 class Sheet(Figure):
-    """A figure without pyplot that a notebook can show; it keeps the style that it is made in."""
+    """A figure without pyplot that a notebook can show; it keeps the style in which it was created."""
 
     def __init__(self, *arguments: Any, **named: Any) -> None:
-        """A figure as Matplotlib makes it."""
+        """Create a figure; the arguments are those of Matplotlib."""
         super().__init__(*arguments, **named)
         self.style = current()
         self._fitted = not self.style.name
@@ -69,9 +69,9 @@ class Sheet(Figure):
         """Draw in the style of the figure, also objects that Matplotlib makes when drawing, such as tick labels."""
         with Using(self.style):
             if not self._fitted:
-                self._fitted = True  # before it is drawn for the first time
+                self._fitted = True  # before the first drawing
                 _thicken(self, self.style.line)
-                self.draw_without_rendering()  # now it is known how long the axes are
+                self.draw_without_rendering()  # the length of the axes is known after this
                 break_labels(self)
             super().draw(renderer)
 
@@ -104,7 +104,7 @@ def _thicken(figure: Figure, factor: float) -> None:
 
 
 def axes_or_new(ax: Axes | None, height: float = 3.0, width: float = WIDTH) -> Axes:
-    """The given Axes, or those of a new figure; InvalidValueError for other objects or for Axes in space."""
+    """The given Axes, or those of a new figure; InvalidValueError for other objects or for 3D axes."""
     optional(ax, Axes, "ax")
     if ax is None:
         return sheet(height, width).add_subplot()
@@ -126,7 +126,7 @@ def format_axes(ax: Axes, x: str, y: str) -> None:
 
 
 def format_clock(ax: Axes, clock: Array, label: str, axis: str = TIME) -> None:
-    """Labels and limits of axes over time, or over numbers."""
+    """Set labels and limits of axes over time, or over pose numbers."""
     format_axes(ax, axis, label)
     if axis != TIME:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
@@ -155,7 +155,7 @@ def _cell_edges(middles: Array) -> Array:
 
 
 def color_bar(shown: ScalarMappable, axes: Any, label: str, **look: Any) -> Colorbar:
-    """A color bar beside axes, with its label."""
+    """Color bar next to axes, with its label."""
     figure = np.ravel(axes)[0].figure
     bar: Colorbar = figure.colorbar(shown, ax=axes, **look)
     bar.set_label(label, fontsize=current().label)
@@ -164,7 +164,7 @@ def color_bar(shown: ScalarMappable, axes: Any, label: str, **look: Any) -> Colo
 
 
 def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> None:
-    """A line at a time, with a name above the axes; none for ""."""
+    """Vertical line at a time, with a name above the axes; no name for ""."""
     ax.axvline(time, color=color, linewidth=1.0, zorder=zorder)
     if name:
         ax.annotate(
@@ -174,7 +174,7 @@ def mark_event(ax: Axes, time: float, name: str, color: str, zorder: float) -> N
 
 
 def cable_look(cable: int) -> dict[str, Any]:
-    """Color and line style of a cable; neighbors, which most robots pair at a winch post, share a color."""
+    """Color and line style of a cable; neighbors (pairs at a winch post of most robots) have equal colors."""
     return {"color": COLORS[cable // 2 % len(COLORS)], "linestyle": "-" if cable % 2 == 0 else DASHED}
 
 
@@ -222,7 +222,7 @@ def shade_spans(
 
 
 def svg_text(figure: Figure, dots: int, **settings: str) -> str:
-    """A figure as an SVG element without date and creator, the same at each call, to be put into a page."""
+    """A figure as an SVG element for a page, without date and creator, so that each call gives an equal text."""
     written = BytesIO()
     with matplotlib.rc_context(cast(Any, settings)):
         figure.savefig(written, format="svg", dpi=dots, metadata={"Date": None, "Creator": None}, transparent=True)
@@ -231,22 +231,22 @@ def svg_text(figure: Figure, dots: int, **settings: str) -> str:
 
 
 def unique_names(svg: str, prefix: str) -> str:
-    """A drawing whose inner names begin with a prefix, so that many fit on one page; unused names are left out."""
+    """A drawing whose identifiers begin with a prefix, so that a page can contain several; unused ones are removed."""
     used = {found[1] for found in _reference.findall(svg)}
     svg = _name.sub(lambda found: f' id="{prefix}{found[1]}"' if found[1] in used else "", svg)
     return _reference.sub(lambda found: f"{found[1]}{prefix}{found[2]}", svg)
 
 
 def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
-    """Write a figure to a file atomically; the suffix (.png, .svg, .pdf) says how.
+    """Write a figure to a file atomically; the suffix (.png, .svg, .pdf) selects the format.
 
     Args:
-        drawing: A figure, or Axes: then the whole figure they are in.
-        file: The file; one that exists is replaced.
+        drawing: A figure, or Axes (their whole figure is saved).
+        file: The file; an existing file is replaced.
 
     Raises:
-        InvalidValueError: If the drawing is none.
-        FileError: If the file cannot be written, or its suffix is none that matplotlib knows.
+        InvalidValueError: If `drawing` is not a figure or Axes.
+        FileError: If the file cannot be written, or its suffix is unknown to matplotlib.
 
     Examples:
         >>> import sagline as sl
@@ -257,12 +257,12 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
     figure = drawing if isinstance(drawing, Figure) else cast(Figure, drawing.get_figure(root=True))
     path = file_path(file)
     kind = path.suffix.lstrip(".").lower()
-    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # text for LaTeX, which may be missing
+    known = sorted(figure.canvas.get_supported_filetypes().keys() - {"pgf"})  # pgf needs LaTeX, which may be missing
     if kind not in known:
         raise FileError(path, f"the suffix is {path.suffix or 'missing'}", f"Choose one of {', '.join(known)}.")
-    # the same figure gives the same bytes: no date, no random names
+    # equal figures give equal bytes: no date, no random names
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    drawn = BytesIO()  # matplotlib leaves a file open that it cannot write to
+    drawn = BytesIO()  # matplotlib would leave a file open after a write error
     with matplotlib.rc_context({"svg.hashsalt": "sagline"}):
         figure.savefig(drawn, format=kind, dpi=RESOLUTION, metadata=metadata)
     content = drawn.getvalue()
@@ -273,7 +273,7 @@ def save(drawing: Figure | Axes, file: os.PathLike[str] | str) -> None:
 
 
 def _with_fonts(svg: str) -> str:
-    """Put the fonts of the text of a drawing into it, each with the letters that are used."""
+    """Embed the fonts of a drawing, each with the used letters only."""
     letters = _letters(svg)
     faces = [_face(face, "".join(sorted(used))) for face, used in sorted(letters.items()) if used]
     if not faces:
@@ -283,7 +283,7 @@ def _with_fonts(svg: str) -> str:
 
 
 def _letters(svg: str) -> dict[_Face, set[str]]:
-    """The letters of each font of ours that text is written in."""
+    """Letters used with each embedded font."""
     found: dict[_Face, set[str]] = {}
 
     def visit(element: ElementTree.Element, style: str) -> None:
@@ -311,7 +311,7 @@ def _face(face: _Face, letters: str) -> str:
     properties = FontProperties(family=[family], weight=int(weight) if weight.isdigit() else weight)
     properties.set_style(cast(Literal["normal", "italic", "oblique"], style))
     options = subset.Options(notdef_outline=True)
-    options.drop_tables += ["FFTM"]  # when it was made; it is not known how to take a part of that
+    options.drop_tables += ["FFTM"]  # time stamp table, which cannot be subset
     with TTFont(fontManager.findfont(properties), recalcTimestamp=False) as font:
         subsetter = subset.Subsetter(options)
         subsetter.populate(text=letters)

@@ -11,8 +11,8 @@ import matplotlib
 
 from sagline.core.arguments import choice, whole_number
 
-SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # come with Matplotlib, so that they are on any machine; one like Times
-SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # in, that a figure may be tall
+SANS, SERIF = "DejaVu Sans", "STIXGeneral"  # fonts of Matplotlib, available on any computer; the second resembles Times
+SLIDE_HEIGHT, PAGE_HEIGHT = 6.0, 9.0  # in, largest heights of a figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Style:
     direct: bool
 
     def size(self, width: float, height: float) -> tuple[float, float]:
-        """Width and height of a figure that would like to be so large [in]."""
+        """Width and height [in] of a figure in this style, from the requested ones."""
         return self.width or width, min(self.height * height, self.tallest)
 
     @property
@@ -76,7 +76,7 @@ PLAIN: Final = Style("", None, 1.0, PAGE_HEIGHT, SANS, "dejavusans", 9.0, 8.0, 1
 _IEEE = Style("ieee", 3.5, 0.75, PAGE_HEIGHT, SERIF, "stix", 9.0, 8.0, 1.0, direct=True)
 _MDPI = Style("mdpi", 5.45, 0.85, PAGE_HEIGHT, SERIF, "stix", 10.0, 9.0, 1.0, direct=True)
 _SLIDES = Style("slides", 6.0, 1.5, SLIDE_HEIGHT, SANS, "dejavusans", 16.0, 14.0, 1.8, direct=True)
-STYLES: Final = {  # name -> over one column, and over two
+STYLES: Final = {  # name -> style for one column, style for two columns
     # IEEE Author Center, "Size requirements for graphics": 3.5 in and 7.16 in
     "ieee": (_IEEE, replace(_IEEE, width=7.16, height=0.9)),
     # the class mdpi.cls: text of 394.36 pt, with the margin beside it 525.5 pt, of 72.27 pt an inch
@@ -88,17 +88,16 @@ _current: ContextVar[Style] = ContextVar("style", default=PLAIN)
 
 
 def current() -> Style:
-    """The style that figures are made in."""
+    """Style of new figures."""
     return _current.get()
 
 
 def style(name: str, columns: int = 1) -> Using:
     """Style of figures for a journal or a slide: figures that are made inside its `with` statement keep it.
 
-    Figures have the width of the column, fonts that come with Matplotlib and so are the same on any machine, sizes that
-    are read on paper at that width, and names are at the ends of lines if there is space. Figures of
-    your own that are made inside, by Matplotlib alone, have its fonts and sizes as well. In PDF and SVG text stays text
-    and its fonts are in the file.
+    Figures have the width of the column, fonts of Matplotlib (available on any computer), and text sizes for print at
+    this width; names are at the ends of lines if there is space. Figures created directly with Matplotlib inside the
+    block also have these fonts and sizes. In PDF and SVG, text remains text and the fonts are embedded.
 
     Args:
         name: "ieee" for 3.5 in or 7.16 in, "mdpi" for 5.45 in or 7.27 in, "slides" for half a slide or a whole one of
@@ -106,10 +105,10 @@ def style(name: str, columns: int = 1) -> Using:
         columns: Width of the figure: 1 for a column, 2 for the width of the page.
 
     Returns:
-        What goes into a `with` statement, and decorates functions; of it comes the `Style` with width and sizes.
+        Context manager for a `with` statement, also a decorator; it gives the `Style` with width and sizes.
 
     Raises:
-        InvalidValueError: If there is no such style, or the page has not so many columns.
+        InvalidValueError: If the style does not exist, or `columns` is not 1 or 2.
 
     Examples:
         >>> import sagline as sl
@@ -125,12 +124,12 @@ class Using(ContextDecorator):
     """Context manager of a style; it can be used repeatedly and nested."""
 
     def __init__(self, chosen: Style) -> None:
-        """Nothing changes before the `with` statement begins."""
+        """Store the style; it is activated by the `with` statement."""
         self.style = chosen
         self._open: list[ExitStack] = []
 
     def __enter__(self) -> Style:
-        """Put the style to use."""
+        """Activate the style."""
         stack = ExitStack()
         stack.callback(_current.reset, _current.set(self.style))
         stack.enter_context(matplotlib.rc_context(cast(Any, self.style.settings)))
@@ -138,5 +137,5 @@ class Using(ContextDecorator):
         return self.style
 
     def __exit__(self, *_: object) -> None:
-        """Put back what there was before."""
+        """Restore the previous style."""
         self._open.pop().close()

@@ -31,42 +31,42 @@ if TYPE_CHECKING:
 
     from sagline.core.arrays import Array, Flags, Indices
 
-POINTS: Final = 200  # along the longer side
-LINES: Final = 5  # of equal margin, at most about so many
-ROOM: Final = 11.0  # pt: a region that is narrower than twice this at its widest has no name
+POINTS: Final = 200  # grid points along the longer side
+LINES: Final = 5  # largest number of contour lines of the margin, approximately
+ROOM: Final = 11.0  # pt: a region whose largest width is below twice this has no name
 OUTSIDE: Final = to_rgba(GAP_COLOR, 0.35)
-BESIDE: Final = 1e-6  # of the way to the end of the box
-PALE: Final = 0.45  # of a region's color; the rest is white
+BESIDE: Final = 1e-6  # offset of the slice, as a share of the distance to the end of the box
+PALE: Final = 0.45  # share of a region's color, mixed with white
 Key = tuple[int, int]  # criterion, as an index, and cable
 Color = tuple[float, float, float]
 HALO: Final = [patheffects.withStroke(linewidth=2.2, foreground="white")]
-NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull before and behind the robot
-FINEST: Final = 90  # cells along the longest side of the hull as it is drawn: more is not seen, and takes long
+NEAR_SIDE, FAR_SIDE = 0.5, 0.22  # opacity of the hull in front of and behind the robot
+FINEST: Final = 90  # cells along the longest side of the drawn hull; more are slow and not visible
 HEIGHT, ZOOM = 3.4, 1.0  # in; and size of the robot in its axes
-WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # of the sheet
-ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # the same where nothing fits beside anything
-MOST_LIMITS: Final = 10  # that have a bar of their own
+WHOLE, ROBOT, BARS = (0.0, 0.0, 1.0, 0.94), (-0.02, 0.0, 0.7, 0.96), (0.78, 0.2, 0.19, 0.6)  # axes in the sheet
+ABOVE, BELOW = (-0.05, 0.42, 1.1, 0.52), (0.2, 0.1, 0.75, 0.3)  # axes in a narrow sheet
+MOST_LIMITS: Final = 10  # largest number of separate bars
 REST: Final = "others"
 
 
 def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes | None = None) -> Axes:
-    """A slice through a workspace, at right angles to an axis of the world.
+    """A slice through a workspace, perpendicular to a world axis.
 
     The bold line is the boundary by the criteria of the workspace, at the resolution of the slice. Inside, thin lines
     are contours of the margin [N], and colors show the limit that is reached first: the cable of the margin, or the
     name of another criterion.
 
     Args:
-        space: The workspace; its robot, loads, orientations and criteria are those of the slice.
-        normal: The axis at right angles: "x", "y" or "z".
-        at: Coordinate on it [m]; None for the middle of the workspace.
+        space: The workspace; the slice has its robot, loads, orientations and criteria.
+        normal: Axis perpendicular to the slice: "x", "y" or "z".
+        at: Coordinate on this axis [m]; None for the middle of the workspace.
         ax: Axes to draw on; None for a new figure.
 
     Returns:
         The axes.
 
     Raises:
-        InvalidValueError: If the place is not in the workspace's box, or the box is flat and the axis is not its own.
+        InvalidValueError: If the slice is outside of the workspace's box, or `normal` is not the normal of a flat box.
 
     Examples:
         >>> import sagline as sl
@@ -81,7 +81,7 @@ def slice(space: Workspace, normal: str = "z", at: float | None = None, ax: Axes
     size = high - low
     longest = max(size[first], size[second])
     shape = tuple(max(2, round(POINTS * float(size[axis] / longest))) for axis in plane.axes)
-    # in a plane of symmetry rounding alone says which of two cables limits: what is drawn is that of a plane beside
+    # in a plane of symmetry, rounding errors would select one of two limiting cables; a parallel plane is drawn instead
     beside = plane._replace(at=plane.at + BESIDE * float(high[plane.normal] - plane.at))
     cut = slice_of(space.levels().details, beside, low, high, (shape[0], shape[1]))
     ax = axes_or_new(ax, height=0.9 + 5.6 * float(np.clip(size[second] / size[first], 0.3, 1.3)))
@@ -128,7 +128,7 @@ def _limit_name(key: Key, space: Workspace) -> str:
 
 
 def limit_colors(space: Workspace) -> dict[Key, Color]:
-    """Colors of all limits that there can be: the same for one limit in each figure of a workspace."""
+    """Colors of all possible limits; a limit has one color in all figures of a workspace."""
     count = space.robot.cable_count
     colors = {(0, cable): _shade(cable_color(cable)) for cable in range(-1, count)}
     others = [(which, cable) for which in range(1, len(space.criteria)) for cable in range(-1, count)]
@@ -142,7 +142,7 @@ def _shade(color: tuple[int, int, int]) -> Color:
 
 
 def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array) -> None:
-    """Pale colors by what limits, each region with its name; gray outside."""
+    """Pale colors by the limit, each region with its name; gray outside."""
     ax.set_facecolor(OUTSIDE)
     inside = ax.contourf(cut.across, cut.up, cut.level, levels=[0.0, np.inf], colors=["white"], zorder=0.8)
     pairs = np.stack((cut.criterion, cut.cable), axis=-1).reshape(-1, 2)
@@ -160,7 +160,7 @@ def _draw_regions(ax: Axes, cut: Slice, space: Workspace, levels: Array) -> None
 
 
 def _on_lines(margin: Array, levels: Array) -> Flags:
-    """Grid points beside a line of equal margin."""
+    """Grid points next to a contour line of the margin."""
     band = np.searchsorted(levels, margin)
     passed = np.zeros(margin.shape, dtype=bool)
     passed[:, 1:] |= band[:, 1:] != band[:, :-1]
@@ -169,10 +169,10 @@ def _on_lines(margin: Array, levels: Array) -> Flags:
 
 
 def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) -> None:
-    """Write the name into the middle of each part that is large enough, between lines if possible."""
+    """Write the name in the middle of each sufficiently large part, between lines if possible."""
     parts, count = label(within)
     figure: Any = ax.get_figure(root=True)
-    figure.draw_without_rendering()  # now it is known how large the slice is on the sheet
+    figure.draw_without_rendering()  # the size of the slice on the sheet is known after this
     points = ax.bbox.width * 72.0 / figure.dpi / cut.across.size
     for part in range(1, count + 1):
         for area in ((parts == part) & free, parts == part):
@@ -185,7 +185,7 @@ def _name_region(ax: Axes, cut: Slice, within: Flags, free: Flags, name: str) ->
 
 
 def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> None:
-    """The boundary, and lines of equal margin inside of it."""
+    """Boundary, and contour lines of the margin inside."""
     if levels.size:
         margin = np.ma.masked_where((cut.level < 0.0) | ~np.isfinite(cut.margin), cut.margin)
         drawn = ax.contour(cut.across, cut.up, margin, levels=levels, colors="0.25", linewidths=0.7, zorder=2.0)
@@ -197,7 +197,7 @@ def _draw_lines(ax: Axes, cut: Slice, levels: Array) -> None:
 
 
 def round_levels(largest: float) -> Array:
-    """Round margins from the first above 0 up to the largest, about as many as are drawn."""
+    """Round margins above 0 up to the largest, about `LINES` of them."""
     if not np.isfinite(largest) or largest <= 0.0:
         return np.empty(0)
     coarse = largest / LINES
@@ -207,10 +207,10 @@ def round_levels(largest: float) -> Array:
 
 
 def workspace(space: Workspace) -> Figure:
-    """The hull of a workspace around its robot, and what limits it.
+    """The hull of a workspace around its robot, and its limits.
 
     Faces have the color of the limit there: the cable of the margin, or another criterion; they are gray at the box of
-    the workspace. The bars are shares of the surface. Of a plane workspace the slice is drawn.
+    the workspace. The bars are shares of the surface. For a plane workspace, the slice is drawn.
 
     Args:
         space: The workspace.
@@ -219,7 +219,7 @@ def workspace(space: Workspace) -> Figure:
         The figure.
 
     Raises:
-        InvalidValueError: If it is no workspace.
+        InvalidValueError: If `space` is not a workspace.
 
     Examples:
         >>> import sagline as sl
@@ -233,7 +233,7 @@ def workspace(space: Workspace) -> Figure:
         return slice(space, AXES[flat[0]]).get_figure(root=True)  # type: ignore[return-value] # a new figure
     limits, narrow = space.limits, current().narrow
     figure = sheet(height=2.3 * HEIGHT if limits and narrow else HEIGHT)
-    figure.set_layout_engine("none")  # none knows how much of its axes a robot in space takes
+    figure.set_layout_engine("none")  # layout engines do not know the extent of 3D axes
     ax: Any = figure.add_axes((ABOVE if narrow else ROBOT) if limits else WHOLE, projection="3d")
     colors = limit_colors(space)
     _, points = draw_robot(ax, space.robot, _place(space), "0.4")
@@ -250,7 +250,7 @@ def workspace(space: Workspace) -> Figure:
 
 
 def _place(space: Workspace) -> Pose:
-    """A pose inside: the middle of the robot's test box, or else the point of the grid that is deepest inside."""
+    """A pose inside: the middle of the robot's test box, or the grid point with the largest margin."""
     box, turn = space.robot.test_box, space.orientations.quaternion[0]
     if box is not None and space.levels()(0.5 * (box.low + box.high)[None])[0] >= 0.0:
         return Pose.from_quaternion(0.5 * (box.low + box.high), turn)
@@ -259,7 +259,7 @@ def _place(space: Workspace) -> Pose:
 
 
 def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, float, float]]) -> None:
-    """Its faces, each in the color of the corner that decides."""
+    """Faces of the hull, each in the color of the limit at one of its corners."""
     vertices, faces, first = _coarser(space.surface.vertices, space.surface.faces)
     if not len(faces):
         return
@@ -276,7 +276,7 @@ def _draw_hull(ax: Axes3D, space: Workspace, colors: dict[Key, tuple[float, floa
 
 
 def _coarser(vertices: Array, faces: Indices) -> tuple[Array, Indices, Indices]:
-    """A mesh with as many faces as a sheet shows: corners in one cell of a grid become one."""
+    """A simplified mesh for print: corners in one cell of a grid are merged."""
     if not len(faces):
         return vertices, faces, np.empty(0, dtype=np.int64)
     low = vertices.min(axis=0)

@@ -24,13 +24,13 @@ from sagline.statics.tables import chord_geometry
 if TYPE_CHECKING:
     from sagline.viewer.session import PlayedLog
 
-MOST_RATE: Final = 100.0  # samples per second; a page keeps a part of twice as many or more, as screens show 60
+MOST_RATE: Final = 100.0  # samples per second; twice this rate or more is thinned out, as screens show 60
 
 
 class _SampleVerdict(NamedTuple):
     """Verdict on a sample."""
 
-    good: bool | None  # None without a judgment
+    good: bool | None  # None: not known
     words: str
 
 
@@ -40,12 +40,12 @@ class SharedMotion:
 
     robot: Robot
     kind: str  # "run", "simulation" or "log"
-    time: Array  # from 0 on [s], shape (N,)
-    position: Array  # of the platform's origin [m], shape (N, 3); NaN if it is not known
+    time: Array  # times from 0 [s], shape (N,)
+    position: Array  # position of the platform's origin [m], shape (N, 3); NaN if it is not known
     quaternion: Array  # its rotation, scalar last, shape (N, 4)
     tension: Array  # for numbers and colors [N], shape (N, m)
-    quantity: str  # place of that tension, in words
-    chord_tension: Array  # of the drawn catenaries [N], shape (N, m); NaN for a straight line
+    quantity: str  # name of this tension in words
+    chord_tension: Array  # chord tensions of the drawn catenaries [N], shape (N, m); NaN for a straight line
     length: Array  # unstrained, off the drum [m], shape (N, m)
     verdict: NDArray[np.intp]  # indices of `verdicts`, shape (N,)
     verdicts: tuple[_SampleVerdict, ...]
@@ -58,7 +58,7 @@ class SharedMotion:
         return Pose.from_quaternion(self.position[index], self.quaternion[index])
 
     def thinned(self) -> SharedMotion:
-        """A regular selection with the last sample, where there are more than a screen shows, and a note about it."""
+        """Every n-th sample and the last one, if the rate exceeds that of screens, and a note on this."""
         count, duration = len(self.time), float(self.time[-1])
         every = int((count - 1) / (MOST_RATE * duration)) if duration > 0.0 else 1
         if every <= 1:

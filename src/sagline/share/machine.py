@@ -18,10 +18,10 @@ from sagline.share.packing import PackedColumn, encode_columns
 from sagline.viewer import shapes
 from sagline.viewer.tension_scale import ForceUnit, TensionScale
 
-DIGITS: Final = 12  # of the numbers in a page
+DIGITS: Final = 12  # significant digits of the numbers in a page
 FINEST: Final = 1e-5  # resolution of its solids, as a share of the robot's size
 WIDE: Final = 640.0  # px
-EDGE: Final = 12.0  # px around it
+EDGE: Final = 12.0  # px, margin
 _RIGHT: Final = np.array([0.9, 0.436, 0.0])
 _UP: Final = np.array([-0.154, 0.318, 0.936])
 _EDGES: Final = [(a, b) for a in range(8) for b in range(a) if (a ^ b) in (1, 2, 4)]

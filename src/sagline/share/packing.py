@@ -14,7 +14,7 @@ from sagline.core.arrays import Array
 
 Codes = NDArray[np.int64]
 
-_ORDERS: Final = (0, 1, 2, 3)  # of differences: the one with the smallest values is used
+_ORDERS: Final = (0, 1, 2, 3)  # orders of differences; the order with the smallest values is used
 _LEVEL: Final = 9
 
 
@@ -71,5 +71,5 @@ def _least(column: Codes) -> tuple[int, int, Codes]:
 
 
 def _planes(codes: Codes, count: int) -> bytes:
-    """The lowest bytes of all codes, then the next ones."""
+    """Lowest bytes of all codes, then their second bytes, and so on."""
     return b"".join((codes >> (8 * plane) & 255).astype(np.uint8).tobytes() for plane in range(count))

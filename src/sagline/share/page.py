@@ -21,7 +21,7 @@ from sagline.share.machine import colors, json_numbers, model_data, robot_drawin
 from sagline.share.packing import PackedColumn, encode_columns
 from sagline.viewer.tension_scale import number_text
 
-SCRIPTS: Final = (  # in the order in which they need each other
+SCRIPTS: Final = (  # in the order of their dependencies
     "catenary.js", "sharing.js", "robot.js", "states.js", "theme.js",
     "renderer.js", "camera.js", "scene.js", "panel.js",
     "pointers.js", "player.js", "share.js",

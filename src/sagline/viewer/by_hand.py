@@ -16,7 +16,7 @@ BY_HAND: Final = "chosen by hand"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ByHand(QuadraticProgram):
-    """The feasible tensions nearest to chosen ones; at the pose where they were chosen, these tensions themselves.
+    """Feasible tensions closest to tensions chosen by hand; at the pose of the choice, exactly the chosen ones.
 
     Tensions in force balance differ from those of the minimum norm by a point of the null space. The sag forces shift
     the minimum norm a little, the point stays. At other poses the tensions stay as close as balance and limits allow.
@@ -25,7 +25,7 @@ class ByHand(QuadraticProgram):
 
 WIDTH, BORDER = 340, 26  # px
 HEIGHTS: Final = (0, 74, 190)  # px, by the number of redundant cables
-BEYOND: Final = 0.5  # of the size of the finite part: extension of an unbounded drawing
+BEYOND: Final = 0.5  # extension of an unbounded drawing, as a share of the size of its finite part
 
 
 @dataclass(frozen=True, slots=True, eq=False)

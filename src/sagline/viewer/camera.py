@@ -19,7 +19,7 @@ class Camera(NamedTuple):
 
     place: Array  # position [m], shape (3,)
     axes: Array  # right, down and forward, one per column, shape (3, 3)
-    reach: Array  # half of the picture's width and height at a distance of 1, shape (2,)
+    reach: Array  # half the picture's width and height at distance 1, shape (2,)
     pixels: Array  # width and height of the picture [px], shape (2,)
 
     @classmethod
@@ -51,7 +51,7 @@ class Camera(NamedTuple):
 
 
 def camera_of(server: viser.ViserServer, client: int) -> Camera | None:
-    """The camera of a client by its number; None if there is none."""
+    """Camera of a client by its number; None if it is unknown."""
     found = server.get_clients().get(client)
     return None if found is None else Camera.of(found.camera)
 
@@ -76,7 +76,7 @@ def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
 
 
 def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: float) -> int | None:
-    """Line within a distance [px] of a point of the picture, the front one of several; None for none."""
+    """Line within a distance [px] of a point of the picture, the front one of several; None if there is none."""
     places, deep = camera.project(lines)
     pixel = np.asarray(at) * camera.pixels
     start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
@@ -89,7 +89,7 @@ def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: 
     if not nearest.min() <= within:
         return None
     depth = np.take_along_axis(deep, away.argmin(axis=1)[:, None], axis=1)[:, 0]
-    as_near = nearest <= nearest.min() + 1.0  # px: cables that cross there
+    as_near = nearest <= nearest.min() + 1.0  # px: includes cables that cross there
     return int(np.argmin(np.where(as_near, depth, np.inf)))
 
 
@@ -104,9 +104,9 @@ def screen_point(value: Any) -> tuple[float, float] | None:
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera
 FIELD = 0.7  # rad, vertical field of view: narrower than viser's, for less distortion
-BORDER = 1.06  # of the box, for a margin at the edges
-_USUAL = 1.3  # width over height until a client has sent its own
-_MOVED = 1e-3  # of the box: a camera farther from its set position has been moved by the user
+BORDER = 1.06  # factor on the size of the box, for a margin
+_USUAL = 1.3  # ratio of width to height until a client has sent its own
+_MOVED = 1e-3  # share of the box: a camera farther from its set position was moved by the user
 _UP: Final = np.array([0.0, 0.0, 1.0])
 
 
@@ -114,7 +114,7 @@ def fitted(low: Array, high: Array, aspect: float, field: float = FIELD) -> tupl
     """The nearest camera that sees a whole box from the usual side.
 
     Returns:
-        Where the camera is and the point that it looks at [m].
+        Position of the camera and its target [m].
     """
     right = np.cross(_UP, TOWARD)
     right /= np.linalg.norm(right)
@@ -134,7 +134,7 @@ def _nearest(place: Array, depth: Array, slope: float) -> float:
 
 
 def _centered(place: Array, distance: Array) -> float:
-    """Place that a camera looks at for points to be centered between both edges."""
+    """Target of a camera for which the points are centered between both edges."""
 
     def off(middle: float) -> float:
         seen = (place - middle) / distance
@@ -147,7 +147,7 @@ class Framing:
     """Keeps a box in the picture of every client that has not moved its camera."""
 
     def __init__(self, server: viser.ViserServer, low: Array, high: Array) -> None:
-        """Aim the cameras of a server's clients, those to come included."""
+        """Aim the cameras of present and future clients of a server."""
         self._server = server
         self._low, self._high = low, high
         size = float(np.linalg.norm(high - low))
@@ -219,7 +219,7 @@ class Framing:
                 camera.position, camera.look_at = wanted[:3], wanted[3:]
             return
         if camera.client.client_id in self._directed:
-            return  # the page may still report its camera from before
+            return  # the page may still report its previous camera
         known = np.array([self._first, *places])
         if places and not np.linalg.norm(known - place, axis=1).min() < self._near:
             return

@@ -20,7 +20,7 @@ from sagline.viewer.tension_scale import TensionScale
 
 
 class Computation(Enum):
-    """Readings whose kernels may still be compiled when the cables are drawn first."""
+    """Computations whose kernels may not be compiled yet when the cables are first drawn."""
 
     MARGIN = "capacity margin"
     POLYGON = "polygon of feasible tensions"
@@ -47,7 +47,7 @@ class View:
 
     @property
     def state(self) -> Equilibrium | None:
-        """The equilibrium that is shown; None in motion, and where the pose is not feasible."""
+        """The shown equilibrium; None in motion, and if the pose is not feasible."""
         snapshot = self.snapshot
         if not isinstance(snapshot, Snapshot) or snapshot.plan is None or not snapshot.feasible:
             return None
@@ -57,7 +57,7 @@ class View:
 class Feature:
     """A feature of the page: its controls, its drawing, its text and its reactions; this one does nothing.
 
-    It is made once, with the `Page`. All its methods are called by the serving thread.
+    It is created once, with the `Page`. All its methods are called by the serving thread.
     """
 
     @property
@@ -71,17 +71,17 @@ class Feature:
         return False
 
     def depends(self, view: View) -> Hashable:
-        """Key of all that `follow` depends on: it is called only when this has changed; by default at every view."""
+        """Key of all inputs of `follow`, which is called only if the key changes; by default at every view."""
         return view
 
     def follow(self, view: View) -> None:
         """Draw and write for a new view."""
 
     def tick(self) -> None:
-        """Do what is due; called after every update, and at least every half second."""
+        """Do periodic work; called after every update, and at least every half second."""
 
     def put_on(self, played: Played | None) -> None:
-        """React when something else is played, or nothing."""
+        """React to a change of the played motion, or to its end."""
 
 
 T = TypeVar("T")
@@ -91,12 +91,12 @@ NICENESS: Final = 10  # a drag has priority on a busy processor: it is then draw
 
 
 class BackgroundTask:
-    """One calculation at a time in a thread of its own; a new one replaces the one before."""
+    """One calculation at a time in a separate thread; a new one replaces the previous one."""
 
     def __init__(self, later: Callable[[Callable[[], None]], None]) -> None:
         """Prepare; `later` has the serving thread call a function, from any thread."""
         self._later = later
-        self._number = 0  # of the last calculation
+        self._number = 0  # number of the last calculation
         self._began: float | None = None
         self._next: Callable[[], None] | None = None
 
@@ -154,5 +154,5 @@ class BackgroundTask:
 
 def _lower_priority() -> None:
     """Lower the priority of this thread."""
-    if sys.platform == "linux":  # elsewhere this would be the whole process
+    if sys.platform == "linux":  # on other systems this would affect the whole process
         os.nice(NICENESS)

@@ -21,10 +21,10 @@ from sagline.robot.robot import Robot
 from sagline.viewer.server import NAME
 
 LONGEST: Final = 4000  # characters of a link
-LONGEST_TEXT: Final = 60  # characters of a value, and of what a message quotes
-FARTHEST: Final = 1e12  # of a number without limits
+LONGEST_TEXT: Final = 60  # characters of a value, and of a quotation in a message
+FARTHEST: Final = 1e12  # limit of a number without own limits
 STEP: Final = "Copy the link again."
-_SAFE: Final = ",:.+"  # need no escape after the number sign
+_SAFE: Final = ",:.+"  # characters without escape after the number sign
 _NUMBERS: Final = (viser.GuiSliderHandle, viser.GuiNumberHandle)
 _VECTORS: Final = (viser.GuiVector2Handle, viser.GuiVector3Handle)
 _KINDS: Final = (*_NUMBERS, *_VECTORS, viser.GuiDropdownHandle, viser.GuiCheckboxHandle, viser.GuiTextHandle)
@@ -48,7 +48,7 @@ def parts_of(text: str) -> dict[str, str]:
 
 
 def name_of(robot: Robot) -> str:
-    """Name and checksum of a robot in a link; the checksum is of all but the load on its platform."""
+    """Name and checksum of a robot in a link; the checksum excludes the load on the platform."""
     fixed = dump_robot(robot.replace(mass=1.0, inertia=np.eye(3)))
     return f"{robot.name}:{crc32(fixed.encode()):08x}"
 
@@ -62,7 +62,7 @@ def check_robot(text: str, robot: Robot) -> None:
 
 
 def pose_part(pose: Pose) -> str:
-    """A pose as the command line takes it, to twelve digits."""
+    """A pose in the format of the command line, with twelve digits."""
     angles = pose.rotation.as_euler("ZYX", degrees=True)
     return listed([*pose.position, *angles] if np.any(np.abs(angles) > 1e-12) else pose.position)
 
@@ -73,7 +73,7 @@ def listed(values: Any) -> str:
 
 
 def numbers_of(text: str, item: str, unit: str, count: int, largest: float) -> Array:
-    """A number of numbers between commas."""
+    """Exactly `count` numbers between commas."""
     return np.array(decimal_numbers(_split(text, item, count), item, unit, largest))
 
 
@@ -91,7 +91,7 @@ class LinkedControls:
     """All controls of a page, also those that are added later."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Take the present values as the default ones: a link contains those that differ."""
+        """Store the present values as defaults; a link contains only values that differ from them."""
         self._gui = gui
         self._defaults = {name: handle.value for name, handle in self._handles().items()}
 
@@ -169,7 +169,7 @@ def _number(text: str, name: str, least: float | None, most: float | None) -> fl
 
 
 def _split(text: str, item: str, count: int) -> list[str]:
-    """A number of parts between commas."""
+    """Exactly `count` parts between commas."""
     parts = text.split(",", maxsplit=count)
     if len(parts) != count:
         raise _refused(item, text, f"{count} numbers")

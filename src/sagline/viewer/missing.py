@@ -26,15 +26,15 @@ from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 ATTEMPTS: Final = 4
-MORE: Final = 1.0 + 1e-9  # factor on the wrench: exactly at the border, rounding would decide
-NEAR: Final = 1e-4  # of a tension: distance to a limit that counts as at the limit
+MORE: Final = 1.0 + 1e-9  # factor on the wrench, to be slightly inside of the boundary despite rounding errors
+NEAR: Final = 1e-4  # relative distance to a limit below which a tension counts as at the limit
 _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
 
 class _AtLimit(NamedTuple):
     """A cable at a limit."""
 
-    cable: int  # its number
+    cable: int  # index of the cable
     lower: bool  # true if it is the lower limit, else the upper
 
     @property
@@ -45,7 +45,7 @@ class _AtLimit(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MissingWrench:
-    """Smallest wrench with which a pose is feasible, a force alone where one suffices."""
+    """Smallest wrench with which a pose is feasible; a force without moment if it suffices."""
 
     wrench: Array  # about the center of mass, world axes [N, N m], shape (6,)
     state: Equilibrium  # with this wrench, the blocking cables at their limits
@@ -83,7 +83,7 @@ def missing_of(snapshot: Snapshot) -> MissingWrench | None:
 
 
 def _step(plan: Plan) -> Array:
-    """Smallest force that suffices [N, N m], shape (6,); where none does, the smallest wrench."""
+    """Smallest sufficient force [N, N m], shape (6,); the smallest wrench if no force suffices."""
     if plan.relief is not None and np.isfinite(plan.relief).all():
         return np.concatenate((plan.relief, np.zeros(3)))
     robot = plan.state.one_robot
@@ -109,12 +109,12 @@ def _limits(plan: Plan, held: Plan) -> tuple[_AtLimit, ...]:
     return tuple(_AtLimit(int(k), bool(to_lower[k] <= to_upper[k])) for k in np.flatnonzero(which))
 
 
-NODES: Final = 15  # of the first grid, along each axis
+NODES: Final = 15  # nodes of the first grid along each axis
 AROUND: Final = 2  # points of a finer grid to each side
 STARTS: Final = 4
 ITERATIONS: Final = 40
 FINEST: Final = 1e-6  # of the region's size
-BLOCK: Final = 250  # positions at once: a few milliseconds, then other threads run
+BLOCK: Final = 250  # positions per call: a few milliseconds, then other threads can run
 INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # from the border inward, as a share of the region's size
 
 

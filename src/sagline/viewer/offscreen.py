@@ -20,8 +20,8 @@ from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
 from sagline.viewer.server import Messages
 from sagline.viewer.tension_scale import force_unit
 
-HEIGHT: Final = 4.0  # of the text size
-_STOPS = 16  # of the bar's colors
+HEIGHT: Final = 4.0  # height of the legend in text sizes
+_STOPS = 16  # number of colors of the bar
 
 
 def strip_of(view: View, *remarks: str) -> dict[str, Any]:
@@ -42,12 +42,12 @@ def strip_of(view: View, *remarks: str) -> dict[str, Any]:
 
 
 PATIENCE: Final = 30.0  # s to wait for a picture
-NAMES: Final = ("/names", "/platform/notice")  # nodes that are in no picture
+NAMES: Final = ("/names", "/platform/notice")  # nodes left out of pictures
 STATIC: Final = ("/hull", "/slice")  # nodes that do not change over time
-BORDER: Final = 1.06  # of the robot, for a margin at the edges
-SHAPES: Final = 0.8, 2.4  # width over height of a picture, least and most
+BORDER: Final = 1.06  # factor on the robot's size, for a margin
+SHAPES: Final = 0.8, 2.4  # smallest and largest ratio of width to height
 DEEPEST: Final = 950.0  # m from the camera: in requested pictures viser draws nothing beyond 1000 m
-_FIRST: Final = 32  # px, of a picture that is discarded
+_FIRST: Final = 32  # px, size of the discarded first picture
 
 
 class Shot(NamedTuple):
@@ -86,7 +86,7 @@ def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, f
     if depth.min() <= forward:  # some of the box is behind the camera
         return float(edge[0]), float(edge[1]), max(far, 0.1 * float(np.linalg.norm(high - low))), 0.0
     reach, nearer = (np.abs(place[:, :2] / (depth - nearer)[:, None]).max(axis=0) for nearer in (0.0, forward))
-    right, up = (nearer * np.minimum(1.0, edge / reach)).tolist()  # as much of it as the window shows
+    right, up = (nearer * np.minimum(1.0, edge / reach)).tolist()  # the part shown in the window
     return right, up, far - forward, forward
 
 
@@ -131,7 +131,7 @@ class _OffscreenScene:
             )
 
     def take(self, kind: Literal["png", "jpeg"]) -> None:
-        """Have the page take and keep a picture; wait until it has."""
+        """Have the page take and store a picture, and wait for this."""
         self._render(self._shot.height, self._shot.width, kind)
 
     def _render(self, height: int, width: int, kind: Literal["png", "jpeg"]) -> None:

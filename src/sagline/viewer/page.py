@@ -32,7 +32,7 @@ from sagline.viewer.server import Channel
 from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 
-FRAME_TIME = 1.0 / 60.0  # s: least time between updates
+FRAME_TIME = 1.0 / 60.0  # s: shortest time between updates
 SOON = 0.05  # s: longest wait while the result of a background task is expected
 IDLE = 0.5  # s: longest wait; Ctrl-C is not noticed earlier where waiting cannot be interrupted
 
@@ -60,22 +60,22 @@ class Source(NamedTuple):
 
 
 class Page:
-    """A robot, perhaps with a run or a simulation, on a server that the caller has started and will stop.
+    """Page of a robot, optionally with a run or simulation; the caller starts and stops the server.
 
-    Its state belongs to the thread in `serve`; other threads call only `later`, `refresh`, `wait`, `extend` and `stop`.
+    Its state is used in the thread of `serve`; other threads call only `later`, `refresh`, `wait`, `extend` and `stop`.
 
     Attributes:
         server: A running server with nothing on it.
         robot: The robot; that of what is played, if anything is.
         ready: Function that returns whether a computation is compiled; call `refresh` when one has become ready.
         channel: Messages to and from browsers.
-        panel: Controls and readings; a feature adds a tab to `panel.readings`.
+        panel: Controls and displayed values; a feature adds a tab to `panel.readings`.
         scene: The robot in the scene.
         player: Player of a run, a simulation or a log.
         framing: Cameras of the clients.
         scale: Colors of tensions.
-        size: Of the robot [m].
-        home: Pose of the platform at first.
+        size: Size of the robot [m].
+        home: Initial pose of the platform.
         extent: Lowest and highest corner of all that is drawn [m].
         wrench: External wrench on the platform while it is dragged, shape (6,), as `inverse` takes it; None for none.
         found: A calibration of the robot to be shown; None for none.
@@ -126,10 +126,10 @@ class Page:
         self._traced: tuple[int, int, float] = (0, 0, 0.0)  # key of the traces that are drawn
         self._extended = 0  # number of extensions of what is played
         self._changed: tuple[tuple[float, float, float], Robot] | None = None  # settings, and the robot with them
-        self._previous: Plan | None = None  # plan of the pose before, for a method that depends on history
+        self._previous: Plan | None = None  # plan of the previous pose, for a method that depends on history
 
     def serve(self) -> None:
-        """Follow what clients do until `stop`; the calling thread does all the work."""
+        """React to clients until `stop`; the calling thread does all the work."""
         self._update()
         last = time.monotonic()
         while not self._stopping.is_set():
@@ -157,7 +157,7 @@ class Page:
         self._wake.set()
 
     def wait(self, reason: str) -> None:
-        """Write why the numbers are not there yet; from any thread."""
+        """Write the reason why values are not available yet; from any thread."""
         self.panel.wait(reason)
 
     def extend(self, played: Played) -> None:
@@ -179,7 +179,7 @@ class Page:
 
     @property
     def state(self) -> Equilibrium | None:
-        """The equilibrium that is shown; None in motion, and where the pose is not feasible."""
+        """The shown equilibrium; None in motion, and if the pose is not feasible."""
         return None if self.view is None else self.view.state
 
     def feature(self, kind: type[F]) -> F:
@@ -219,7 +219,7 @@ class Page:
             self._tasks.popleft()()
 
     def _put_on(self, played: Played | None) -> None:
-        """Play something else, or nothing."""
+        """Play another motion, or none."""
         if played is None:
             self.scene.show_traces(np.empty((0, 3)), np.empty((0, 3)))
         for feature in self.features:

@@ -1,4 +1,4 @@
-"""Panels in the browser: controls on the left, readings on the right."""
+"""Panels in the browser: controls on the left, displayed values on the right."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_histor
 from sagline.viewer.tension_scale import TensionScale
 
 LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # px
-_LIGHTEST, _HEAVIEST = 0.1, 4.0  # of the robot's own mass
+_LIGHTEST, _HEAVIEST = 0.1, 4.0  # limits relative to the robot's mass
 
 
 class ControlPanel:
-    """Sliders, choices and readings."""
+    """Sliders, choices and displayed values."""
 
     def __init__(
         self,
@@ -88,12 +88,12 @@ class ControlPanel:
         self._forgetting.visible = shown and depends_on_history(self._tension())
 
     def read_out(self, verdict: str, numbers: str) -> None:
-        """Show the readings."""
+        """Show the values."""
         self._verdict.content = verdict
         self._numbers.content = numbers
 
     def explain(self, text: str) -> None:
-        """Write why a pose is not feasible, and how to change that; "" for nothing."""
+        """Write the reason why a pose is not feasible, and a remedy; "" for no text."""
         self._explained.content, self._explained.visible = text, bool(text)
 
     def show_polygon(self, polygon: str) -> None:
@@ -118,7 +118,7 @@ class ControlPanel:
         self._changed()
 
     def wait(self, reason: str) -> None:
-        """Write why the numbers are not there yet."""
+        """Write the reason why values are not available yet."""
         self._verdict.content = readout.waiting(reason)
 
     def refuse(self, message: str) -> None:

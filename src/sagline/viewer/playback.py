@@ -52,7 +52,7 @@ class PlayedPlan:
 
     plan: Plan
     confirmation: Confirmation  # with exact cables
-    time: Array  # of the samples, from 0 on [s], shape (N,); one second a sample for poses without a path
+    time: Array  # times of the samples from 0 [s], shape (N,); one second per pose without a path
 
     name = "run"
     unchanged = "A run keeps its robot and loads; drag the platform to change them."
@@ -153,7 +153,7 @@ class PlayedSimulation:
 
     @property
     def time(self) -> Array:
-        """Of the samples, from 0 on [s], shape (N,)."""
+        """Times of the samples from 0 [s], shape (N,)."""
         return np.asarray(self.simulation.time - self.simulation.time[0])
 
     @property
@@ -240,5 +240,5 @@ class PlayedSimulation:
 
 
 def _sample_at(times: Array, time: float) -> int:
-    """Number of the sample at or before a time; of the first one before it."""
+    """Index of the last sample at or before a time; 0 for earlier times."""
     return int(np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 1))

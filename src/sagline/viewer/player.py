@@ -27,11 +27,11 @@ class InMotion:
 
     robot: Robot
     pose: Pose
-    index: int  # of the sample
+    index: int  # index of the sample
     tension: Array  # [N], shape (m,); NaN if there is none
     length: Array  # unstrained, off the drums [m], shape (m,); NaN if there is none
     verdict: str  # HTML of the state and of the events
-    heads: tuple[str, ...]  # of the table of the cables
+    heads: tuple[str, ...]  # column heads of the table of cables
     columns: Sequence[Sequence[str]]  # of that table, a text for each cable
     why_no_choice: str  # reason why tensions are not chosen
     feasible: bool = True
@@ -114,7 +114,7 @@ class Beside(NamedTuple):
     """A second run with the same clock."""
 
     played: Played
-    names: tuple[str, str]  # of both on the timeline, this one last
+    names: tuple[str, str]  # names of both runs on the timeline, the second run last
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ class Timeline:
     """Clock of a playback."""
 
     duration: float  # time of the end [s]
-    time: float = 0.0  # that is shown [s], 0 to duration
+    time: float = 0.0  # shown time [s], 0 to duration
     playing: bool = False  # true if the clock runs
 
     def advanced(self, elapsed: float, speed: float) -> Timeline:
@@ -173,7 +173,7 @@ class Player:
         put_on: Callable[[Played | None], None],
         beside: Beside | None = None,
     ) -> None:
-        """Play something, or nothing; `put_on` is called whenever something else is played."""
+        """Play a motion or none; `put_on` is called whenever another motion is played."""
         self._put_on, self._original, self._beside = put_on, original, beside
         self.speed, self.number = 1.0, 0
         self.play(original)
@@ -205,7 +205,7 @@ class Player:
             self.clock = self.clock.extended(self._duration())
 
     def grow(self, played: Played) -> None:
-        """Replace the simulation of a cut by a longer version; a clock that has reached its end runs on."""
+        """Replace the simulation of a cut by a longer version; a clock at the former end continues."""
         waits = self.clock.time >= self.clock.duration
         self.played = played
         self.clock = Timeline(self._duration(), self.clock.time, self.clock.playing or waits)
@@ -215,7 +215,7 @@ class Player:
         return PlayerState(self.played, self.is_original, self.clock, self.following)
 
     def restore(self, kept: PlayerState) -> None:
-        """Return to a state; the original is played as far as it has been extended since."""
+        """Return to a state; the original includes later extensions."""
         self.play(self._original if kept.original else kept.played)
         self.clock = self.clock.scrubbed(kept.clock.time)
         if kept.clock.playing:

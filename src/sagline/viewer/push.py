@@ -20,9 +20,9 @@ from sagline.statics.stiffness import stiffness
 
 FORCES: Final = 24  # trials in an iteration, which narrows the bounds of a limit to a 23rd
 ITERATIONS: Final = 4
-SMALLEST: Final = 1e-4  # of the largest force: the first trial
+SMALLEST: Final = 1e-4  # first trial, as a share of the largest force
 BEYOND: Final = 1e3  # largest force, of the robot's weight and tensions, if its cables have no upper limit
-AT_LIMIT: Final = 1e-9  # of the largest tension: excess over a limit that counts as at the limit
+AT_LIMIT: Final = 1e-9  # share of the largest tension: smaller excess over a limit counts as at the limit
 
 
 class Push(NamedTuple):
@@ -48,7 +48,7 @@ class Reserve(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PushResponse:
-    """Response of a platform to a force, the unstrained lengths kept."""
+    """Response of a platform to a force with constant unstrained lengths."""
 
     push: Push
     state: Equilibrium  # without the force
@@ -139,7 +139,7 @@ def _reserve(state: Equilibrium, push: Push) -> Reserve:
 
 
 def _redistributed(state: Equilibrium, push: Push) -> Reserve:
-    """Largest force before no tensions within the limits hold the platform at its pose."""
+    """Largest force for which tensions within the limits balance the platform at its pose."""
     robot, unit = state.one_robot, Push(push.force / np.linalg.norm(push.force), push.at)
     poses = Pose.from_quaternion(np.tile(state.pose.position, (FORCES, 1)), np.tile(state.pose.quaternion, (FORCES, 1)))
 
@@ -165,7 +165,7 @@ def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[flo
 
 
 def _upper_bound(state: Equilibrium) -> float:
-    """A force that no cables of the robot hold [N]."""
+    """A force larger than the cables of the robot can balance [N]."""
     robot = state.one_robot
     weight = robot.mass * robot.gravity
     if np.isfinite(robot.tension_max).all():

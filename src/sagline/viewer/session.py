@@ -34,8 +34,8 @@ from sagline.viewer.timeline import (
     spans_of,
 )
 
-PER_METER = 1e3  # mm
-MOST_EVENTS = 8  # in the list, the newest
+PER_METER = 1e3  # mm per m
+MOST_EVENTS = 8  # largest number of listed events, the newest
 NO_CHOICE = "Tensions of a log are not chosen: they are those that the load cells read."
 WRONG = (State.FAULT, State.EMERGENCY)
 
@@ -45,9 +45,9 @@ class PlayedLog:
     """N cycles of a controller, from time 0 on."""
 
     robot: Robot
-    time: Array  # of the cycles, from 0 on [s], shape (N,)
+    time: Array  # times of the cycles from 0 [s], shape (N,)
     began: float  # time of the first cycle on the clock of the link [s]
-    state: Codes  # of `State`, shape (N,)
+    state: Codes  # codes of `State`, shape (N,)
     late: Array  # delay of each cycle [s], shape (N,)
     position: Array  # of the platform's origin, estimated [m], shape (N, 3); NaN if it is not known
     quaternion: Array  # estimated, shape (N, 4)

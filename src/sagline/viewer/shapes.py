@@ -138,7 +138,7 @@ _BEAM = 0.0045  # thickness of the frame's beams (share of the robot's size)
 _DASH = 0.02  # length of a dash of an assumed frame (share of the robot's size)
 _WINCH = 0.009  # radius of a winch (share of the robot's size)
 _THINNEST = 0.08  # thinnest platform, of its largest edge
-_SIDES = 20  # of a winch's drum
+_SIDES = 20  # number of sides of a drum
 _WHEEL: Final = ((0.8, 0.97), (0.1, 0.26))  # radii of rim and hub, of a pulley's: the cable lies on the rim
 _WHEEL_WIDTH, _SPOKE, _WHEEL_SIDES = 0.2, 0.055, 48
 _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
@@ -305,9 +305,9 @@ class Ellipsoids(NamedTuple):
     """Ellipsoids of errors."""
 
     middle: Array  # [m], shape (k, 3)
-    turn: Array  # their axes, as quaternions, scalar first, shape (k, 4)
-    radius: Array  # one standard error along each of their axes [m], shape (k, 3)
-    which: Indices  # numbers of their points, shape (k,)
+    turn: Array  # rotations of the axes, quaternions, scalar first, shape (k, 4)
+    radius: Array  # standard errors along the axes [m], shape (k, 3)
+    which: Indices  # indices of their points, shape (k,)
 
     @classmethod
     def of(cls, points: Array, covariance: Array) -> Ellipsoids:

@@ -32,7 +32,7 @@ class MarginScale:
 
     @classmethod
     def up_to(cls, largest: float) -> MarginScale:
-        """Bands of a round width of which the last but one ends about at the largest margin [N]."""
+        """Bands of a round width; the last but one ends near the largest margin [N]."""
         coarse = largest / INSIDE if np.isfinite(largest) and largest > 0.0 else 1.0
         power = 10.0 ** floor(log10(coarse))
         return cls(max(times * power for times in (1.0, 2.0, 5.0) if times * power <= coarse * (1.0 + 1e-9)))
@@ -70,7 +70,7 @@ def _bare(edge: float, unit: ForceUnit) -> str:
 
 APART = 0.12  # of the slice's longer side: least distance of two labels
 FINER = 3  # pixels for a point of the grid, along each axis
-INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # of 255: the robot behind stays visible
+INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # out of 255: the robot behind stays visible
 
 
 class Picture(NamedTuple):

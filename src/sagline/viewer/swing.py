@@ -24,8 +24,8 @@ from sagline.viewer import shapes
 
 DRAWN: Final = 0.035  # largest displacement as drawn, as a share of the robot's size
 MOST_TURN: Final = 0.3  # rad: largest rotation of the platform as drawn
-ENERGY: Final = 1.0  # J, of the vibration that the drawing is compared with
-PERIOD: Final = 2.0  # s, of the motion as drawn
+ENERGY: Final = 1.0  # J, energy of the reference vibration
+PERIOD: Final = 2.0  # s, period of the drawn motion
 
 
 @dataclass(frozen=True, slots=True, eq=False)

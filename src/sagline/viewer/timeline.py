@@ -100,7 +100,7 @@ def chart_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, 
     return lower + upper
 
 
-MOST_SPANS: Final = 400  # on a timeline; nearer ones are joined
+MOST_SPANS: Final = 400  # largest number on a timeline; close ones are joined
 
 
 def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:

@@ -29,13 +29,13 @@ from sagline.viewer.tension_scale import force_unit
 LOSSES: Final = Damping(loss_time=1e-3)
 PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # s: ends of the parts; the first is short, to be shown soon
 DURATION: Final = PARTS[-1]
-ELEMENTS: Final = 10  # of a cable with mass: four times as fast as twice as many
+ELEMENTS: Final = 10  # elements of a cable with mass; twice as many take four times as long
 CABLE_MASS = {"massless": "none", "with cable mass": "lumped"}
-TOP = -10.0  # order of buttons above all other controls
+TOP = -10.0  # order value: above all other controls
 HELP: Final = sentence("Click a cable in the scene, or choose one.")
 MARK: Final = (200, 60, 130)  # 3 : 1 on both backgrounds
 _WIDTH: Final = 7.0  # px
-_PLACE: Final = 0.4  # fraction of the cable at which its name stands, from the frame on
+_PLACE: Final = 0.4  # position of the name along the cable, from the frame end
 TOPIC: Final = "pick"  # of the messages of browser/hand.js
 NEAR: Final = 14.0  # px: largest distance of a click, or of a finger, from a cable
 
@@ -64,7 +64,7 @@ def peak_of(simulation: Simulation, cut: int) -> tuple[int, float, float]:
 def _outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
     """HTML: largest displacement of the platform and highest tension after a cut; `whole` if it is complete."""
     unit, (cable, tension, time) = force_unit(simulation.robot), peak_of(simulation, cut)
-    limit = float(simulation.robot.tension_max[cable])  # infinite for none
+    limit = float(simulation.robot.tension_max[cable])  # infinite without a limit
     away = np.linalg.norm(simulation.pose.position - simulation.pose.position[0], axis=1)
     far = int(np.argmax(away))
     times = f", {tension / limit:.2f} times its limit" if np.isfinite(limit) else ""

@@ -29,9 +29,9 @@ from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
 WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # px
-RATE = 30.0  # pictures a second
+RATE = 30.0  # pictures per second
 LONGEST = 120.0  # s of film: more pictures fill the memory of a browser
-LINE_WIDTH = 1.4  # for those of a screen
+LINE_WIDTH = 1.4  # relative to the line width on the screen
 TOPIC: Final = "film"  # description of the film
 CLOCK: Final = "film clock"  # texts of its strip, before each picture
 
@@ -197,7 +197,7 @@ class ExportFeature(Feature):
         self.put_on(page.player.played)
 
     def depends(self, view: View) -> Hashable:
-        """Nothing of the view."""
+        """Key independent of the view."""
         return None
 
     def put_on(self, played: Played | None) -> None:

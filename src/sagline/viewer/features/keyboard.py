@@ -60,7 +60,7 @@ def _tensions(robot: Robot, tension: Array) -> str:
 
 STEP: Final = 0.01  # translation by a key, as a share of the robot's size
 TURN: Final = np.radians(1.0)  # rotation by a key
-MOST: Final = 100.0  # steps at once, from keys held while messages were delayed
+MOST: Final = 100.0  # largest number of steps in one message (keys held during a delay)
 
 
 class KeyboardFeature(Feature):
@@ -84,7 +84,7 @@ class KeyboardFeature(Feature):
         self._channel.send("spoken", screen_reader_text(view))
 
     def _on_nudge(self, value: Any, _: int) -> None:
-        """Move by steps along x, y, z, and turn by steps about z, y, x."""
+        """Move by steps along x, y, z, and rotate by steps about z, y, x."""
         steps = _steps(value)
         if steps is None or self._pose is None:
             return

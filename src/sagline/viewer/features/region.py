@@ -39,13 +39,13 @@ from sagline.workspaces.region import Plane, Region, region_of, slice_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 BOUNDARY_WIDTH, LINE_WIDTH, LINE_COLOR = 4.0, 1.5, (120, 128, 138)  # px
-_SMALL, _TEXT_SCALE = 0.7, 0.85  # of labels on lines, and of others
+_SMALL, _TEXT_SCALE = 0.7, 0.85  # text scale of labels on lines, and of other labels
 INWARD, OUTWARD = REST, PLATFORM  # arrows back to the workspace, and to its boundary
 _BELOW: Final = 0.04  # of the robot's size, from the platform to the text below it
 _ARROW: Final = np.array([0.002, 0.009, 0.03])  # radii of shaft and head, length of the head; of the robot's size
 # turn x and y of a picture to the two axes of a plane, by its normal
 _TURNS: Final = np.array([[0.5, 0.5, 0.5, 0.5], [np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
-POINTS: Final = 40  # of a slice, along each axis of its plane
+POINTS: Final = 40  # points of a slice along each axis of its plane
 COARSE: Final = 7  # points along each axis whose margins give the range of the colors
 BY_CABLE, BY_MARGIN = "limiting cable", "margin"
 PLANES: Final = {"level": 2, "upright, along x": 1, "upright, along y": 0}  # names of planes, and their normals
@@ -76,7 +76,7 @@ class RegionFeature(Feature):
         self._query: WorkspaceQuery | None = None
         self._levels: Levels | None = None
         self._region: Region | None = None
-        self._place = np.zeros(3)  # of the platform [m]
+        self._place = np.zeros(3)  # position of the platform [m]
         self._scale = MarginScale(1.0)
         self._scale_key: Hashable = None  # of the workspace that the scale is for
         # key of the workspace, true if the hull is the coarse one, and the hull; None if it cannot be computed
