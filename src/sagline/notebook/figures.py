@@ -199,7 +199,7 @@ def _ink(gray: re.Match[str]) -> str:
 
 
 def _themed(svg: str, description: str) -> str:
-    """A drawing in the colors of the page: black becomes the color of its text, gray the same with less opacity.
+    """A drawing in the colors of the page: black becomes the text color, gray the text color with less opacity.
 
     Its inner names become unique, so that several drawings can be on one page.
     """

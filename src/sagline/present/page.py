@@ -58,14 +58,14 @@ class Table(NamedTuple):
 
 
 def table_of(caption: str, *columns: tuple[str, Iterable[Any], str]) -> Table:
-    """Table by columns, each with its head, its values and their form as `n` takes it; texts stay as they are."""
+    """Table from columns, each with its head, its values and their format for `n`; texts are unchanged."""
     cells = [[each if isinstance(each, str) else n(each, form) for each in values] for _, values, form in columns]
     return Table(caption, [head for head, _, _ in columns], list(zip(*cells, strict=True)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Finding:
-    """One thing the article says or shows, beside what we measured.
+    """One statement or figure of the article, compared with the computed result.
 
     Attributes:
         key: Anchor in the page and key of its numbers: letters, digits and hyphens.
@@ -166,7 +166,7 @@ def write_page(folder: Path | str, names: tuple[str, str], text: str, numbers: d
 
 
 def _result(chapters: Sequence[Chapter], picture: Panel | None) -> str:
-    """Numbers of statements by verdict and chapter, and one drawing."""
+    """Counts of statements by verdict and chapter, and one drawing."""
     counts = Counter(finding.verdict for chapter in chapters for finding in chapter.findings)
     verdicts = [verdict for verdict in Verdict if counts[verdict]]
     tiles = "".join(
@@ -216,7 +216,7 @@ def _chapter(number: int, chapter: Chapter) -> str:
 
 
 def _finding(finding: Finding) -> str:
-    """Heading, what is said and found, drawings and tables; one drawing or a narrow table is beside the text."""
+    """Heading, statement, result, drawings and tables; one drawing or a narrow table is next to the text."""
     said = f'<div class="said"><h4>The article</h4><p>{_text(finding.statement)}</p></div>' if finding.statement else ""
     paragraphs = "".join(f"<p>{_text(part)}</p>" for part in finding.measured.split("\n\n"))
     pair = f'<div class="pair">{said}<div class="found"><h4>Computed</h4>{paragraphs}</div></div>'
@@ -250,7 +250,7 @@ def _headline(finding: Finding) -> str:
 
 
 def _text(text: str) -> str:
-    """Text with its subscripts set as such: T_x, b_π, ε_max."""
+    """Text with typeset subscripts: T_x, b_π, ε_max."""
     return _subscript.sub(r"<sub>\1</sub>", escape(text))
 
 
