@@ -195,7 +195,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         fits = [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in close]
         if min(fit.squares for fit in fits) > _limit(
             case.read, (*taken, close[0]), count
-        ):  # no explanation is right, or the linear fit is far from it
+        ):  # no suspect explains the readings, or the linear fits were inaccurate
             likely = ~near_best & (np.array([fit.squares for fit in first]) < _NONLINEAR * before)
             more = [suspects[k] for k in np.flatnonzero(likely)]
             fits += [_fit_suspects(case, (*taken, one), _ITERATIONS) for one in more]

@@ -52,7 +52,7 @@ def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None
 
 @contextmanager
 def notices() -> Iterator[None]:
-    """Print the warnings of sagline as notes on stderr while inside."""
+    """Print the warnings of sagline as notes on stderr inside the `with` block."""
     with warnings.catch_warnings():
         others = warnings.showwarning
 

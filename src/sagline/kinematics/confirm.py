@@ -67,7 +67,8 @@ def confirm(plan: Plan, *, progress: Progress | None = None) -> Confirmation:
     Inertia and external wrench are those of the plan; the search starts at the planned poses.
 
     Args:
-        plan: A plan of any cable model. The errors are those of its model; for the exact model, only rounding errors.
+        plan: A plan of any cable model. The pose errors are caused by this model; with the exact model they are only
+            rounding errors.
         progress: Called about every tenth of a second: number of confirmed poses, total number.
 
     Returns:

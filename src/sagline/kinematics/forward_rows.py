@@ -209,7 +209,7 @@ def solve_forward_rows(
 
 
 def new_chain(cables: int, freedoms: int) -> LastEquilibriumArrays:
-    """Memory of a chain of samples, before the first sample."""
+    """Initial memory of a chain of samples: NaN."""
     return (
         np.full((CABLE_ROWS, cables), np.nan),
         np.full((freedoms, freedoms), np.nan),

@@ -148,8 +148,8 @@ class CableChoice:
 class FreeCable(Free):
     """The material of all cables, from a catalogue.
 
-    catalogue: The cables, preferably sorted by weight, because neighbors are tried one after the other.
-        catalogue: The cables, best in the order of their weight: neighbors are tried after each other.
+    Attributes:
+        catalogue: The cables, preferably sorted by weight, because neighbors are tried one after the other.
     """
 
     catalogue: tuple[CableChoice, ...]

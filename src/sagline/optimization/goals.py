@@ -155,8 +155,8 @@ class Goal:
             measured: Quantities of the candidates.
             worst: True to take the worst of a sample of anchors, False for the mean.
 
-        Values in the goal's unit, shape (N,).
-            In the goal's unit, shape (N,).
+        Returns:
+            Values in the unit of the goal, shape (N,).
         """
         samples = KINDS[self.kind].over_poses(getattr(measured, self.needs))
         if not worst:

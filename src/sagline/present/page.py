@@ -68,7 +68,7 @@ class Finding:
     """One statement or figure of the article, compared with the computed result.
 
     Attributes:
-        key: Anchor in the page and key of its numbers: letters, digits and hyphens.
+        key: HTML id of the finding, and key of its numbers in the results: letters, digits and hyphens.
         figures: Numbers of the article's figures that it redoes.
         tables: Numbers of the article's tables that it redoes.
         title: A few words.

@@ -25,7 +25,7 @@ _ALIKE = {"cable_count": "", "motion_pattern": "", "tension_limits_of": "", "gra
 def together(robot: Robot | Sequence[Robot]) -> Robots:
     """Check a robot, or several robots against each other; several are returned as a tuple.
 
-    Several robots must have the same number of cables, motion pattern with plane normal, type of limited tension, and
+    Several robots must have the same number of cables, motion pattern with plane normal, type of tension limits, and
     gravity. All other properties may differ.
 
     robot: a robot, or a sequence of them.

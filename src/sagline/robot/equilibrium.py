@@ -142,7 +142,7 @@ class Equilibrium(Result):
             index: A number (negative: from the end), a slice, or an array of numbers or of N booleans.
 
         Raises:
-            NoBatchError: If the equilibrium is a single one (also a TypeError).
+            NoBatchError: If the equilibrium is a single one. NoBatchError is also a TypeError.
             NoSuchEntryError: If there is no such pose (also an IndexError).
         """
         part = part_of(index, self.pose.shape, "single equilibrium")

@@ -24,8 +24,8 @@ def limit_margin(state: Equilibrium) -> Array:
         state: Robot or robots, and cables; `plan.state` for instance.
 
     Returns:
-        Smallest distance [N] of the limited tension, shape () or (N,): 0 if a cable is at its limit, NaN where there
-        are no tensions. It depends on the tension distribution.
+        Smallest distance [N] of the tension of a cable to its limits, shape () or (N,): 0 if a cable is at its limit,
+        NaN where there are no tensions. It depends on the tension distribution.
 
     Raises:
         InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state).

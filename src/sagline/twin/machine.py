@@ -211,7 +211,7 @@ class Machine:
 
         Args:
             group: Index of the group, from 0.
-            message: Id of the owner for a claim, or a command.
+            message: A claim (the id of its owner), or a command.
         """
         if self._schedule.waiting:
             self._apply_due_faults()

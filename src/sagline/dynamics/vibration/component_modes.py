@@ -92,7 +92,7 @@ class CableComponents(NamedTuple):
             amplitudes: Amplitudes of the components, shape (T, K).
 
         Returns:
-            Modes; displacements of the platform ends in their directions, (t, d, K); amplitudes, (t, k, K).
+            Modes; displacements of the platform ends along their directions, (t, d, K); amplitudes, (t, k, K).
         """
         own, inside = self.mesh.axes @ ends[self.mesh.taut], self.plane.square.size
         swing = amplitudes[:inside].reshape(*self.plane.square.shape, ends.shape[2])

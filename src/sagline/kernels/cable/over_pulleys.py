@@ -104,7 +104,7 @@ def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> f
 
 @glue
 def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
-    """Fill where exact cables leave their pulleys, from T_x and T_zA, and their free spans and lengths."""
+    """Compute exit points, free spans and free lengths of exact cables over pulleys from T_x and T_zA."""
     m = rows.shape[1]
     for i in range(m):  # T_zA
         rows[g.VERTICAL, i] -= cables[i, tables.DENSITY] * model.gravity * rows[g.ASKED_LENGTH, i]

@@ -25,7 +25,7 @@ from sagline.kernels.tension.polygon import new_work_arrays
 
 FORCE, MOMENT = 0, 1  # columns of the residuals
 
-# as they come from Python, which passes plain tuples fastest
+# types of the arguments from Python: plain tuples, which are passed fastest
 ModelTerms = tuple[int, float, float]  # code, k_h, k_p
 DistributionTerms = tuple[int, float, int, Array, Array]  # Distribution
 LimitTerms = tuple[int, float]  # Limits

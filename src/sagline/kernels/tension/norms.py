@@ -98,7 +98,7 @@ def share_lowest_maximum(
         rows[r, m + i] = 1.0
         for row in range(STRIP_ROWS):
             wide[row, i] = bounds[row, i]
-        # the largest tension less this one is not negative
+        # the largest tension minus that of cable i is >= 0
         wide[START, m + i], wide[LOW, m + i], wide[HIGH, m + i] = -bounds[START, i] - offset[i], 0.0, math.inf
     for k in range(r):
         cost[k] = 0.0
