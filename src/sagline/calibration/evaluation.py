@@ -24,7 +24,8 @@ from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 from sagline.robot.tolerances import UNCERTAIN, Provenance
 
-DOUBTFUL: Final = 1e-4  # probability that chance gives so large a chi squared; below it the result is doubtful
+# probability that chance gives a chi squared so far from its expected value; below it the result is doubtful
+DOUBTFUL: Final = 1e-4
 ODD: Final = 0.1  # share of the poses that may fit badly before the whole result is in doubt
 ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
 TOLERATED: Final = 1.1  # ratio of chi squared to its expected value: in a large log, no model is better than that

@@ -16,7 +16,7 @@ from sagline.kernels.calibration import kinds
 from sagline.robot.robot import Robot
 
 OPEN: Final = 1e-12  # share of the largest singular value: rounding of slopes that cancel
-_SPREAD: Final = 1e-9  # share of the largest singular value: lower limit for the gap before open directions
+_SPREAD: Final = 1e-9  # share of the largest singular value: larger ones are always observable
 _FIXED: Final = 5e-2  # share of the usual deviation: a parameter with a smaller stated deviation counts as known
 _WIDE: Final = 1e3  # times the usual deviation of an unknown value: limit for wider priors
 _SAME: Final = 1e-6  # sine of the angle below which two directions are equal

@@ -141,7 +141,7 @@ def information_of(rows: Array) -> Array:
 
 
 TOTAL_STATION: Final = 1e-3  # m, of each coordinate
-CELL_SHARE: Final = 0.01  # share of the mean tension: a typical load cell
+CELL_SHARE: Final = 0.01  # share of the median tension: a typical load cell
 NEARLY: Final = 0.9  # share of the largest decrease of the log errors: a cheaper measurement is sufficient with it
 WORTH: Final = 0.99  # share of the errors: a measurement that leaves more is not recommended
 

@@ -23,7 +23,7 @@ EXAMINED: Final = 100  # number of worst poses; if more are bad, the calibration
 _MOST: Final = 3  # largest number of errors at one pose; with more, the pose as a whole is the outlier
 _CLEAR: Final = 3.0  # difference in log probability: closer explanations are not distinguished
 _REST: Final = 0.1  # share of the squares that one error explains: allowance for errors of the calibration
-_WORTH: Final = 20.0  # ratio of squares, to first order: worse explanations are not computed exactly
+_WORTH: Final = 20.0  # difference in log probability, to first order: worse explanations are not computed exactly
 _NONLINEAR: Final = 0.6  # ratio of squares: large errors need only this linear improvement for an exact fit
 _DROP: Final = 500.0  # of chi squared
 _ITERATIONS: Final = 10
@@ -244,7 +244,7 @@ def _suspects(m: int, there: Flags) -> list[_Suspect]:
 
 
 def _whole(case: _Case, row: int, squares: float) -> Outlier:
-    """Outlier for the whole pose, with the reading of the largest error."""
+    """Outlier for the whole pose, with the kind of reading of the largest error."""
     m = case.lengths.shape[1]
     off, _ = case.misses()
     parts = (slice(0, m), slice(m, 2 * m), slice(2 * m, 2 * m + 3), slice(2 * m + 3, 2 * m + 6))

@@ -43,8 +43,8 @@ class Details(NamedTuple):
 class Levels:
     """Smallest value of all criteria, each divided by its scale, at positions of the platform: >= 0 inside.
 
-    A negative margin is the level itself: other criteria have no tensions there. Among the rotations the smallest level
-    counts, or the largest if any rotation is sufficient.
+    If the margin is negative, criteria on tensions do not count, because there are no tensions. Among the rotations the
+    smallest level counts, or the largest if any rotation is sufficient.
 
     Attributes:
         robot: The robot.

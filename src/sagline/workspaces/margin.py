@@ -136,8 +136,8 @@ def margin(
 
     Also valid at poses without a tension distribution. With sag the bracket is proved for all tensions: low >= 0 means
     that every load of the set can be balanced within the limits, high < 0 that at least one load cannot. Sagging cables
-    are included up to a length of fifteen times their chord. Without an upper limit they are included up to twice their
-    own length, because a lower limit of zero has no largest sag force.
+    are included up to a length of fifteen times their chord, because a lower limit of zero has no largest sag force.
+    Without an upper limit they are included until they are stretched to twice their own length.
 
     Args:
         robot: The robot, or a sequence of N robots, one per pose.

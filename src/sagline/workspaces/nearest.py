@@ -21,7 +21,7 @@ _STARTS: Final = 3  # number of best grid points from which the search starts
 _STEP: Final = 0.1  # share of the box: initial step
 _EVALUATIONS: Final = 300  # largest number from each start
 _PRECISION: Final = 1e-4  # m
-_FAR: Final = 1e6  # replaces infinite levels, because the search needs finite numbers
+_FAR: Final = 1e6  # replaces levels of minus infinity, because the search needs finite numbers
 _UNHELD: Final = 1e3  # reduction of the levels at infeasible poses
 
 
@@ -34,7 +34,7 @@ class Nearest(Result):
         level: Level of the pose: < 0, or >= 0 if a region smaller than a grid cell was found.
         margin: Margin of the loads at the pose [N].
         criterion: Index of the most violated criterion.
-        cables: Indices of the cables that violate it.
+        cables: Indices of the cables that make the pose infeasible.
         reason: Reason as a sentence.
     """
 

@@ -295,7 +295,8 @@ def prove(
         wrenches: Set of loads, all of which must be balanced; None for the weight alone.
         budget: Time after which no further cells are examined [s], > 0.
         model: Cable model.
-        smallest: Smallest edge of a cell that is halved [m]; None for no limit except the budget.
+        smallest: Cells are not halved if their longest edge would become shorter than this [m]; None for no limit
+            except the budget.
         progress: Called after every few thousand cells with the number of finished cells and the number of known cells.
 
     Returns:

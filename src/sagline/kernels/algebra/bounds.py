@@ -20,7 +20,7 @@ TOLERANCE = 1e-12  # relative to the largest bound: a side violated by less than
 @formula
 def largest_bound(bounds: Array) -> float:
     """Largest finite bound, to which tolerances are relative."""
-    start = low = high = 0.0  # three independent sums, which the processor computes in parallel
+    start = low = high = 0.0  # three independent maxima, which the processor computes in parallel
     for i in range(bounds.shape[1]):
         start = max(start, abs(bounds[START, i]))
         low = max(low, abs(bounds[LOW, i]) if abs(bounds[LOW, i]) < math.inf else 0.0)

@@ -94,8 +94,8 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
     """Smallest and largest eigenvalue of a symmetric matrix (n, n), which is overwritten; other arrays are work arrays.
 
-    The largest is computed only if the smallest is below flat times it; else an upper bound, at most three times as
-    large, is returned, which takes less time.
+    The largest is computed only if the absolute smallest is at most flat times its upper bound; else an upper bound, at
+    most three times as large, is returned, which takes less time.
     """
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)

@@ -21,7 +21,7 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 EXCHANGES = 2000
-DEPENDENT = 1e-10  # a side with a smaller part than this outside the span of others depends on them
+DEPENDENT = 1e-10  # a side with a smaller share of itself than this outside the span of others depends on them
 
 # rows of the pushes
 PUSH, SHARE = 0, 1  # multipliers of the active sides; components of the entering side

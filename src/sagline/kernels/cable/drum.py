@@ -45,7 +45,7 @@ def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]
 
 @formula
 def _wound_length(drum: Array, layer: int, turns: float) -> float:
-    """Length wound by the first turns of a layer [m]; convex and increasing in the turns."""
+    """Decrease of the length off the drum by the first turns of a layer [m]; convex and increasing in the turns."""
     first, _ = _exit_position(drum, layer, 0.0)
     place, _ = _exit_position(drum, layer, turns)
     distance = drum[DISTANCE]

@@ -19,7 +19,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
-LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch sag forces on
+LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
 EXITS = 4  # passes over pulleys: for X up to 1 the sag force is then known to 1e-9 of the tension
 SHRINKINGS = 30

@@ -133,7 +133,7 @@ def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
 
 @formula
 def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
-    """Change of the frame-end tension due to a motion of the platform end at fixed height: K^T times the shares."""
+    """Change of the frame-end tension by a motion of the platform end, except for its height: K^T times the shares."""
     x, y, z = shares[i, 0], shares[i, 1], shares[i, 2]
     return (
         ends[i, 0] * x + ends[i, 3] * y + ends[i, 6] * z,

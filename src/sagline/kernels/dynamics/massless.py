@@ -253,7 +253,7 @@ def fill_damping(run: MasslessRun) -> None:
 
 @glue
 def add_powers(drives: Drives, time: float) -> None:
-    """Add the work of the powers during a time to the audit; the damping of cables acts on ideal winches."""
+    """Add the work of the powers during a time to the audit; cable damping acts on ideal and second-order winches."""
     power = drives.audit[d.GIVEN_POWER]
     if drives.kind != d.DRUMS:
         for i in range(drives.now.shape[1]):

@@ -237,7 +237,7 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Halve a step until it reaches the required decrease; False if no step does.
+    """Halve a step until it reaches the required decrease; False if nothing is gained or the last step is worse.
 
     What hard rows leave counts by more than their multipliers, so that a step that pays for it elsewhere is none.
     """
