@@ -10,7 +10,7 @@ ROUNDING = 1e-12  # relative to the size of the operands: a smaller difference i
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 POWERS = {prefix: power for power, prefix in PREFIXES.items()}
 HIGHEST = {"m": 3, "g": 3, "s": 0, "rad": 0}  # power of ten of the largest usual prefix; other units use all prefixes
-LONGEST_PLAIN = 1e7  # a larger number without a prefix is written with a power of ten
+LONGEST_PLAIN = 1e7  # from this value on, a number without a prefix is written with a power of ten
 SPACE = "\N{NO-BREAK SPACE}"
 TIGHT = ("", "°")  # units written without a space before them
 

@@ -42,7 +42,7 @@ from sagline.statics.tables import pose_rows
 
 _TILTS = (25.0, 60.0)  # degrees, tried if the level start fails
 _DEPTH = 0.1  # relative to the mean length
-_LIMIT_SLACK = 0.01  # a measured tension may exceed its limit by this share
+_LIMIT_SLACK = 0.01  # a measured tension may be outside its limits by this share
 _POOR = np.array([0, 1, 2, 3, 4, 5, 6, 0])  # rank of each status; a fitted sample has the rank of a solved one
 
 

@@ -73,7 +73,7 @@ class ForwardSolution(Result):
 
     @property
     def stable(self) -> Flags:
-        """True if each sample is a stable equilibrium, with any constraint by the cables, shape () or (N,)."""
+        """True if each sample is a stable equilibrium, fully constrained by the cables or not, shape () or (N,)."""
         return np.isin(self.status, STABLE)
 
     @property

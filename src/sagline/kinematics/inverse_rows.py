@@ -114,7 +114,7 @@ class Verdicts(NamedTuple):
 
     @property
     def shortfall(self) -> Array:
-        """Smallest change of the force known to be sufficient [N], (N,); infinite only if none is proved to exist."""
+        """Smallest change of the force known to be sufficient [N], (N,); infinite only if provably none exists."""
         proved, enough = self.brackets[:, PROVED], self.brackets[:, ENOUGH]
         return np.where(np.isinf(enough) & np.isfinite(proved), np.nan, enough)
 

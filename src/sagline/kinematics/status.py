@@ -88,5 +88,5 @@ class ForwardStatus(Status):
     )
 
 
-# Equilibria in which the platform remains without other forces.
+# Stable equilibria: the platform does not leave them by itself.
 STABLE = (ForwardStatus.SOLVED, ForwardStatus.LOOSE, ForwardStatus.OVERSTRETCHED)

@@ -87,7 +87,7 @@ class Drums:
         return self.lengths(turns)
 
     def zero_and_rate(self) -> tuple[Array, Array]:
-        """Turns on the drums at zero counts, and counts per turn of cable paid out.
+        """Turns on the drums at count_zero (length_zero off the drum), and counts per turn of cable paid out.
 
         Returns both of shape (m,).
         """

@@ -178,7 +178,7 @@ class Robot(Shown):
         return evolve(self, **changes)._kept(self) if "calibration" not in changes else evolve(self, **changes)
 
     def _kept(self, before: Robot) -> Robot:
-        """This robot with standard errors only for the values that the calibration identified."""
+        """This robot with standard errors only for the values that are unchanged since the calibration."""
         if self.calibration is None:
             return self
         errors = self.calibration.standard_error

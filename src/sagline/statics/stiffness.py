@@ -32,7 +32,7 @@ class Stiffness(Result):
     Attributes:
         state: The equilibrium of the calculation.
         matrix: -d(wrench of the cables)/d(motion) at fixed lengths: elastic, sag and geometric stiffness, shape
-            Symmetric except for half the given moment, whose direction does not rotate with the platform.
+            (..., 6, 6). Symmetric except for half the given moment, whose direction does not rotate with the platform.
         compliance: d(motion)/d(wrench on the platform), shape (..., 6, 6).
         length_sensitivity: d(motion)/dL of each cable, shape (..., 6, m) [m/m, rad/m].
         density_sensitivity: d(motion)/d(linear density) of each cable, shape (..., 6, m) [m^2/kg, rad m/kg].
@@ -147,7 +147,7 @@ def stiffness(state: Equilibrium) -> Stiffness:
 
 
 def _by_frame_anchor(slopes: CableSlopes, compliance: Array) -> Array:
-    """Frame anchor sensitivity: moving a frame end by da acts like moving the platform end by -da."""
+    """Frame anchor sensitivity: moving a frame end by da acts like moving the platform end by -da, (..., 6, m, 3)."""
     columns = [compliance @ on_platform(slopes.blocks[..., k], slopes.levers) for k in range(3)]
     return np.stack(columns, axis=-1)
 

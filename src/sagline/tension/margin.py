@@ -52,7 +52,7 @@ def cable_margins(state: Equilibrium) -> Array:
 
 
 def capacity_margin(state: Equilibrium) -> Array:
-    """Largest additional force, in any direction, that tensions within the limits can balance at each pose.
+    """Largest additional force that tensions within the limits can balance at each pose, whatever its direction.
 
     The moment remains unchanged. Exact for weightless cables; for sagging cables, the sag forces of the state are kept.
     The computing time grows with the binomial coefficient of m over n - 1: 56 faces for eight cables, about twenty

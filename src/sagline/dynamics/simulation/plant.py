@@ -26,7 +26,7 @@ from sagline.statics.tables import cable_table
 
 MARGIN: Final = 5.0  # m of cable beyond the required length for which a drum stores the strain
 BROKEN: Final = 1e-12  # share of the stiffness and weight of a cable that remains after it is cut
-NOTES: Final = 1000  # largest number of spontaneous events between two scheduled events
+NOTES: Final = 1000  # number of recorded spontaneous events above which a run pauses to store them
 
 
 class Records:
@@ -37,8 +37,8 @@ class Records:
         tensions: Tensions at the frame ends [N], (N, m).
         lengths: Unstrained lengths [m], (N, m).
         energies: Kinetic, potential, supplied and lost energy [J], (N, 4).
-        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS); a run pauses after NOTES
-            events.
+        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS); a run pauses with
+            more than NOTES events.
         points: Points of cables with mass [m], (N, m, points, 3); None without cable mass.
     """
 

@@ -211,7 +211,7 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
 
 def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
     """Stretch loss to first order: K(omega) = K + i omega eta K S K, with S the stretch part."""
-    # Wrenches due to platform velocity (6, 6) and length rates (6, m); frame-end tensions due to platform velocity (m,
+    # Wrenches against platform velocity (6, 6) and length rates (6, m); frame-end tensions due to platform velocity (m,
     # 6) and to the rate of the cable's own length (m,)
     m = state.one_robot.cable_count
     if not loss_time:

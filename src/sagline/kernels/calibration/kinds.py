@@ -7,7 +7,7 @@ from __future__ import annotations
 
 FRAME = 0  # frame anchor, world axes, three rows [m]
 PLATFORM = 3  # platform anchor, platform frame, three rows [m]
-ZERO = 6  # length off the drum at zero counts, or a constant offset of the lengths [m]
+ZERO = 6  # length off the drum at count_zero (length_zero), or a constant offset of the lengths [m]
 DRUM = 7  # drum radius [m]
 DENSITY = 8  # [kg/m]
 STIFFNESS = 9  # [N]
