@@ -168,9 +168,9 @@ def test_the_numbers_are_in_the_json_file(report: ArticleReport) -> None:
 def test_the_documentation_tells_the_same_volumes(report: ArticleReport) -> None:
     page = " ".join((Path(__file__).parents[2] / "docs" / "article.md").read_text(encoding="utf-8").split())
     suspended, mixed = report.numbers["workspace"]["volume"].values()
-    told = f"reaches {suspended['volume_m3']:.1f} m³ of its frame and the mixed one {mixed['volume_m3']:.1f} m³, "
-    change = f"{suspended['change_percent']:+.2f} % and −{-mixed['change_percent']:.2f} % against straight cables"
-    assert told + change in page
+    volumes = f"{suspended['volume_m3']:.1f} m³ and that of the mixed robot {mixed['volume_m3']:.1f} m³: "
+    change = f"{suspended['change_percent']:+.2f} % and −{-mixed['change_percent']:.2f} % relative to straight cables"
+    assert volumes + change in page
 
 
 NUMBER = re.compile(r"(?<![\w.])([-−]?\d[\d,]*(?:\.\d+)?)(?:\u00a0([fpnµmkMG](?=[mNgs](?![\w²]))))?")

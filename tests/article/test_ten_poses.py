@@ -239,7 +239,7 @@ def test_the_documentation_tells_the_same_numbers(study: TenPoses) -> None:
     text = (Path(__file__).parents[2] / "docs" / "article.md").read_text(encoding="utf-8")
     flowing = " ".join(text.split())
     rows = [
-        line.split("|")[1:-1] for line in text.splitlines() if line.startswith(("| anchor height", "| zero of the l"))
+        line.split("|")[1:-1] for line in text.splitlines() if line.startswith(("| anchor height", "| length zero"))
     ]
     told = [study.best(1), study.best(2), study.explanations[1][1], study.best(3)]
     for (_, *cells), found in zip(rows, told, strict=True):

@@ -56,9 +56,11 @@ def flat(value: Any, type_: Type) -> list[Any]:
 
 
 def copied(value: Any) -> Any:
-    """A copy of an argument, with arrays that may be written."""
+    """A copy of an argument; arrays that are read-only stay so, because numba compiles an entry for these flags."""
     if isinstance(value, np.ndarray):
-        return value.copy()
+        same = value.copy()
+        same.flags.writeable = value.flags.writeable
+        return same
     return tuple(copied(each) for each in value) if isinstance(value, tuple) else value
 
 
