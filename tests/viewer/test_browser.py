@@ -321,7 +321,7 @@ def test_a_cable_is_cut_and_the_break_is_played(browser: Browser) -> None:
     with opened(browser, sl.load_robot("article-suspended")) as (page, viewer):
         page.get_by_text("Cut a cable").click()
         page.get_by_role("button", name="Cut", exact=True).click()
-        page.get_by_text("Simulated", exact=True).wait_for()
+        page.get_by_role("heading", name="Simulated").wait_for()
         page.get_by_text("break of cable 0 at 0.000 s").wait_for()
         assert viewer.player.played is not None
         await_that(page, lambda: viewer.player.clock.time == viewer.player.played.duration)  # type: ignore[union-attr]
