@@ -6,22 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import sagline as sl
-
-MODELS = (sl.Catenary(), sl.Elastic(), sl.Straight(), sl.Parabolic(), sl.Empirical())
-METHODS = (
-    sl.Closest(),
-    sl.MinimumNorm(),
-    sl.QuadraticProgram(),
-    sl.ClosedForm(),
-    sl.ImprovedClosedForm(),
-    sl.Puncture(),
-    sl.LowestSum(),
-    sl.LowestMaximum(),
-    sl.PNorm(),
-    sl.Centroid(),
-    sl.AnalyticCenter(),
-    sl.PolygonWalk(),
-)
+from tests.record.poses import METHODS, MODELS
 
 
 def poses_of(robot: sl.Robot, count: int, seed: int) -> sl.Pose:
