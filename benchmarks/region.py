@@ -50,7 +50,7 @@ def shown(robot: sl.Robot) -> Iterator[Shown]:
     thread.start()
     fields = {each.label: each for each in server.gui._gui_input_handle_from_uuid.values()}
     with Client(server.get_port()) as client:
-        await_that(viewer.shown.is_set)
+        await_that(lambda: viewer.view is not None)
         client.set(_name(fields["Region"]), True)
         heard_until(client, "m³")
         yield Shown(viewer, client, _name(fields["Platform + load [kg]"]))

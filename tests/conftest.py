@@ -1,4 +1,4 @@
-"""Rules for all tests: kernels are compiled once before the workers start, and the first tier stays fast.
+"""Rules for all tests: the first tier stays fast.
 
 See `tests.tiers` for the two tiers.
 """
@@ -10,7 +10,6 @@ import random
 import re
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -21,20 +20,9 @@ from hypothesis import settings, strategies
 from numba.core import event
 from typer.main import get_command
 
-from sagline.cli import entries
-from sagline.cli.compilation import compile_all, not_compiled
-from sagline.cli.entries import ENTRIES
 from tests.effort import slowness
 from tests.tiers import FILE_LIMIT, TEST_LIMIT
 
-# Compiled versions that only tests of the second tier use: they double the time that the others take to compile.
-SECOND_TIER_ENTRIES: Final = (
-    entries.CHAINS,
-    entries.PROOFS,
-    entries.READINGS_OVER_PULLEYS,
-    entries.SIMULATION_OVER_PULLEYS,
-    entries.VIBRATION_OVER_PULLEYS,
-)
 ALL_EXTENDED: Final = re.compile(r"^pytestmark = (extended|\[extended\b)", re.MULTILINE)
 EXAMPLES: Final = 40  # of a property, in the first tier
 CPU: Final = "cpu"  # property of a report: processor time of the test [s], compilation excluded
@@ -50,36 +38,6 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile("first tier", max_examples=EXAMPLES)
     if first_tier_alone(config):
         settings.load_profile("first tier")
-
-
-def needed_entries(config: pytest.Config) -> list[str]:
-    """Names of the kernel entries that the selected tiers use."""
-    return [name for name in ENTRIES if not (first_tier_alone(config) and name in SECOND_TIER_ENTRIES)]
-
-
-@pytest.hookimpl(optionalhook=True)
-def pytest_xdist_setupnodes(config: pytest.Config, specs: Any) -> None:
-    """Compile kernels before the workers start; a kernel that does not compile is left to the tests."""
-    names = needed_entries(config)
-    if waiting := not_compiled(names):
-        config.get_terminal_writer().line(f"compiling {', '.join(waiting)} ...")
-    with suppress(Exception):
-        compile_all(waiting, lambda stage: None)
-        for name in names:  # loads it, or compiles it again if the file on disk is stale
-            ENTRIES[name].compile()
-
-
-@pytest.fixture(scope="session", autouse=True)
-def no_entry_is_compiled_by_a_test(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Fail if a test compiled an entry for argument types that `ENTRIES` does not list.
-
-    The usual reason is an argument that is not read-only. A user would wait for the same compilation twice. In the
-    first tier the reason may be an entry that belongs to the second.
-    """
-    yield
-    if hasattr(request.config, "workerinput"):
-        functions: list[Any] = [entry.function for entry in ENTRIES.values()]
-        assert {each.__qualname__: list(each.stats.cache_misses) for each in functions if each.stats.cache_misses} == {}
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -71,7 +71,9 @@ def press(count: int, seed: int) -> None:
     thread = threading.Thread(target=viewer.serve)
     thread.start()
     try:
-        assert viewer.shown.wait(PATIENCE)
+        while viewer.view is None:
+            assert thread.is_alive()
+            time.sleep(0.01)
         handles = server.gui._gui_input_handle_from_uuid.items()
         usual = {uuid: each.value for uuid, each in handles if not isinstance(each, viser.GuiButtonHandle)}
         for _ in range(0, count, BATCH):

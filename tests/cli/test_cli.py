@@ -13,13 +13,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba.core import event
 from typer.testing import CliRunner
 
 import sagline as sl
 from sagline.cli.ending import exit_code_of
 from sagline.cli.main import app
-from sagline.kernels.inverse.poses import inverse_poses
 from tests.cli import interrupts
 from tests.tiers import extended, wide
 
@@ -242,20 +240,6 @@ def test_a_lost_interrupt_ends_the_command_all_the_same(capsys: pytest.CaptureFi
     assert code == 130
     err = capsys.readouterr().err
     assert (err.partition(" ")[0], err.count("\n")) == ("Interrupted.", 1)
-
-
-def test_a_cold_start_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    def compile_all(names: list[str], tell: object) -> None:
-        assert list(names) == ["inverse kinematics", "forward kinematics"]
-        with event.trigger_event("numba:compile", data={"dispatcher": inverse_poses, "args": ("int64", "none")}):
-            pass
-
-    sagline("track", "article-suspended", "inside.yaml", "--no-figures")  # whatever it needs is compiled then
-    monkeypatch.setattr("sagline.cli.progress.compile_all", compile_all)
-    result = sagline("track", "article-suspended", "inside.yaml", "--no-figures", "--json")
-    assert "inverse kinematics" in result.stderr
-    assert result.stderr.count("\n") == 1
-    assert json.loads(result.stdout)["runs"][0]["poses"] == 101
 
 
 def test_completion_offers_presets_and_files() -> None:

@@ -87,7 +87,6 @@ def test_the_viewer_takes_them_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr("sagline.viewer.server.start_server", lambda *_: SimpleNamespace(stop=int, get_port=lambda: 1))
     monkeypatch.setattr("sagline.viewer.page.Page", Page)
-    monkeypatch.setattr("sagline.cli.hosting.not_compiled", lambda names: [])
     assert sagline("view", "article-suspended", "--no-browser", *LOADS).exit_code == 0
     (robot, wrench) = taken[0]
     assert robot.mass == 55.0

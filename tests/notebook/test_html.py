@@ -232,17 +232,3 @@ def test_without_matplotlib_there_is_the_verdict_alone(before: str, said: str) -
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == said
     assert done.stderr == ""
-
-
-@pytest.mark.soak
-def test_a_robot_is_shown_before_anything_is_compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """With straight cables, in seconds, though planning will have to compile first."""
-    folder = tmp_path_factory.mktemp("cold")
-    code = (
-        f"import os, time; os.environ['NUMBA_CACHE_DIR'] = os.environ['XDG_CACHE_HOME'] = {str(folder)!r}\n"
-        "import sagline as sl, matplotlib.figure\n"
-        "text = sl.load_robot('article-suspended')._repr_html_()\n"
-        "print('<svg' in text, 'held' in text, time.process_time() < 30.0)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["True", "False", "True"]

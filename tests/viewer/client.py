@@ -15,7 +15,7 @@ import zstandard
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-PATIENCE = 300.0  # s: far more than anything takes, kernels that are compiled first on a busy machine included
+PATIENCE = 300.0  # s: far more than anything takes, on a busy machine too
 LEAVING = 0.5  # s to hear farewell: behind all that was not read it never comes
 _MARKS = count(1)
 

@@ -226,9 +226,9 @@ def test_marks_are_where_their_ways_are() -> None:
     field, found = dot_field_of(snapshot), MethodMarks()
     assert field is not None
     assert snapshot.plan is not None
-    marks = found.at(snapshot.plan, further=True)
+    marks = found.at(snapshot.plan)
     assert [mark.name for mark in marks] == list(METHODS)
-    assert found.at(snapshot.plan, further=True) is marks
+    assert found.at(snapshot.plan) is marks
     html = polygon_figure(snapshot, marks, field)
     places = grouped(marks, field)
     assert sorted(mark.name for _, group in places for mark in group) == sorted(
@@ -239,7 +239,6 @@ def test_marks_are_where_their_ways_are() -> None:
         where = field.polygon.basis @ (plan.chord_tension - field.polygon.origin)
         assert [x, y] == pytest.approx(field.place(where), abs=1e-6)
         assert f'data-value="{group[0].name}"' in unescape(html)
-    assert {mark.name for mark in found.at(snapshot.plan, further=False)} < set(METHODS)
 
 
 def changed(name: str) -> sl.Robot:
@@ -268,17 +267,15 @@ def test_marks_of_a_robot_that_is_moved_are_those_of_one_that_is_not(
         pose = sl.Pose.from_euler(home.position + away, 0.02 * k, -0.03, 0.05)
         plan = sl.inverse(robot, pose, wrench=load)
         calls.clear()
-        marks = moved.at(plan, further=True)
+        marks = moved.at(plan)
         assert len(calls) == (0 if k and name != "guides" else len(METHODS))
-        for mark, expected in zip(marks, MethodMarks().at(plan, further=True), strict=True):
+        for mark, expected in zip(marks, MethodMarks().at(plan), strict=True):
             assert (mark.name, mark.letter, mark.missing) == (expected.name, expected.letter, expected.missing)
             np.testing.assert_array_equal(mark.tension, expected.tension)
     other = sl.inverse(changed(name), home)
     calls.clear()
-    moved.at(other, further=True)
+    moved.at(other)
     assert len(calls) == len(METHODS)
-    moved.at(sl.inverse(other.state.one_robot, pose), further=True, verdicts=False)
-    assert len(calls) == 2 * len(METHODS)
 
 
 def test_what_a_way_misses_is_told() -> None:
@@ -287,7 +284,7 @@ def test_what_a_way_misses_is_told() -> None:
     snapshot = snapshot_at(robot, pose, Settings(mass=50.0), None)
     assert snapshot.plan is not None
     assert not sl.inverse(robot, pose, tension=sl.ClosedForm()).feasible
-    marks = MethodMarks().at(snapshot.plan, further=True)
+    marks = MethodMarks().at(snapshot.plan)
     missing = {mark.name: mark.missing for mark in marks if mark.missing}
     assert "ClosedForm" in missing
     html = polygon_figure(snapshot, marks, dot_field_of(snapshot))

@@ -1,6 +1,7 @@
 """What is missing where the platform cannot be held, by linear programs; and the nearest pose, by trying many."""
 
 import re
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,7 +13,6 @@ from scipy.optimize import linprog
 
 import sagline as sl
 from sagline.core.arrays import locked
-from sagline.viewer.feature import Computation
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.missing import explanation, missing_label
 from sagline.viewer.missing import NearestFeasible, missing_of, nearest_feasible
@@ -22,7 +22,7 @@ from sagline.viewer.snapshot import Settings, Snapshot, snapshot_at
 from sagline.viewer.tension_scale import force_unit
 from tests.effort import best_rate
 from tests.tiers import extended, wide
-from tests.viewer.client import Client, await_that
+from tests.viewer.client import PATIENCE, Client, await_that
 from tests.viewer.planar import PLANAR
 from tests.viewer.platform_forces import unbalanced
 from tests.viewer.shown import Shown, shown, updates_a_second
@@ -198,14 +198,19 @@ def test_other_reasons_are_explained_too() -> None:
         assert "Unconstrained motion" in explanation(singular, None, None, searching=True)
 
 
-def test_nobody_says_that_there_is_nowhere_to_go_before_it_was_looked_for() -> None:
+def test_the_text_says_that_a_search_is_running_until_its_result_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = threading.Event()
+    monkeypatch.setattr("sagline.viewer.features.missing.nearest_feasible", lambda *_: ended.wait(PATIENCE) and None)
+
     def made(server: PageServer) -> Page:
-        pose, later = sl.Pose(OUTSIDE["cogiro"][0], np.eye(3)), Computation.WORKSPACE
-        return Page(server, FEATURES, sl.load_robot("cogiro"), pose=pose, ready=lambda reading: reading is not later)
+        pose = sl.Pose(OUTSIDE["cogiro"][0], np.eye(3))
+        return Page(server, FEATURES, sl.load_robot("cogiro"), pose=pose)
 
     with contextmanager(shown)(made) as page:
         assert "searching" in page.text
         assert "none within" not in page.text
+        ended.set()
+        await_that(lambda: "none within" in page.text)
 
 
 @pytest.fixture(scope="module")

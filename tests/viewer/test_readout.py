@@ -122,11 +122,6 @@ def test_colors_of_cables_are_those_of_nothing_else() -> None:
     assert np.linalg.norm(lines[:, None] - lines, axis=2)[~np.eye(len(lines), dtype=bool)].min() > 40.0
 
 
-def test_until_the_first_numbers_the_page_says_what_it_waits_for() -> None:
-    assert "Getting ready" in readout.waiting()
-    assert "compiles" in readout.waiting()
-
-
 def test_robots_with_pulleys_show_wraps_and_all_cable_off_the_drum() -> None:
     robot = ROBOT.replace(winches=sl.Winch(pulley_radius=[0.0] + [0.2] * 7, dead_cable=4.0, dead_rise=1.0))
     pose = sl.Pose([1.0, 0.5, 2.0], np.eye(3))

@@ -11,11 +11,9 @@ import pytest
 
 import sagline as sl
 from sagline import SaglineError
-from sagline.viewer.feature import Computation
 from sagline.viewer.features import FEATURES
 from sagline.viewer.features.region import RegionFeature, planes_of
 from sagline.viewer.page import Page
-from sagline.viewer.server import PageServer
 from sagline.viewer.tension_scale import cable_color
 from sagline.viewer.workspace import Hull, WorkspaceQuery, region_hull
 from tests.effort import best_rate
@@ -270,15 +268,3 @@ def test_loads_that_are_none_are_refused_in_words(page: Shown, client: Client, l
 def test_a_planar_robot_is_sliced_in_its_plane() -> None:
     assert planes_of(ROBOT) == (2, 1, 0)
     assert planes_of(planar((0.0, 1.0, 0.0))) == (1,)
-
-
-def test_what_is_still_compiled_is_said() -> None:
-    def made(server: PageServer) -> Page:
-        return Page(server, FEATURES, ROBOT, ready=lambda reading: reading is not Computation.WORKSPACE)
-
-    with contextmanager(shown)(made) as page:
-        assert "Compiling" not in page.text
-        handle(page, "Slice").value = True
-        page.viewer.refresh()
-        await_that(lambda: "Compiling" in page.text)
-        assert page.node("/slice/picture") is None

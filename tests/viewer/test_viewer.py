@@ -1,12 +1,9 @@
 """The viewer with clients that drag, set, leave and talk nonsense."""
 
-import re
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from html import unescape
-from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
@@ -14,7 +11,6 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 import sagline as sl
-from sagline.viewer.feature import Computation
 from sagline.viewer.features import FEATURES
 from sagline.viewer.page import Page
 from sagline.viewer.robot_scene import RobotScene
@@ -24,7 +20,7 @@ from tests.effort import best_rate
 from tests.refusal import refused
 from tests.tiers import extended, wide
 from tests.viewer.client import PATIENCE, Client, await_that, clients
-from tests.viewer.shown import PATH, ROBOT, Shown, a_run, handle, pieces_of, shown, tell, updates_a_second
+from tests.viewer.shown import PATH, ROBOT, Shown, a_run, handle, shown, tell, updates_a_second
 
 
 @pytest.fixture(scope="module")
@@ -252,59 +248,3 @@ def test_a_run_is_named_once_and_cannot_be_changed(film: Shown) -> None:
         client.drag([0.1, 0.8, 2.0])
         await_that(lambda: film.position[1] == 0.8 and bool(model.visible) and bool(mass.visible))
         await_that(lambda: f"</b> {model.value}" in unescape(film.text))
-
-
-def test_cables_verdict_and_table_come_before_what_is_not_ready(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refusing(kernel: Callable[..., Any]) -> Callable[..., Any]:
-        def refuse(*arguments: Any) -> Any:
-            if threading.current_thread() is thread:
-                raise AssertionError("asked before it is ready")
-            return kernel(*arguments)  # of a page that another test has left open
-
-        return refuse
-
-    ready: set[Computation] = set()
-    kernels = (
-        "sagline.tension.margin.margins_of_poses",
-        "sagline.statics.slopes.describe_states",
-        "sagline.kinematics.polygon.polygon_of_pose",
-        "sagline.kinematics.forward_rows.forward_poses",
-    )
-    server = start_server(port=0)
-    pieces = pieces_of(server)
-    viewer = Page(server, FEATURES, ROBOT, ready=ready.__contains__)
-    thread = threading.Thread(target=viewer.serve)
-    page = Shown(server, viewer, thread, pieces)
-
-    try:
-        with monkeypatch.context() as patched:
-            for kernel in kernels:
-                patched.setattr(kernel, refusing(resolve_name(kernel)))
-            thread.start()
-            assert viewer.shown.wait(PATIENCE)
-            assert "Feasible" in page.text
-            assert page.text.count("ompiling …") == 3
-            cells = re.compile(r"<td.*?>(?:<span.*?</span> )?([\d.]+)</td>")
-            assert 6 * ROBOT.cable_count in [len(cells.findall(piece.content)) for piece in pieces]
-            handle(page, "Cable model").value = "empirical (the article's)"
-            updates = viewer.updates
-            viewer.refresh()
-            await_that(lambda: viewer.updates > updates)
-            assert viewer.view is not None
-            assert viewer.view.snapshot.rest is None
-        for reading, text in (
-            (Computation.MARGIN, "in any direction"),
-            (Computation.FREQUENCIES, " Hz</span></div>"),
-            (Computation.POLYGON, 'class="polygon"'),
-            (Computation.REST, "Equilibrium"),
-        ):
-            assert text not in page.text
-            ready.add(reading)
-            viewer.refresh()
-            await_that(lambda text=text: text in page.text)  # type: ignore[misc]
-        assert "ompiling" not in page.text
-    finally:
-        viewer.stop()
-        if thread.ident is not None:
-            thread.join(timeout=PATIENCE)
-        stop_server(server)

@@ -6,7 +6,6 @@ from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
-from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.options import JsonOption, OutOption, argument
 from sagline.cli.terminal import counting, show_json, show_note
 from sagline.files.writing import check_files
@@ -37,8 +36,7 @@ def article(
     from sagline.article.report import NAMES, write_article
 
     check_files(folder, NAMES)
-    needed = () if parts else (INVERSE, FORWARD)  # single parts need neither, or one
-    with counting("redoing the article", *needed) as progress:
+    with counting("redoing the article") as progress:
         report = write_article(folder, parts or [], progress)
     if as_json:
         show_json(report.numbers)

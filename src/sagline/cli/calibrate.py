@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 from rich.text import Text
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import FORWARD, INVERSE, READINGS, STARTING_LENGTHS
 from sagline.cli.options import (
     JsonOption,
     ModelName,
@@ -128,7 +127,7 @@ def calibrate(
 
 def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, robust: bool, as_json: bool) -> int:
     """Calibrate, write and print the result; returns the exit code."""
-    from sagline.calibration import parameters, summary
+    from sagline.calibration import summary
     from sagline.calibration.calibrate import calibrate
     from sagline.calibration.findings import CalibrationStatus
     from sagline.files.robot_file import load_robot
@@ -140,9 +139,10 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
         raise FileError(log, "is no CSV file of readings", "Give the readings of encoders and load cells, winches.csv.")
     request.check_files((*ROBOTS, WHOLE))
     robot, readings = load_robot(request.robot), _log(log, request.deviations)
-    unknowns = parameters.checked_unknowns(request.unknowns)  # before anything is compiled
-    with working(f"{robot.name}: calibrating from {len(readings):,} rows", FORWARD, STARTING_LENGTHS, READINGS) as line:
-        found = calibrate(robot, readings, unknowns, model=model, robust=robust, folds=folds, progress=line.progress)
+    with working(f"{robot.name}: calibrating from {len(readings):,} rows") as line:
+        found = calibrate(
+            robot, readings, request.unknowns, model=model, robust=robust, folds=folds, progress=line.progress
+        )
         files = _written(found, request, line)
     if as_json:
         show_json({**_record(found), "files": files})
@@ -160,7 +160,7 @@ def _fit(request: _Request, log: Path | None, model: CableModel, folds: int, *, 
 
 def _plan_poses(request: _Request, count: int, seed: int, log: Path | None, *, as_json: bool) -> int:
     """Choose poses, write and print them; returns the exit code."""
-    from sagline.calibration import parameters, planning
+    from sagline.calibration import planning
     from sagline.calibration.log import Sensors
     from sagline.calibration.planning import calibration_poses
     from sagline.files.robot_file import load_robot
@@ -171,10 +171,9 @@ def _plan_poses(request: _Request, count: int, seed: int, log: Path | None, *, a
             raise InvalidValueError(item, f"given with --plan: {str(value)!r}", "one of the two", step)
     request.check_files(ROBOTS)
     robot = load_robot(request.robot)
-    unknowns = parameters.checked_unknowns(request.unknowns)  # before anything is compiled
-    with working(f"{robot.name}: choosing {count:,} poses", INVERSE, READINGS) as line:
+    with working(f"{robot.name}: choosing {count:,} poses") as line:
         sensors = Sensors(**request.deviations) if request.deviations else None
-        chosen = calibration_poses(robot, count, unknowns, sensors, seed=seed, progress=line.progress)
+        chosen = calibration_poses(robot, count, request.unknowns, sensors, seed=seed, progress=line.progress)
         for file in request.files:
             create_folder(file.parent)
             chosen.save(file)

@@ -7,7 +7,6 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from sagline.cli.entries import FORWARD, INVERSE
 from sagline.cli.options import ModbusOption, RobotArgument, flag, option
 from sagline.cli.terminal import working
 
@@ -44,7 +43,7 @@ def control(
 
     robot = load_robot(name)
     with ExitStack() as stack:
-        with working("preparing the controller", INVERSE, FORWARD):
+        with working("preparing the controller"):
             link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
             record = None
             if log is not None:

@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from sagline.cli.entries import INVERSE, SIGNED_MARGINS, VIBRATION
 from sagline.cli.options import JsonOption, RobotArgument, argument, figures_flag, option
 from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_note, show_text, working
 
 if TYPE_CHECKING:
     from sagline.optimization.front import Front
-    from sagline.optimization.goals import Goal
 
 FIGURE: Final = "front"
 MOST_ROWS: Final = 12  # rows of the printed table; front.csv has all
@@ -53,7 +51,7 @@ def design(
         request["evaluations"] = whole_of(evaluations, "--evaluations", 1, MOST_EVALUATIONS)
     output = Output(out, [FRONT], [FIGURE] * figures)
     rated = [0]
-    with working(f"{first.name}: evaluating robots", *_needed(request["goals"])) as line:
+    with working(f"{first.name}: evaluating robots") as line:
 
         def show_progress(done: int, total: int) -> None:
             rated[0] = done
@@ -76,17 +74,6 @@ def design(
         show_text(front.text)
 
     output.report(lambda: _record(front), tell, as_json=as_json)
-
-
-def _needed(goals: list[Goal]) -> tuple[str, ...]:
-    """Entries of the kernels that the goals need."""
-    from sagline.optimization.goals import AT_POSES
-
-    needs = {goal.needs for goal in goals}
-    found = [SIGNED_MARGINS] if "margin" in needs else []
-    found += [INVERSE] if needs & set(AT_POSES) else []
-    found += [VIBRATION] if "stiffness" in needs else []
-    return tuple(found)
 
 
 def _table(front: Front) -> TextTable:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import numpy as np
 
-from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
 from sagline.cli.options import JsonOption, OutOption, SeedOption, argument, flag, option
 from sagline.cli.output import TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
@@ -69,7 +68,7 @@ def experiment(
         raise InvalidValueError("--true", f"a robot of {real.cable_count} cables", f"{nominal.cable_count}", step)
     check_files(folder, NAMES)
     how = _how(None if true is None else real.name, waits)
-    with working("home, ten points, home", INVERSE, FORWARD, SIMULATION) as line:
+    with working("home, ten points, home") as line:
 
         def tell(share: float) -> None:
             line.progress(round(PARTS * share), PARTS)

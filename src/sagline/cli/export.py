@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from sagline.cli.entries import INVERSE
 from sagline.cli.options import RobotArgument, flag, option
 from sagline.cli.terminal import show_note, show_text, working
 
@@ -59,7 +58,7 @@ def export_scl(
     from sagline.files.robot_file import load_robot
 
     loaded = load_robot(robot)
-    with working("", INVERSE):
+    with working(""):
         path = export_scl(loaded, out)
     groups = len(groups_of(loaded.cable_count))
     show_text(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import FIT, FORWARD
 from sagline.cli.options import (
     JsonOption,
     ModelName,
@@ -65,8 +64,7 @@ def forward(
     lengths = _counted(file, robot) if counts else _measured(file, robot)
     table = f"{file_stem(robot.name, 'poses')}.csv"
     output = Output(folder, [table])
-    entry = FIT if model is ModelName.STRAIGHT else FORWARD
-    with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses", entry) as line:
+    with working(f"{robot.name}: finding {len(lengths.unstrained_length):,} poses") as line:
         first = solve(robot, lengths.unstrained_length[0], model=model.build(), wrench=wrench)
         start = first.pose if np.isfinite(first.pose.position).all() else None
         found = solve(robot, lengths.unstrained_length, start, model.build(), wrench, progress=line.progress)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import needed_for
 from sagline.cli.options import FileOption, argument, option
 from sagline.cli.output import csv_text
 from sagline.cli.terminal import show_data, show_note, working
@@ -79,7 +78,7 @@ def encoder(
     winches = plan.state.one_robot.winches
     if plan.path is None or winches is None or (winches.speed_limit is None and winches.torque_limit is None):
         return code
-    with working(f"{file.name}: speeds and torques of the winches", *needed_for(plan.tension)):
+    with working(f"{file.name}: speeds and torques of the winches"):
         rates = winch_rates(plan)
     for beyond, limit in ((rates.too_fast, "speed_limit"), (rates.too_strong, "torque_limit")):
         if beyond is not None and beyond.any():

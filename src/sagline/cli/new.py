@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from sagline.cli.entries import INVERSE
 from sagline.cli.options import argument, flag, option
 from sagline.cli.terminal import show_note, show_text, working
 from sagline.core.errors import FileError, InvalidValueError
@@ -75,7 +74,7 @@ def new(
     }  # fmt: skip
     _check_file(file, force=force)
     design, said = _answered(file.stem, answers)
-    with working(f"checking {GRID**3} poses of each of a few boxes", INVERSE):
+    with working(f"checking {GRID**3} poses of each of a few boxes"):
         robot, middle = _boxed(design)
     text = _header(said) + dump_robot(robot)
     made = parse_robot(text, file)

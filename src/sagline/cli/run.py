@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from sagline.cli.entries import FORWARD, INVERSE, SIGNED_MARGINS
 from sagline.cli.options import JsonOption, OutOption
 from sagline.cli.output import Output
 from sagline.cli.terminal import show_text, working
@@ -43,10 +42,10 @@ def run(folder: OutOption = Path("output"), as_json: JsonOption = False) -> int:
     plans = [f"{run_name(robot, model)}.nc" for robot in robots for model in models]
     output = Output(folder, [*plans, *(f"{name}.glb" for name in HULLS)], [*FIGURES, *HULLS])
     path, runs = article_path(), []
-    with working("planning and confirming the article's path", INVERSE, FORWARD) as line:
+    with working("planning and confirming the article's path") as line:
         for robot in robots:
             runs += [run_along(robot, path, model, tension, line) for model in models]
-    with working("workspaces of both robots", SIGNED_MARGINS) as line:
+    with working("workspaces of both robots") as line:
         spaces = [workspace(robot, cells=CELLS, progress=line.progress) for robot in robots]
     with working("writing runs, hulls and figures"):
         from sagline import plot

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.entries import INVERSE
 from sagline.cli.options import argument, option, robot_completions
 from sagline.cli.terminal import show_text, working
 from sagline.core.errors import FileError, InvalidValueError
@@ -58,7 +57,7 @@ def share(
     robot = found if isinstance(found, Robot) else found.robot
     stem = file_stem(robot.name) if source.suffix == "" else source.stem
     target = _free(Path(f"{stem}.html")) if out is None else check_file(out)
-    with working(f"{robot.name}: page", *[INVERSE] * isinstance(found, Robot)):
+    with working(f"{robot.name}: page"):
         text = robot_page(found) if isinstance(found, Robot) else course_page(found, source.stem)
         write_text(target, text)
     size = len(text.encode())

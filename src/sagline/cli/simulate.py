@@ -7,7 +7,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from sagline.cli.entries import CHAINS, SIMULATION, SIMULATION_OVER_PULLEYS, VIBRATION, needed_for
 from sagline.cli.options import (
     AirDampingOption,
     JsonOption,
@@ -109,7 +108,6 @@ def simulate(
     from sagline.files.path_file import load_path
     from sagline.files.writing import file_stem
     from sagline.present.summaries import cable_mass_text, summary_of
-    from sagline.robot.batch import has_routing
 
     robot = robot_with_payload(name, payload)
     events = tuple(_break(text, robot) for text in breaks or ())
@@ -125,11 +123,8 @@ def simulate(
     way = None if path is None else load_path(path)
     if path is not None and way is not None:
         check_unit(path, way, robot)
-    massless = SIMULATION_OVER_PULLEYS if has_routing(robot) else SIMULATION
-    moving = {_CableMass.NONE: (massless,), _CableMass.LUMPED: (CHAINS,)}.get(cable_mass, ())
     method = tension.build(TensionVariable.CHORD)
-    needed = (*needed_for(method), VIBRATION, *moving)
-    with working(f"{robot.name}: simulating", *needed) as line:
+    with working(f"{robot.name}: simulating") as line:
         start = _start(robot, way, method, shaper, cable_mass, wrench, line)
         end = after if way is None else _duration(start) + after
         line.stage(f"{robot.name}: simulating {end:g} s, {cable_mass_text(cable_mass.value)}")

@@ -7,7 +7,6 @@ from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import INVERSE, SHARING, VERDICTS
 from sagline.cli.options import JsonOption, argument, option
 from sagline.cli.output import TextTable, number_text, show_table
 from sagline.cli.terminal import show_json, show_note, show_text, working
@@ -16,7 +15,6 @@ from sagline.core.numbers import counted
 from sagline.files.writing import check_folder, create_folder
 
 if TYPE_CHECKING:
-    from sagline.sweep.request import Request
     from sagline.sweep.result import Sweep
 
 ENDS = {
@@ -74,7 +72,7 @@ def sweep(
     again = _again(file, folder, workers, scheduler)
     what = f"{len(request):,} requests"
     try:
-        with working(what, *_entries(request)) as line:
+        with working(what) as line:
             found = run(request, folder, count, scheduler=scheduler, progress=line.progress, tell=_tell)
     except KeyboardInterrupt:
         show_note("", f"To continue: {again}")
@@ -91,12 +89,6 @@ def sweep(
     if left:
         show_note(f"{left:,} of {len(request):,} requests: ", "without a verdict", style="bold red")
     return OUTSIDE if left else 0
-
-
-def _entries(request: Request) -> tuple[str, ...]:
-    from sagline.tension.method import takes_default_kernel
-
-    return (INVERSE, *[SHARING] * (not takes_default_kernel(request.tension)), VERDICTS)
 
 
 def _tell(text: str) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import INVERSE, MARGINS, POLYGON, SHARING
 from sagline.cli.options import (
     JsonOption,
     ModelName,
@@ -69,7 +68,7 @@ def tension(
     place = middle_pose(robot) if pose is None else pose
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
     output = Output(folder, (), [file_stem(robot.name, "tension")] * drawn)
-    with working(f"{robot.name}: tension distributions", INVERSE, SHARING, MARGINS, *[POLYGON] * drawn):
+    with working(f"{robot.name}: tension distributions"):
         least = inverse(
             robot, place, model.build(), MinimumNorm(variable.value), wrench
         )  # raises an error if no method applies

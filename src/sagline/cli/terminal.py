@@ -7,7 +7,7 @@ import json
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console, RenderableType
@@ -28,20 +28,17 @@ _wide = Console(highlight=False, markup=False, emoji=False, width=FREE)  # for f
 _err = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
-@contextmanager
-def working(what: str, *needed: str) -> Iterator[ProgressLine]:
-    """Show work and its progress on a terminal, after compiling entries of the kernels (`sagline.cli.entries`)."""
+def working(what: str) -> AbstractContextManager[ProgressLine]:
+    """Show work and its progress on a terminal while inside."""
     from sagline.cli.progress import progress_line
 
-    with progress_line(_err, what) as line:
-        line.compile(needed)
-        yield line
+    return progress_line(_err, what)
 
 
 @contextmanager
-def counting(what: str, *needed: str) -> Iterator[Callable[[int, int, str], None]]:
+def counting(what: str) -> Iterator[Callable[[int, int, str], None]]:
     """Show progress of named parts; yields a function of the number done, the total and the name of the next part."""
-    with working(what, *needed) as line:
+    with working(what) as line:
 
         def tell(done: int, total: int, name: str) -> None:
             line.name(f"{what}: {name}")

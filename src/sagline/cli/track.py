@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
-from sagline.cli.entries import FORWARD, needed_for
 from sagline.cli.lengths import plan_text
 from sagline.cli.options import (
     JsonOption,
@@ -84,7 +83,7 @@ def track(
     drawn = [f"{name}-{figure}" for figure in FIGURES if figures]
     output = Output(folder, [f"{name}.nc", *[f"{name}.csv"] * table], drawn)
     method = tension.build(variable)
-    with working(f"{machine.name}: planning and confirming {len(way):,} poses", *needed_for(method), FORWARD) as line:
+    with working(f"{machine.name}: planning and confirming {len(way):,} poses") as line:
         run = run_along(machine, way, cable, method, line, wrench)
     with working("writing"):
         run.plan.save(output.file(f"{name}.nc"))

@@ -9,7 +9,6 @@ from pathlib import Path
 from socket import gethostname
 from typing import TYPE_CHECKING, Annotated, Final
 
-from sagline.cli.entries import FORWARD, INVERSE, SIMULATION
 from sagline.cli.options import ModbusOption, RobotArgument, SeedOption, converted_option, option
 from sagline.cli.terminal import show_note, show_text, working
 
@@ -74,7 +73,7 @@ def twin(
     real = robot if true is None else load_robot(true)
     noise = whole_of(seed, "--seed", 0, MOST_SEED)
     with ExitStack() as stack:
-        with working("switching the machine on", INVERSE, FORWARD, SIMULATION):
+        with working("switching the machine on"):
             machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
             server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
         watch = TwinMonitor(machine)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import ANSWERS, INVERSE, MODES, VIBRATION
 from sagline.cli.options import (
     AirDampingOption,
     JsonOption,
@@ -120,7 +119,7 @@ def vibrate(
     reel = f"{file_stem(robot.name, f'mode-{film}')}.gif"
     output = Output(folder, [f"{table}.csv", *[reel] * (film is not None)], [drawing] * figures)
     place = middle_pose(robot) if pose is None else pose
-    with working(f"{robot.name}: modes up to {up_to:g} Hz", INVERSE, VIBRATION, MODES, *[ANSWERS] * figures) as line:
+    with working(f"{robot.name}: modes up to {up_to:g} Hz") as line:
         plan = inverse(robot, place, wrench=wrench)
         if not plan.feasible:
             show_note("No modes: ", PoseStatus(int(plan.status)).text, style="bold red")
@@ -245,7 +244,7 @@ def _vibrate_in_box(
     name = file_stem(robot.name, "vibration-map")
     output = Output(folder, [f"{name}.nc"], [f"{name}-{figure}" for figure in FIGURES if figures])
     what = f"{robot.name}: modes at {len(poses):,} poses"
-    with working(what, INVERSE, VIBRATION, MODES) as line:
+    with working(what) as line:
         found = frequency_map(robot, poses, up_to=limit, damping=damping, progress=line.progress)
         found.save(output.file(f"{name}.nc"))
         if figures:

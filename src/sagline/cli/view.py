@@ -10,7 +10,6 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from sagline.cli.entries import FORWARD
 from sagline.cli.options import (
     PayloadOption,
     PoseOption,
@@ -207,7 +206,7 @@ def played_in(robot: Robot, file: Path) -> Played:
     made_for = plan.state.one_robot
     _check_robot(file, "run", made_for, robot)
     count = len(plan.state.pose) if plan.state.pose.shape else 1
-    with working(f"{made_for.name}: confirming {count:,} poses", FORWARD) as line:
+    with working(f"{made_for.name}: confirming {count:,} poses") as line:
         return PlayedPlan.of(plan, line.progress)
 
 

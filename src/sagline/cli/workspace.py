@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from sagline.cli.ending import OUTSIDE
-from sagline.cli.entries import CLEARANCES, INVERSE, PROOFS, SIGNED_MARGINS, VIBRATION
 from sagline.cli.options import (
     JsonOption,
     ModelName,
@@ -171,7 +170,7 @@ def workspace(
     space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
     drawn = [file_stem(robot.name, what) for what in ("workspace", "slice") if figures]
     output = Output(folder, [space_file, hull], drawn)
-    with working(f"{robot.name}: workspace", *_entries(limits), *[PROOFS] * (to_prove is not None)) as line:
+    with working(f"{robot.name}: workspace") as line:
         space = workspace(
             robot,
             box,
@@ -202,14 +201,6 @@ def workspace(
         show_note("Empty workspace: ", space.nearest.reason, style="bold red")
     proved = proof is None or proof.verdict is ProofVerdict.PROVED_INSIDE
     return 0 if space.nearest is None and proved else OUTSIDE
-
-
-def _entries(limits: dict[str, float | None]) -> tuple[str, ...]:
-    """Entries of the kernels for these limits."""
-    names = {name for name, limit in limits.items() if limit is not None}
-    vibrates, near = bool(names & {"min_stiffness", "min_frequency"}), "clearance" in names
-    tensions = vibrates or near or "max_sag" in names
-    return (SIGNED_MARGINS, *[INVERSE] * tensions, *[VIBRATION] * vibrates, *[CLEARANCES] * near)
 
 
 def _tell(space: Workspace, proof: Proof | None) -> None:

@@ -8,7 +8,6 @@ import threading
 import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from enum import Enum
 from typing import Final, TypeVar
 
 from sagline.core.arrays import Array
@@ -17,20 +16,6 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer.player import Configuration, Played
 from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import TensionScale
-
-
-class Computation(Enum):
-    """Computations whose kernels may not be compiled yet when the cables are first drawn."""
-
-    MARGIN = "capacity margin"
-    POLYGON = "polygon of feasible tensions"
-    SHARING = "tensions of the other tension distribution methods"
-    FREQUENCIES = "natural frequencies"
-    REST = "pose of equilibrium if the model is approximate"
-    MODES = "modes with cable mass"
-    SIMULATION = "simulation of a cut cable"
-    WORKSPACE = "margins over a wrench set"
-    VERDICTS = "feasibility of a pose"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,7 +24,7 @@ from sagline.robot.robot import Robot
 from sagline.statics.stiffness import modes
 from sagline.viewer import readout, shapes
 from sagline.viewer.camera import Framing
-from sagline.viewer.feature import Computation, Feature, View
+from sagline.viewer.feature import Feature, View
 from sagline.viewer.panel import ControlPanel
 from sagline.viewer.player import Beside, Configuration, InMotion, Played, Player
 from sagline.viewer.robot_scene import TRACE_POINTS, RobotScene
@@ -62,12 +62,11 @@ class Source(NamedTuple):
 class Page:
     """Page of a robot, optionally with a run or simulation; the caller starts and stops the server.
 
-    Its state is used in the thread of `serve`; other threads call only `later`, `refresh`, `wait`, `extend` and `stop`.
+    Its state is used in the thread of `serve`; other threads call only `later`, `refresh`, `extend` and `stop`.
 
     Attributes:
         server: A running server with nothing on it.
         robot: The robot; that of what is played, if anything is.
-        ready: Function that returns whether a computation is compiled; call `refresh` when one has become ready.
         channel: Messages to and from browsers.
         panel: Controls and displayed values; a feature adds a tab to `panel.readings`.
         scene: The robot in the scene.
@@ -84,7 +83,6 @@ class Page:
         view: The view that is shown; None at first, and the one before while features follow.
         features: All features, in the order in which they follow.
         updates: Number of views that were shown.
-        shown: Event that is set when the first view is shown.
     """
 
     def __init__(
@@ -93,7 +91,6 @@ class Page:
         features: Sequence[Callable[[Page], Feature | None]],
         robot: Robot,
         played: Played | None = None,
-        ready: Callable[[Computation], bool] = lambda _: True,
         wrench: Array | None = None,
         pose: Pose | None = None,
         mode: str = "",
@@ -102,7 +99,7 @@ class Page:
         beside: Beside | None = None,
     ) -> None:
         """Build the page; `beside` is a second run of the robot with the same clock. Other arguments: see above."""
-        self.server, self.robot, self.ready, self.wrench = server, robot, ready, wrench
+        self.server, self.robot, self.wrench = server, robot, wrench
         self.mode, self.found, self.source = mode, found, source or Source()
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._tasks: deque[Callable[[], None]] = deque()  # appended to by any thread
@@ -117,7 +114,7 @@ class Page:
         self.extent = self.scene.extent(self.home)
         self.framing = Framing(server, *self.extent)
         self.view: View | None = None
-        self.updates, self.shown = 0, threading.Event()
+        self.updates = 0
         self.features: tuple[Feature, ...] = ()
         self.player = Player(played, self._put_on, beside)
         self.features = tuple(feature for make in features if (feature := make(self)) is not None)
@@ -155,10 +152,6 @@ class Page:
     def refresh(self) -> None:
         """Show everything again; from any thread."""
         self._wake.set()
-
-    def wait(self, reason: str) -> None:
-        """Write the reason why values are not available yet; from any thread."""
-        self.panel.wait(reason)
 
     def extend(self, played: Played) -> None:
         """Replace what is played by a longer version of it; from any thread.
@@ -259,8 +252,8 @@ class Page:
     def _from_gizmo(self, settings: Settings) -> Snapshot:
         if self._changed is None or self._changed[0] != settings.changes:
             self._changed = (settings.changes, settings.applied(self.robot))
-        robot, pose, confirmed = self._changed[1], self.scene.dragged_pose(), self.ready(Computation.REST)
-        snapshot = snapshot_at(robot, pose, settings, self._previous, confirmed=confirmed, wrench=self.wrench)
+        robot, pose = self._changed[1], self.scene.dragged_pose()
+        snapshot = snapshot_at(robot, pose, settings, self._previous, self.wrench)
         if not depends_on_history(settings.tension):
             self._forget()  # the tensions of another method are no history
         elif snapshot.feasible:
@@ -285,14 +278,10 @@ class Page:
                 feature.follow(view)
         self.view = view
         self.updates += 1
-        self.shown.set()
 
     def _readings(self, snapshot: Configuration) -> tuple[str, str]:
         """Verdict and numbers."""
         if isinstance(snapshot, InMotion):
             return snapshot.verdict, snapshot.numbers(self.scale)
-        verdict, held = readout.verdict(snapshot, capacity=self.ready(Computation.MARGIN)), snapshot.feasible
-        if not self.ready(Computation.FREQUENCIES):
-            return verdict, readout.numbers_html(snapshot, self.scale, None, frequencies_later=held)
-        frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and held else None
-        return verdict, readout.numbers_html(snapshot, self.scale, frequencies)
+        frequencies = modes(snapshot.plan.state).frequency if snapshot.plan is not None and snapshot.feasible else None
+        return readout.verdict(snapshot), readout.numbers_html(snapshot, self.scale, frequencies)

@@ -43,7 +43,7 @@ class ControlPanel:
         self._build_drawing()
         readings = self.readings = self._gui.add_panel()
         with readings.add_tab("Readings"):
-            self._verdict = self._gui.add_html(readout.waiting())
+            self._verdict = self._gui.add_html("")
             self._explained = self._gui.add_html("", visible=False)
             self._gui.add_html(readout.legend(scale, robot))
             self._numbers = self._gui.add_html("")
@@ -116,10 +116,6 @@ class ControlPanel:
             self._method.options = (*METHODS, BY_HAND)
         self._method.value = BY_HAND
         self._changed()
-
-    def wait(self, reason: str) -> None:
-        """Write the reason why values are not available yet."""
-        self._verdict.content = readout.waiting(reason)
 
     def refuse(self, message: str) -> None:
         """Write why a setting is refused."""

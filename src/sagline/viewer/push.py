@@ -54,8 +54,7 @@ class PushResponse:
     state: Equilibrium  # without the force
     loaded: Equilibrium | None  # with the force; None if none was found
     reserve: Reserve  # largest force before a tension is at its limit, the lengths kept
-    # largest force with feasible tensions at this pose; None until it is known
-    redistributed: Reserve | None
+    redistributed: Reserve  # largest force with feasible tensions at this pose
     compliance: Array  # of the point at which it acts, world axes [m/N], shape (3, 3); NaN if unknown
 
     @property
@@ -86,7 +85,7 @@ class PushResponse:
         return Pose(place - rotation.as_matrix() @ self.push.at, rotation)
 
 
-def push_response(state: Equilibrium, push: Push, *, redistribution: bool = True) -> PushResponse:
+def push_response(state: Equilibrium, push: Push) -> PushResponse:
     """Response to a force, within the model of the state's cables."""
     if isinstance(state.cables.model, Straight):
         raise InvalidValueError("push: cable model", "straight", "one that stretches", "Choose another cable model.")
@@ -98,7 +97,7 @@ def push_response(state: Equilibrium, push: Push, *, redistribution: bool = True
         state,
         found.state if bool(found.solved) else None,
         _reserve(state, push),
-        _redistributed(state, push) if redistribution else None,
+        _redistributed(state, push),
         locked(arm @ stiffness(state).compliance @ arm.T),
     )
 

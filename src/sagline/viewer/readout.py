@@ -21,7 +21,6 @@ from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number_text
 
-LATER = "compiling …"
 EXACT: Final = 1e-9  # m: smaller distances are rounding
 _ALONE = 1e-9  # of a robot's highest tension: distance to a limit that counts as at the limit
 
@@ -36,10 +35,10 @@ def sentence(text: str) -> str:
     return f'<div class="sagline quiet">{text}</div>'
 
 
-def verdict(snapshot: Snapshot, *, capacity: bool = True) -> str:
+def verdict(snapshot: Snapshot) -> str:
     """Feasible or not, in one colored box; where not, why."""
     if snapshot.feasible:
-        return verdict_box("good", "Feasible", _summary(snapshot, capacity=capacity))
+        return verdict_box("good", "Feasible", _summary(snapshot))
     return verdict_box("bad", headline(snapshot), escape(snapshot.reason))
 
 
@@ -57,19 +56,12 @@ def refused(message: str) -> str:
     return verdict_box("bad", "Not possible", escape(message))
 
 
-def waiting(what: str = "The first run on a machine compiles the numerical core; later ones start at once.") -> str:
-    """Box shown before the numbers: the first run compiles the numerical core."""
-    return verdict_box("quiet", "Getting ready", escape(what))
-
-
-def numbers_html(
-    snapshot: Snapshot, scale: TensionScale, frequencies: Array | None, *, frequencies_later: bool = False
-) -> str:
-    """The pose, the numbers of every cable, and the platform's natural frequencies, or that they come later."""
+def numbers_html(snapshot: Snapshot, scale: TensionScale, frequencies: Array | None) -> str:
+    """The pose, the numbers of every cable, and the platform's natural frequencies."""
     parts = (
         pose_line(snapshot.pose),
         _cable_numbers(snapshot, scale),
-        _frequency_line(LATER) if frequencies_later else _listed(frequencies),
+        _listed(frequencies),
         _material_line(snapshot),
         _pulley_line(snapshot.robot),
     )
@@ -140,7 +132,7 @@ def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:
     return kept
 
 
-def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
+def _summary(snapshot: Snapshot) -> str:
     """Quantities of a feasible pose, with their names."""
     unit = force_unit(snapshot.robot)
     tension = snapshot.tension
@@ -149,8 +141,8 @@ def _summary(snapshot: Snapshot, *, capacity: bool) -> str:
         ("Nearest limit", _nearest_limit(snapshot, unit)),
     ]
     if snapshot.plan is not None:
-        extra = unit.written(float(capacity_margin(snapshot.plan.state))) if capacity else LATER
-        rows.append(("Spare force", f"{extra}, in any direction, with redistributed tensions" if capacity else extra))
+        extra = unit.written(float(capacity_margin(snapshot.plan.state)))
+        rows.append(("Spare force", f"{extra}, in any direction, with redistributed tensions"))
     if (error := snapshot.error) is not None:
         away = float(np.linalg.norm(error))
         rows.append(
@@ -231,9 +223,8 @@ def _listed(frequencies: Array | None) -> str:
         return ""
     words = [_pressed(k, value) for k, value in enumerate(frequencies)]
     ends = [*[","] * (len(words) - 1), " Hz"]  # stay with the number before
-    return _frequency_line(
-        " ".join(f'<span class="whole">{word}{end}</span>' for word, end in zip(words, ends, strict=True))
-    )
+    text = " ".join(f'<span class="whole">{word}{end}</span>' for word, end in zip(words, ends, strict=True))
+    return f'<div style="margin-top:4px"><b>Natural frequencies</b> {text}</div>'
 
 
 def _pressed(mode: int, frequency: float) -> str:
@@ -243,10 +234,6 @@ def _pressed(mode: int, frequency: float) -> str:
         return text
     name = f"{MASSLESS} {mode + 1}"
     return f'<button class="shake" {chosen_by("mode", name)} aria-label="{text} Hz: move mode {name}">{text}</button>'
-
-
-def _frequency_line(text: str) -> str:
-    return f'<div style="margin-top:4px"><b>Natural frequencies</b> {text}</div>'
 
 
 def _material_line(snapshot: Snapshot) -> str:

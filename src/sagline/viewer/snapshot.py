@@ -175,8 +175,6 @@ def snapshot_at(
     pose: Pose,
     settings: Settings,
     previous: Plan | None,
-    *,
-    confirmed: bool = True,
     wrench: Array | None = None,
 ) -> Snapshot:
     """A robot, already changed by the settings, held at rest at a pose."""
@@ -186,7 +184,7 @@ def snapshot_at(
     except CableGeometryError as error:
         reason = "" if robot.winches is None else str(error).removeprefix("pose, ")
         return Snapshot(robot, pose, None, None, reason, reference)
-    approximate = confirmed and not isinstance(settings.model, Catenary) and bool(plan.feasible)
+    approximate = not isinstance(settings.model, Catenary) and bool(plan.feasible)
     return Snapshot(robot, pose, plan, confirm(plan).pose if approximate else None, "", reference)
 
 

@@ -18,7 +18,7 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.viewer import shapes
 from sagline.viewer.camera import camera_of, nearest_line, screen_point
-from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
+from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.playback import PlayedSimulation
 from sagline.viewer.player import PlayerState
@@ -145,9 +145,6 @@ class CutFeature(Feature):
         state, view = self._page.state, self._page.view
         if state is None or view is None:
             self._text.content = sentence("A cable can be cut at a feasible pose at rest. Drag the platform to one.")
-            return
-        if not self._page.ready(Computation.SIMULATION):
-            self._text.content = sentence("The simulation is still being compiled.")
             return
         cable, cable_mass = self._chosen, CABLE_MASS.get(self._mass.value, "none")
         self._requested += 1

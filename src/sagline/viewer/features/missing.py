@@ -14,7 +14,7 @@ from sagline.core.numbers import n
 from sagline.kinematics.status import PoseStatus
 from sagline.tension.singular import unresisted_motion
 from sagline.viewer import shapes
-from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
+from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.features.tensions import SHARING
 from sagline.viewer.missing import MissingWrench, NearestFeasible, missing_of, nearest_feasible
 from sagline.viewer.page import Page
@@ -145,7 +145,7 @@ class MissingFeature(Feature):
         pose = snapshot.pose
         self._key = (id(snapshot.robot), type(model), pose.position.tobytes(), pose.quaternion.tobytes(), load)
         self._shown = snapshot, view
-        if self._page.ready(Computation.WORKSPACE) and not self._task.busy and self._found[0] != self._key:
+        if not self._task.busy and self._found[0] != self._key:
             self._search()
         self._explain()
 

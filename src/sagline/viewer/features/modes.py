@@ -16,10 +16,10 @@ from sagline.dynamics.vibration.mode_list import MASSLESS, ListedMode, listed_mo
 from sagline.dynamics.vibration.response import MOTIONS, ResponseCurves, response_curves
 from sagline.dynamics.vibration.vibration import Vibration, VibrationStatus, vibration
 from sagline.robot.equilibrium import Equilibrium
-from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
+from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.player import InMotion
-from sagline.viewer.readout import html_block, refused, sentence, waiting
+from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.server import chosen_by
 from sagline.viewer.swing import PERIOD, Swing, mode_of
 from sagline.viewer.tension_scale import number_text
@@ -142,7 +142,7 @@ class ModesFeature(Feature):
 
     def __init__(self, page: Page) -> None:
         """Build the tab."""
-        self._scene, self._task, self._ready = page.scene, BackgroundTask(page.later), page.ready
+        self._scene, self._task = page.scene, BackgroundTask(page.later)
         self._key: Hashable = None
         self._state: Equilibrium | None = None
         self._due: float | None = None  # time at which the modes are to be computed [s]
@@ -156,7 +156,7 @@ class ModesFeature(Feature):
             self._mode: Any = gui.add_text(FIELD, page.mode, hint=hint)
             self._text = gui.add_html("")
             self._up_to: Any = gui.add_slider("Modes up to [Hz]", 1.0, HIGHEST, 1.0, UP_TO)
-            self._list = gui.add_html(waiting("The modes are computed when the platform is at rest."))
+            self._list = gui.add_html("")
             self._force: Any = gui.add_dropdown("Force", MOTIONS, hint="Along an axis, or a moment about one.")
             self._figure = gui.add_html("")
         page.refresh_on(self._mode, self._up_to, self._force)
@@ -225,9 +225,7 @@ class ModesFeature(Feature):
     def _at_rest(self, view: View) -> tuple[Equilibrium | None, Hashable]:
         """The equilibrium whose modes are to be computed, and a key of it."""
         snapshot, settings = view.snapshot, view.settings
-        if isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
-            return None, None
-        if view.playing or not self._ready(Computation.MODES):
+        if view.playing or isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
             return None, None
         place = snapshot.pose.position.tobytes() + snapshot.pose.quaternion.tobytes()
         return snapshot.plan.state, (place, settings.changes, settings.model, settings.tension, id(view.played))
@@ -272,7 +270,7 @@ class ModesFeature(Feature):
         if not _has_modes(vibration):
             return sentence("No response: there are no modes.")
         if curves is None:
-            return waiting("The response is being computed.")
+            return sentence("The response is being computed.")
         axis = self._axis
         motion, unit = ("rotation", "N m") if axis.startswith("about") else ("motion along", "N")
         with_mass = [mode for mode in modes if mode.kind != MASSLESS]

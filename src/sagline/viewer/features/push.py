@@ -15,10 +15,10 @@ from sagline.core.numbers import n
 from sagline.robot.equilibrium import Equilibrium
 from sagline.viewer import shapes
 from sagline.viewer.camera import Camera, camera_of, ray_distance, screen_point
-from sagline.viewer.feature import Computation, Feature, View
+from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
 from sagline.viewer.push import Push, PushResponse, Reserve, push_response, semi_axes
-from sagline.viewer.readout import LATER, definitions, refused, sentence, verdict_box
+from sagline.viewer.readout import definitions, refused, sentence, verdict_box
 from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.shapes import THINNEST, ball, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
@@ -39,15 +39,12 @@ LONGEST: Final = 0.6  # longest arrow of a force that is typed, as a share of th
 def response_text(response: PushResponse, drawn_for: float | None) -> str:
     """HTML of a response; `drawn_for` is the force that the ellipsoid is drawn for [N], None without one."""
     unit = force_unit(response.state.one_robot)
-    redistributed = LATER
-    if response.redistributed is not None:
-        redistributed = f"{_reserve_text(response, response.redistributed, unit)}, at the same pose"
     rows = [
         ("Force", unit.written(response.force)),
         ("Displacement", _motion_text(response)),
         ("Tensions", _tensions(response, unit)),
         ("Fixed lengths", _reserve_text(response, response.reserve, unit)),
-        ("Redistributed", redistributed),
+        ("Redistributed", f"{_reserve_text(response, response.redistributed, unit)}, at the same pose"),
         ("Compliance", _compliance_text(response, drawn_for)),
     ]
     within = response.loaded is not None and response.reserve.force >= response.force
@@ -140,16 +137,13 @@ class PushFeature(Feature):
         self._force.value = 0.0
 
     def _respond(self, view: View) -> None:
-        push, state, ready = self._typed(), view.state, self._page.ready
+        push, state = self._typed(), view.state
         if push is None:
             self._show_none("")
         elif state is None:
             self._show_none(sentence("The response to a force is computed at a feasible pose at rest."))
-        elif not ready(Computation.REST) or not ready(Computation.FREQUENCIES):
-            late = "The response is shown when forward kinematics and stiffness are compiled."
-            self._show_none(sentence(late))
         else:
-            response = push_response(state, push, redistribution=ready(Computation.VERDICTS))
+            response = push_response(state, push)
             drawn_for = None
             if self._ellipsoid.value and np.isfinite(response.compliance).all():
                 drawn_for = readable(semi_axes(response.compliance)[0], LARGE * self._size)

@@ -12,9 +12,9 @@ from sagline.core.arrays import Array, locked
 from sagline.core.errors import InvalidValueError, SaglineError
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
-from sagline.viewer.feature import BackgroundTask, Computation, Feature, View
+from sagline.viewer.feature import BackgroundTask, Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import LATER, html_block, refused, sentence
+from sagline.viewer.readout import html_block, refused, sentence
 from sagline.viewer.robot_scene import INFEASIBLE, PLATFORM, REST, Nodes
 from sagline.viewer.slices import MarginScale, Picture, picture_of
 from sagline.viewer.tension_scale import force_unit
@@ -71,7 +71,7 @@ class RegionFeature(Feature):
     def __init__(self, page: Page) -> None:
         """Build the tab."""
         self._server, self._size, self._nodes = page.server, page.size, Nodes(page.server.scene)
-        self._task, self._ready = BackgroundTask(page.later), page.ready
+        self._task = BackgroundTask(page.later)
         self._key: Hashable = None  # identifies the workspace
         self._query: WorkspaceQuery | None = None
         self._levels: Levels | None = None
@@ -136,10 +136,6 @@ class RegionFeature(Feature):
     def follow(self, view: View) -> None:
         """Draw the workspace at the orientation that is shown."""
         self._arrange()
-        if not self._ready(Computation.WORKSPACE):
-            if self._anything:
-                self._hull_html.content = sentence(LATER.capitalize())
-            return
         if not self._anything:
             self._clear()
             return

@@ -16,13 +16,13 @@ from sagline.kinematics.inverse_solver import InverseSolver
 from sagline.kinematics.plan import Plan
 from sagline.kinematics.polygon import polygon_at, tension_polygon
 from sagline.kinematics.status import PoseStatus
-from sagline.tension.method import kernel_options, takes_default_kernel
+from sagline.tension.method import kernel_options
 from sagline.tension.methods import MinimumNorm
 from sagline.tension.polygon import TensionPolygon
 from sagline.viewer.by_hand import BY_HAND, WIDTH, ByHand, DotField
-from sagline.viewer.feature import Computation, Feature, View
+from sagline.viewer.feature import Feature, View
 from sagline.viewer.page import Page
-from sagline.viewer.readout import LATER, html_block, sentence
+from sagline.viewer.readout import html_block, sentence
 from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import METHODS, Snapshot, method_name
 from sagline.viewer.tension_scale import force_unit, number_text
@@ -50,25 +50,21 @@ class MethodMarks:
         """Begin without results."""
         self._key: tuple[object, ...] = ()
         self._found: tuple[_MethodMark, ...] = ()
-        self._solvers: dict[str, InverseSolver] | None = None
+        self._solvers: dict[str, InverseSolver] = {}
 
-    def at(self, plan: Plan, *, further: bool, verdicts: bool = True) -> tuple[_MethodMark, ...]:
+    def at(self, plan: Plan) -> tuple[_MethodMark, ...]:
         """Results at the pose of a plan, at rest under its wrench."""
         state = plan.state
         place = (state.pose.position.tobytes(), state.pose.quaternion.tobytes(), state.wrench.tobytes())
-        key = (id(state.robot), type(state.cables.model), further, verdicts, *place)
+        key = (id(state.robot), type(state.cables.model), *place)
         if key != self._key:
-            ways = [
-                (name, letter)
-                for (name, method), letter in zip(METHODS.items(), ascii_uppercase, strict=False)
-                if further or takes_default_kernel(method)
-            ]
-            if key[:4] != self._key[:4]:
-                self._solvers = None
-            elif self._solvers is None and verdicts:
-                self._solvers = _solvers(plan, [name for name, _ in ways])
+            if key[:2] != self._key[:2]:
+                self._solvers = {}
+            elif not self._solvers:
+                self._solvers = _solvers(plan)
             self._key, self._robot = key, state.robot  # the robot is kept, so that its id is not used again
-            self._found = tuple(_mark(plan, name, letter, (self._solvers or {}).get(name)) for name, letter in ways)
+            ways = zip(METHODS, ascii_uppercase, strict=False)
+            self._found = tuple(_mark(plan, name, letter, self._solvers.get(name)) for name, letter in ways)
         return self._found
 
 
@@ -87,13 +83,13 @@ def grouped(marks: tuple[_MethodMark, ...], field: DotField) -> list[tuple[tuple
     return groups
 
 
-def _solvers(plan: Plan, names: list[str]) -> dict[str, InverseSolver]:
+def _solvers(plan: Plan) -> dict[str, InverseSolver]:
     """Solvers of the methods that are applicable to the robot of a plan."""
     robot, model = plan.state.one_robot, plan.state.cables.model
     found = {}
-    for name in names:
+    for name, method in METHODS.items():
         with suppress(InvalidValueError):  # `inverse` gives the reason
-            found[name] = InverseSolver(robot, model, METHODS[name].alone)
+            found[name] = InverseSolver(robot, model, method.alone)
     return found
 
 
@@ -130,11 +126,6 @@ def polygon_figure(
         + sentence(_description(snapshot, drawn, movable=field is not None))
         + _key(snapshot, marks, back)
     )
-
-
-def _polygon_later() -> str:
-    """HTML: the polygon is not compiled yet."""
-    return sentence(LATER.capitalize())
 
 
 def _why_not_drawn(snapshot: Snapshot) -> str:
@@ -292,7 +283,7 @@ class TensionsFeature(Feature):
 
     def __init__(self, page: Page) -> None:
         """Build nothing yet."""
-        self._panel, self._ready = page.panel, page.ready
+        self._panel = page.panel
         self._marks = MethodMarks()
         self._field: DotField | None = None  # in which the dot moves
         self._key: tuple[object, ...] = ()  # of the pose that the field is of
@@ -306,8 +297,6 @@ class TensionsFeature(Feature):
         before, self._field = self._field, None
         if not isinstance(snapshot, Snapshot):
             self._panel.show_polygon(sentence(snapshot.why_no_choice))
-        elif not self._ready(Computation.POLYGON):
-            self._panel.show_polygon(_polygon_later())
         elif view.played is not None or snapshot.plan is None or _why_not_drawn(snapshot):
             self._panel.show_polygon(polygon_figure(snapshot))
         else:
@@ -320,8 +309,7 @@ class TensionsFeature(Feature):
             self._key = key
             if self._field is not None and self._aim is None:
                 self._aim = self._field.polygon.coordinates(snapshot.tension)
-            further, verdicts = self._ready(Computation.SHARING), self._ready(Computation.VERDICTS)
-            marks = self._marks.at(snapshot.plan, further=further, verdicts=verdicts) if self._field else ()
+            marks = self._marks.at(snapshot.plan) if self._field else ()
             self._panel.show_polygon(polygon_figure(snapshot, marks, self._field, self._panel.method_name))
 
     def _on_dot(self, value: Any, _: int) -> None:
