@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from sagline.cli.options import ModbusOption, RobotArgument, flag, option
-from sagline.cli.terminal import working
 
 if TYPE_CHECKING:
     from sagline.control.link import Link
@@ -43,14 +42,13 @@ def control(
 
     robot = load_robot(name)
     with ExitStack() as stack:
-        with working("preparing the controller"):
-            link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
-            record = None
-            if log is not None:
-                from sagline.files.mcap_writer import Recorder
+        link = stack.enter_context(closing(_link(robot, plc, modbus=modbus)))
+        record = None
+        if log is not None:
+            from sagline.files.mcap_writer import Recorder
 
-                record = stack.enter_context(Recorder(log, robot))
-            controller = Controller(robot, link, pace=Pace(), record=record, shadow=shadow)
+            record = stack.enter_context(Recorder(log, robot))
+        controller = Controller(robot, link, pace=Pace(), record=record, shadow=shadow)
         session = OperatorSession(controller, alone=not sys.stdin.isatty(), shadow=shadow)
         return session.run()
 

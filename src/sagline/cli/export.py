@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 from sagline.cli.options import RobotArgument, flag, option
-from sagline.cli.terminal import show_note, show_text, working
+from sagline.cli.terminal import show_note, show_text
 
 
 def export_c(
@@ -58,7 +58,6 @@ def export_scl(
     from sagline.files.robot_file import load_robot
 
     loaded = load_robot(robot)
-    with working(""):
-        path = export_scl(loaded, out)
+    path = export_scl(loaded, out)
     groups = len(groups_of(loaded.cable_count))
     show_text(f"{path}: SCL for the {groups} PLCs of {loaded.name}, not compiled yet", whole=True)

@@ -57,9 +57,8 @@ def share(
     robot = found if isinstance(found, Robot) else found.robot
     stem = file_stem(robot.name) if source.suffix == "" else source.stem
     target = _free(Path(f"{stem}.html")) if out is None else check_file(out)
-    with working(f"{robot.name}: page"):
-        text = robot_page(found) if isinstance(found, Robot) else course_page(found, source.stem)
-        write_text(target, text)
+    text = robot_page(found) if isinstance(found, Robot) else course_page(found, source.stem)
+    write_text(target, text)
     size = len(text.encode())
     amount = f"{size / 1e3:,.0f} kB" if size < 1e6 else f"{size / 1e6:.1f} MB"
     show_text(f"{target.resolve()}: {amount}, opens in any browser, without a network", whole=True)

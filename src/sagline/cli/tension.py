@@ -22,7 +22,7 @@ from sagline.cli.options import (
     figures_flag,
 )
 from sagline.cli.output import Output, TextTable, show_table
-from sagline.cli.terminal import show_note, show_text, working
+from sagline.cli.terminal import show_note, show_text
 from sagline.core.errors import InvalidValueError
 from sagline.core.numbers import n
 
@@ -68,18 +68,17 @@ def tension(
     place = middle_pose(robot) if pose is None else pose
     drawn = figures and robot.cable_count == robot.degrees_of_freedom + 2
     output = Output(folder, (), [file_stem(robot.name, "tension")] * drawn)
-    with working(f"{robot.name}: tension distributions"):
-        least = inverse(
-            robot, place, model.build(), MinimumNorm(variable.value), wrench
-        )  # raises an error if no method applies
-        plans = {
-            title: _plan(robot, place, model, method(variable.value), wrench)
-            for title, method in METHODS.items()
-            if title not in LEFT_OUT
-        }
-        reason = _reason(robot, place, least)
-        margin = float(capacity_margin(least.state))
-        shape = tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
+    least = inverse(
+        robot, place, model.build(), MinimumNorm(variable.value), wrench
+    )  # raises an error if no method applies
+    plans = {
+        title: _plan(robot, place, model, method(variable.value), wrench)
+        for title, method in METHODS.items()
+        if title not in LEFT_OUT
+    }
+    reason = _reason(robot, place, least)
+    margin = float(capacity_margin(least.state))
+    shape = tension_polygon(robot, place, model.build(), wrench, variable.value) if drawn else None
     for text in least.warnings:
         show_note(f"{robot.name}: ", text)
     if not any(plan is not None and plan.feasible for plan in plans.values()):

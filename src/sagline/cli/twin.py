@@ -10,7 +10,7 @@ from socket import gethostname
 from typing import TYPE_CHECKING, Annotated, Final
 
 from sagline.cli.options import ModbusOption, RobotArgument, SeedOption, converted_option, option
-from sagline.cli.terminal import show_note, show_text, working
+from sagline.cli.terminal import show_note, show_text
 
 if TYPE_CHECKING:
     from sagline.dynamics.simulation.simulator import Reading
@@ -73,9 +73,8 @@ def twin(
     real = robot if true is None else load_robot(true)
     noise = whole_of(seed, "--seed", 0, MOST_SEED)
     with ExitStack() as stack:
-        with working("switching the machine on"):
-            machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
-            server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
+        machine = Machine(real, nominal=robot, seed=noise, period=SCAN, faults=tuple(faults or ()))
+        server = stack.enter_context(closing(Server(machine, host=host, port=port, modbus=modbus)))
         watch = TwinMonitor(machine)
         if log is not None:
             from sagline.files.mcap_writer import Recorder
