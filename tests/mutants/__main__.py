@@ -68,7 +68,7 @@ class Mutant(NamedTuple):
         return Path("src") / "sagline" / self.file
 
 
-def mutants(folders: Sequence[str]) -> Iterator[Mutant]:
+def mutants(folders: Sequence[str] = ()) -> Iterator[Mutant]:
     """All mistakes of some folders, or of all; an entry whose text is not found exactly once is an error."""
     known = sorted(file.stem for file in Path(__file__).parent.glob("*.toml"))
     if unknown := set(folders) - set(known):
