@@ -114,6 +114,26 @@ def test_what_stands_around(folder: FilePath) -> None:
     )
     volumes = [len(json.loads(result.stdout)["components_m3"]) for result in (own, other, none)]
     assert volumes == [2, 2, 1]
+    counts = [re.findall(r"\(.*\)", json.loads(result.stdout)["criteria"][-1]) for result in (own, other, none)]
+    assert counts == [["(1 obstacle)"], ["(1 obstacle)"], ["(0 obstacles)"]]
+
+
+@extended
+def test_a_robot_file_of_any_name_has_its_scene_and_a_mesh_is_counted(folder: FilePath) -> None:
+    import trimesh
+
+    text = sl.dump_robot(sl.load_robot("article-suspended"))
+    scene = "scene:\n  - {name: wall, box: [0.2, 12, 1.0], center: [1, 0, 0.5]}\n"
+    (folder / "machine").write_text(text + scene)
+    (folder / "plain.yaml").write_text(text)
+    (folder / "block.stl").write_bytes(trimesh.creation.box((0.2, 0.2, 0.2)).export(file_type="stl"))
+    words = ["--box", "-1..1, -1..1, 2..3 m", "--cells", "4", "--no-figures", "--json", "--clearance", "5 cm"]
+    assert "(1 obstacle)" in sagline("machine", *words).stdout
+    assert "(1 obstacle, 12 triangles)" in sagline("article-suspended", *words, "--scene", "block.stl").stdout
+    for scene in ("plain.yaml", "cogiro"):
+        result = sagline("article-suspended", *words, "--scene", scene)
+        assert result.exit_code == 2
+        assert f"{scene}: has no scene. " in result.stderr
 
 
 def test_nowhere_ends_with_the_nearest_pose(folder: FilePath) -> None:

@@ -25,6 +25,7 @@ from sagline.core.errors import FileError, InvalidValueError, SaglineError
 
 if TYPE_CHECKING:
     from sagline.cli.hosting import ServerAddress
+    from sagline.robot.pose import Pose
     from sagline.robot.robot import Robot
     from sagline.viewer.page import Page, Source
     from sagline.viewer.player import Beside, Played
@@ -126,6 +127,8 @@ def view(
 def view_robot(robot: Robot, name: str | Path, address: ServerAddress, mass: float | None = None, **start: Any) -> int:
     """Serve a robot, with its mass if it has a payload [kg], until Ctrl-C; returns the exit code."""
     serve, Source = _viewer()
+    if start.get("mode"):
+        _check_mode(robot, **start)
     return serve(robot, address, source=Source.of_robot(name, mass), **start)
 
 
@@ -286,3 +289,17 @@ def _mode(text: str | None) -> str:
         step = "The page lists the modes."
         raise InvalidValueError("--mode", repr(text), "a number from 1 on, or massless 1, massless 2", step)
     return words
+
+
+def _check_mode(robot: Robot, pose: Pose | None, mode: str, wrench: Any) -> None:
+    """Refuse a mode that is not in the list at the first pose of the page; where there is no list the page says why."""
+    from sagline.dynamics.vibration.vibration import VibrationStatus, vibration
+    from sagline.kinematics.inverse import inverse
+    from sagline.robot.reach import home_pose
+    from sagline.viewer.features.modes import UP_TO, range_of_modes
+    from sagline.viewer.swing import mode_of
+
+    found = vibration(inverse(robot, home_pose(robot) if pose is None else pose, wrench=wrench).state, up_to=UP_TO)
+    if found.status is VibrationStatus.SOLVED and mode_of(found, mode) is None:
+        allowed = f"{range_of_modes(found)}, below {UP_TO:g} Hz"
+        raise InvalidValueError("--mode", repr(mode), allowed, "Choose one of the list on the page.")

@@ -23,7 +23,7 @@ from sagline.cli.options import (
 )
 from sagline.cli.output import Output, TextTable, number_text, show_table
 from sagline.cli.terminal import show_note, show_text, working
-from sagline.core.errors import InvalidValueError
+from sagline.core.errors import FileError, InvalidValueError
 from sagline.core.numbers import counted
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *,
         "max_sag": MaximumSag,
         "min_stiffness": LeastStiffness,
         "min_frequency": LeastFrequency,
-        "clearance": lambda limit: Clearance(limit, _obstacles(robot if scene is None else scene)),
+        "clearance": lambda limit: Clearance(limit, _obstacles(robot, scene)),
     }
     found = [kinds[name](limit) for name, limit in limits.items() if limit is not None]
     if scene is not None and limits["clearance"] is None:
@@ -69,15 +69,20 @@ def _criteria(robot: str, limits: dict[str, float | None], scene: str | None, *,
     return found + [InFrame()] * in_frame
 
 
-def _obstacles(name: str) -> tuple[Obstacle, ...]:
-    """Obstacles: the scene of a robot file, a mesh file, none for the name of a preset."""
+def _obstacles(robot: str, scene: str | None) -> tuple[Obstacle, ...]:
+    """Obstacles of --scene, a robot file or a mesh file, at least one; without it those of the robot, if any."""
     from sagline.files.mesh_file import load_mesh
     from sagline.files.robot_file import load_scene
+    from sagline.robot.catalogue import robot_names
 
-    path = Path(name)
-    if path.suffix.lower() in (".yaml", ".yml"):
-        return load_scene(path)
-    return (load_mesh(path),) if path.suffix else ()
+    if scene is None:
+        return () if robot in robot_names() else load_scene(robot)
+    path = Path(scene)
+    if path.suffix.lower() not in ("", ".yaml", ".yml"):
+        return (load_mesh(path),)
+    if found := () if scene in robot_names() else load_scene(path):
+        return found
+    raise FileError(path, "has no scene", "Name a robot file with a scene, or a mesh file.")
 
 
 _TiltOption = Annotated[
@@ -162,11 +167,11 @@ def workspace(
         "clearance": clearance,
     }
     cable = model.build()
-    criteria = _criteria(name, limits, scene, in_frame=in_frame)
     if tilt > pi:  # the user may have meant degrees: a number without unit is in radians
         step = "Give its unit, --tilt 10deg: no rotation turns by more than half a turn."
         raise InvalidValueError("--tilt", f"{tilt:g} rad", "0 to 180deg", step)
     robot = robot_with_payload(name, payload)
+    criteria = _criteria(name, limits, scene, in_frame=in_frame)
     space_file, hull = f"{file_stem(robot.name, 'workspace')}.nc", f"{file_stem(robot.name, 'hull')}.glb"
     drawn = [file_stem(robot.name, what) for what in ("workspace", "slice") if figures]
     output = Output(folder, [space_file, hull], drawn)

@@ -17,7 +17,9 @@ import numpy as np
 from sagline.cables.model import CableModel
 from sagline.core.arguments import instance
 from sagline.core.arrays import Array, locked
+from sagline.core.numbers import counted
 from sagline.interference.clearance import ClearanceRows, check_obstacles, obstacles_of
+from sagline.interference.mesh import Mesh
 from sagline.interference.pairs import Obstacle
 from sagline.kinematics.confirm import confirm
 from sagline.robot.reach import bounds
@@ -196,6 +198,13 @@ class Clearance(Criterion):
         listed = isinstance(given, Obstacle | list | tuple)
         found = obstacles_of(given if listed else [given], "Clearance: obstacles")
         object.__setattr__(self, "obstacles", found)
+
+    def __str__(self) -> str:
+        """Title, limit and counts of obstacles: "clearance ≥ 30 mm (1 obstacle, 12 triangles)"."""
+        solids: Any = self.obstacles  # a tuple after the check
+        triangles = sum(len(one.faces) for one in solids if isinstance(one, Mesh))
+        counts = counted(len(solids), "obstacle") + (f", {counted(triangles, 'triangle')}" if triangles else "")
+        return f"{super(Clearance, self).__str__()} ({counts})"
 
     def judge(self, given: Given) -> Judged:
         """Least distance minus the limit [m], and the cable (the first of two) of the nearest pair."""

@@ -100,14 +100,19 @@ FIELD = "Mode"
 TOPIC: Final = "mode"  # of the messages with the name of a mode that is clicked
 
 
+def range_of_modes(vibration: Vibration) -> str:
+    """First and last name of each kind in the list, "1 to 4 and massless 1 to 6"; "none" if it is empty."""
+    counts = vibration.frequency.size, int(np.isfinite(vibration.massless_frequency).sum())
+    there = [f"{word}1 to {count}" for word, count in zip(("", "massless "), counts, strict=True) if count]
+    return " and ".join(there) or "none"
+
+
 def _swing_text(vibration: Vibration, swing: Swing | None, chosen: str) -> str:
     if swing is not None:
         mode = swing.mode
         return html_block(f"<b>{mode.frequency:.3f} Hz, {mode.kind}</b>: {swing.text}")
     if chosen:
-        counts = vibration.frequency.size, int(np.isfinite(vibration.massless_frequency).sum())
-        there = [f"{word}1 to {count}" for word, count in zip(("", "massless "), counts, strict=True) if count]
-        return sentence(f"There is no mode {escape(chosen)}: the list has {' and '.join(there) or 'none'}.")
+        return sentence(f"There is no mode {escape(chosen)}: the list has {range_of_modes(vibration)}.")
     return sentence("Click a frequency to see its mode move.")
 
 
