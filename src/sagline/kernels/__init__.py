@@ -1,1 +1,1 @@
-"""Compiled kernels: floats and arrays in, floats and arrays out, SI units, nothing else."""
+"""Compiled kernels: they take and return floats and arrays in SI units."""

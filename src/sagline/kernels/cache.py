@@ -1,7 +1,7 @@
-"""Compiled kernels on disk: one file per kernel and argument types, written whole, its content checked by a digest.
+"""Compiled kernels on disk: one file per kernel and argument types, written atomically and checked by a digest.
 
-A file that is damaged is compiled again and replaced; a folder that cannot be used costs the time to compile, and one
-line on standard error.
+A damaged file is replaced after a new compilation. If the folder cannot be used, kernels are compiled again in every
+process, and one line on standard error reports it.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from typing import Any
 import numba
 from numba.core import compiler, serialize
 
-_result: Any = compiler.CompileResult  # numba has no types
+_result: Any = compiler.CompileResult  # numba has no type annotations
 _dumps: Any = serialize.dumps
 DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".nbc"
 
 
 class KernelCache:
-    """Machine code of one kernel, in place of numba's own cache, which is keyed by paths and trusts what it reads."""
+    """Machine code of one kernel, in place of numba's own cache, which uses paths as keys and reads files unchecked."""
 
     def __init__(self, function: Callable[..., object], folder: Path) -> None:
-        """Use a folder for a function; nothing is read or written yet."""
+        """Use a folder for a function, without reading or writing."""
         self.cache_path = str(folder)
         self._folder, self._code = folder, function.__code__
         module = Path(self._code.co_filename).stem
@@ -38,11 +38,11 @@ class KernelCache:
         self._enabled = True
 
     def enable(self) -> None:
-        """Read and write files."""
+        """Allow reading and writing of files."""
         self._enabled = True
 
     def disable(self) -> None:
-        """Leave files alone."""
+        """Stop reading and writing of files."""
         self._enabled = False
 
     def flush(self) -> None:
@@ -59,14 +59,14 @@ class KernelCache:
         try:
             content = file.read_bytes()
         except OSError:
-            return None  # no such file, or no access: saving reports which
+            return None  # no such file, or no access: `save_overload` reports the cause
         if hashlib.sha256(content[DIGEST:]).digest() != content[:DIGEST]:
             say_once(f"sagline: {file} is damaged; its kernel is compiled again")
             return None
         return _result._rebuild(target_context, *pickle.loads(content[DIGEST:]))
 
     def save_overload(self, signature: object, compiled: Any) -> None:
-        """Write machine code for argument types, if it can be written."""
+        """Write machine code for argument types, if the folder can be written."""
         if not self._enabled or compiled.lifted or compiled.library.has_dynamic_globals:
             return
         payload = _dumps(compiled._reduce())

@@ -9,18 +9,18 @@ EMPIRICAL = 2
 PARABOLIC = 3
 CATENARY = 4
 
-# How the calculation of one cable ended.
+# Status of the calculation of one cable.
 CABLE_SOLVED = 0
 CABLE_SLACK = 1  # carries no chord tension
-CABLE_NO_TENSION = 2  # the straight model knows no tension for a length
+CABLE_NO_TENSION = 2  # the straight model does not determine a tension from a length
 CABLE_BELOW_VALIDITY = 3  # the empirical model's lowest point lies inside the span
-CABLE_TOO_SLACK = 4  # half its weight exceeds RANGE chord tensions: no practical answer
+CABLE_TOO_SLACK = 4  # half its weight exceeds RANGE times the chord tension: outside the practical range
 CABLE_NOT_CONVERGED = 5
 
 # Tension distribution methods.
 MINIMUM_NORM = 0
 CLOSEST = 1
-QUADRATIC_PROGRAM = 2  # up to here: the feasible point nearest to a target
+QUADRATIC_PROGRAM = 2  # methods up to this one: feasible point nearest to a target
 LOWEST_SUM = 3
 LOWEST_MAXIMUM = 4
 P_NORM = 5
@@ -40,7 +40,7 @@ FRAME_END_TENSION = 2
 LIMITS_OF_CHORD = 0
 LIMITS_OF_FRAME_END = 1
 
-# How the calculation of one pose ended.
+# Status of the calculation of one pose.
 POSE_SOLVED = 0
 POSE_INFEASIBLE = 1  # no tensions within the limits balance the wrench
 POSE_SINGULAR = 2  # the structure matrix has lost rank
@@ -48,18 +48,18 @@ POSE_TOO_SLACK = 3  # a cable's chord tension is too small for its weight
 POSE_NOT_CONVERGED = 4
 POSE_NO_CHORD = 5  # both ends of a cable coincide
 POSE_NOT_COVERED = 6  # feasible, but not by the chosen tension distribution method
-POSE_UNBOUNDED = 7  # the feasible set has no end, and the chosen tension distribution method needs one
-POSE_BORDERLINE = 8  # so near the border that neither tensions nor a proof were found
+POSE_UNBOUNDED = 7  # the feasible set is unbounded, and the chosen tension distribution method requires a bounded one
+POSE_BORDERLINE = 8  # too close to the border of the feasible set: neither tensions nor a proof were found
 
-# How the forward calculation of one sample ended.
+# Status of the forward calculation of one sample.
 FORWARD_SOLVED = 0
-FORWARD_LOOSE = 1  # stable, but fewer cables pull than the platform has freedoms
-FORWARD_OVERSTRETCHED = 2  # a cable is stretched beyond all reason: the lengths are too short to meet
-FORWARD_UNSTABLE = 3  # an equilibrium, but no minimum of the energy
-FORWARD_SINGULAR = 4  # an equilibrium that some motion leaves without resistance
+FORWARD_LOOSE = 1  # stable, but fewer taut cables than degrees of freedom
+FORWARD_OVERSTRETCHED = 2  # unrealistic strain: the cables are too short to meet the platform
+FORWARD_UNSTABLE = 3  # an equilibrium, but not a minimum of the energy
+FORWARD_SINGULAR = 4  # an equilibrium with an unconstrained motion
 FORWARD_NOT_CONVERGED = 5
 FORWARD_NO_LENGTHS = 6  # all lengths NaN: a pose without a plan
-FORWARD_FITTED = 7  # straight cables: the pose whose lengths fit best
+FORWARD_FITTED = 7  # straight cables: least-squares pose
 
 # Result of the bracket of a pose's margin.
 MARGIN_FEASIBLE = 0

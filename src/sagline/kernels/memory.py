@@ -1,7 +1,7 @@
-"""The memory that kernels work in: kernels allocate nothing, which spares them counting references to it.
+"""Work memory of kernels, which do not allocate memory themselves and so avoid reference counting.
 
-It comes from Python as one flat array of numbers and one of counters, from which `block`,
-`vector` and `counters` take named arrays one after the other.
+Python passes one flat array of numbers and one of counters. `block`, `vector` and `counters` take named arrays from
+them one after the other.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from sagline.kernels.jit import glue
 class Memory(NamedTuple):
     """Memory of a kernel, or its unused part."""
 
-    numbers: Array  # flat
-    counters: Indices  # flat
+    numbers: Array  # flat array of numbers
+    counters: Indices  # flat array of counters
 
 
 def memory_for(cables: int) -> tuple[Array, Indices]:
-    """Work arrays of a kernel for one pose of `m` cables; a kernel that needs more raises ValueError."""
+    """Work arrays of a kernel for one pose of `m` cables; a kernel that requires more memory raises ValueError."""
     return np.empty(12 * cables * cables + 320 * cables + 400), np.empty(10 * cables + 40, dtype=np.int64)
 
 

@@ -1,7 +1,7 @@
-"""Columns of the arrays in which a robot enters the kernels.
+"""Columns of the arrays that describe a robot in kernels.
 
-A robot is two arrays with a leading axis of 1 (the same robot at every pose) or N (one robot per pose):
-`cable_table` (1 or N, m, 14) and `body_table` (1 or N, 5). A pose is a row of seven.
+A robot is two arrays with a leading axis of 1 (the same robot at every pose) or N (one robot per pose): `cable_table`
+(1 or N, m, 14) and `body_table` (1 or N, 5). A pose is a row of seven numbers.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ PLATFORM_X, PLATFORM_Y, PLATFORM_Z = 3, 4, 5  # platform anchor, platform frame 
 DENSITY = 6  # [kg/m]
 STIFFNESS = 7  # [N]
 TENSION_MIN, TENSION_MAX = 8, 9  # [N]
-# the pulley at the frame anchor, and the dead length behind it; all zero where there is neither
+# pulley at the frame anchor, and dead length behind it; all zero without pulley and dead length
 PULLEY_RADIUS = 10  # R [m]
-ENTRY = 11  # s: +1 where the cable comes to the pulley from below, -1 from above
+ENTRY = 11  # s: +1 if the cable enters the pulley from below, -1 if from above
 DEAD_CABLE, DEAD_RISE = 12, 13  # length from drum to pulley, height of the pulley's entry above the drum [m]
 CABLE_COLUMNS = 14
 
@@ -27,7 +27,7 @@ BODY_COLUMNS = 5
 # pose row: position of the platform origin [m], unit quaternion, scalar last
 POSE_COLUMNS = 7
 
-# rows of the result of one pose, each of m values; those from WRAP on only where something is behind a cable
+# rows of the result of one pose, each of m values; rows from WRAP on only for robots with pulleys or dead lengths
 SPAN, RISE, LENGTH, HORIZONTAL, VERTICAL, TENSION = 0, 1, 2, 3, 4, 5
 WRAP, WRAPPED, DEAD = 6, 7, 8  # wrap angle [rad], unstrained length on the pulley and behind it [m]
 SINE = 9  # sin phi of the chord that touches the pulley

@@ -1,4 +1,4 @@
-"""Limits as bounds: the points x (d,) for which START + x . rows is between LOW and HIGH in every bound.
+"""Bounds: a point x (d,) satisfies a bound if START + x . row lies between LOW and HIGH.
 
 rows is (d, k), one column per bound; bounds is (3, k), and HIGH may be infinite. A label names one side of a bound:
 2i is the lower side of bound i, 2i + 1 the upper side. The normal of a side points inward.

@@ -13,7 +13,7 @@ STILL = 1e-16  # relative to the largest eigenvalue: a shorter step is below rou
 
 @formula
 def _tridiagonalize(matrix: Array, diagonal: Array, beside: Array, vector: Array) -> None:
-    """Householder: fill diagonal (n,) and beside (n,), last entry 0, of a similar matrix; matrix is destroyed."""
+    """Householder: fill diagonal (n,) and beside (n,) of a similar tridiagonal matrix; matrix is overwritten."""
     n = matrix.shape[0]
     product = diagonal  # work array here; the diagonal is filled at the end
     for k in range(n - 2):
@@ -64,8 +64,8 @@ def _gershgorin_bound(diagonal: Array, beside: Array, sign: float) -> float:
 def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
     """Smallest eigenvalue of sign times a tridiagonal matrix, by Laguerre's iteration from below.
 
-    The pivots q of the shifted matrix have the characteristic polynomial as their product, and are positive below:
-    the iteration never passes the root.
+    The pivots q of the shifted matrix have the characteristic polynomial as their product, and all pivots are positive
+    below the smallest root. The iteration never passes this root.
     """
     n = diagonal.shape[0]
     root = _gershgorin_bound(diagonal, beside, sign)
@@ -92,10 +92,11 @@ def _lowest_eigenvalue(diagonal: Array, beside: Array, sign: float) -> float:
 
 @kernel
 def extreme_eigenvalues(matrix: Array, diagonal: Array, beside: Array, work: Array, flat: float) -> tuple[float, float]:
-    """Smallest and largest eigenvalue of a symmetric matrix (n, n), which is overwritten; other arrays are work arrays.
+    """Smallest and largest eigenvalue of a symmetric matrix (n, n); all arrays are overwritten.
 
-    The largest is computed only if the absolute smallest is at most flat times its upper bound; else an upper bound, at
-    most three times as large, is returned, which takes less time.
+    The largest eigenvalue is computed only if the absolute smallest one is at most flat times the upper bound.
+    Otherwise the upper bound is returned in its place, which takes less time. It is at most three times the largest
+    eigenvalue.
     """
     _tridiagonalize(matrix, diagonal, beside, work)
     low = _lowest_eigenvalue(diagonal, beside, 1.0)

@@ -91,7 +91,8 @@ def solve_general(matrix: Array, right: Array) -> bool:
 def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
     """Subtract from row count of a frame (.., d) its components along the orthonormal rows before it.
 
-    Fills column count of the triangle above its diagonal with these components; returns the square of the remainder.
+    These components fill column `count` of the triangle above its diagonal. The result is the squared length of the
+    rest.
     """
     d = frame.shape[1]
     for b in range(count):
@@ -112,7 +113,7 @@ def orthogonalize_row(frame: Array, count: int, triangle: Array) -> float:
 
 @formula
 def normalize_row(frame: Array, count: int, triangle: Array, square: float) -> None:
-    """Scale row count, left by `orthogonalize_row` with a given square, to a unit row of the frame."""
+    """Scale row `count` of the frame to unit length; square is the result of `orthogonalize_row`."""
     length = math.sqrt(square)
     triangle[count, count] = length
     for k in range(frame.shape[1]):
@@ -128,8 +129,8 @@ RANK = 1e-9  # relative to its row: a smaller diagonal entry of R means that ran
 def factorize(reduced: Array, diagonals: Array) -> bool:
     """QR in place; returns whether the matrix (n, m) has full rank.
 
-    Row k of reduced then contains column k of R before its diagonal and the k-th reflection's vector from there
-    on; row HEADS of diagonals (2, n) is the diagonal of R, row FACTORS contains 2/|v|^2 of the reflections.
+    Row k of reduced then contains column k of R up to its diagonal, and the vector v of reflection k from there on. Row
+    HEADS of diagonals (2, n) is the diagonal of R. Row FACTORS contains 2/|v|^2 of the reflections.
     """
     n, m = reduced.shape
     for k in range(n):

@@ -1,7 +1,7 @@
 """Hyperbolic functions without cancellation.
 
-For h^2 <= 4 they are Taylor polynomials in h^2, cut off below 1e-18, which the compiler can vectorize.
-Each is summed in four interleaved chains, because each product of a single chain waits for the previous one.
+For h^2 <= 4 they are Taylor polynomials in h^2, which the compiler can vectorize. Terms below 1e-18 are omitted. Each
+polynomial is summed in four interleaved chains, because each product of a single chain waits for the previous one.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import math
 
 from sagline.kernels.jit import formula
 
-POLYNOMIAL_LIMIT = 4.0  # of h^2
-EXCESS_LIMIT = 0.0625  # of u^2
+POLYNOMIAL_LIMIT = 4.0  # largest h^2
+EXCESS_LIMIT = 0.0625  # largest u^2
 
 
 @formula

@@ -1,8 +1,8 @@
 """Linear programs in few unknowns, over bounds: the dual simplex method.
 
-It visits points that are optimal for their active sides until one satisfies all bounds, or a side
-contradicts the active ones, which proves infeasibility. If the same rows and cost occur again with other
-limits, the sides of the last solution are still optimal, and the search starts from them.
+The method visits points that are optimal for their active sides. It ends when a point satisfies all bounds. It also
+ends when a side contradicts the active sides, which proves infeasibility. For the same rows and cost with other limits,
+the sides of the last solution are still optimal. The search then starts from them.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ PIVOT = 1e-11  # smallest pivot, relative to the largest entry of the row
 
 
 class Basis(NamedTuple):
-    """The active sides of an optimal point; good for the next program with the same rows and cost.
+    """The active sides of an optimal point. The next program with the same rows and cost can start from them.
 
-    A limit that was finite must still be finite then: a side at infinity cannot be active.
+    A limit that was finite must be finite in the next program too: a side at infinity cannot be active.
     """
 
     # of the sides, and of the one that contradicts them if the bounds have nothing in common, (d + 1,); labels[0] is -1

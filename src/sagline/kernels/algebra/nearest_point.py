@@ -1,8 +1,8 @@
 """Point nearest to a target that satisfies all bounds, for any number of unknowns: a dual active-set method.
 
-Starting from the target, violated sides are added one by one, and sides with a negative multiplier are
-dropped, until all are satisfied; docs/model.md, section 5. The search starts with the active sides of a similar
-problem, which usually are the solution.
+The method starts from the target. It adds violated sides one by one, and drops sides with a negative multiplier, until
+all sides are satisfied; docs/model.md, section 5. The first active sides are those of a similar problem, which usually
+are the solution.
 
 Source:
     Goldfarb & Idnani 1983, "A numerically stable dual method for solving strictly convex quadratic programs", with
@@ -21,10 +21,10 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 EXCHANGES = 2000
-DEPENDENT = 1e-10  # a side with a smaller share of itself than this outside the span of others depends on them
+DEPENDENT = 1e-10  # a side depends on others if less than this share of its normal is outside their span
 
-# rows of the pushes
-PUSH, SHARE = 0, 1  # multipliers of the active sides; components of the entering side
+# rows of `pushes`
+PUSH, SHARE = 0, 1  # multipliers of the active sides, and components of the entering side
 
 
 class ActiveSet(NamedTuple):
@@ -38,7 +38,7 @@ class ActiveSet(NamedTuple):
 
 @glue
 def new_active_set(memory: Memory, d: int) -> tuple[ActiveSet, Memory]:
-    """Work arrays for d unknowns, and the memory that is left."""
+    """Work arrays for d unknowns, and the remaining memory."""
     frame, memory = block(memory, d + 1, d)
     triangle, memory = block(memory, d + 1, d + 1)
     pushes, memory = block(memory, 2, d + 1)

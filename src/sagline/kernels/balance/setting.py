@@ -1,7 +1,7 @@
 """Data of one pose: cables in place, their limits, and the factored force balance.
 
-Only this module prepares a pose. The tension method uses t, which is scale times the chord tension plus
-offset: chord, horizontal or frame-end tensions, also weighted. Limits and minimum norm refer to t - offset.
+Only this module prepares a pose. The tension distribution methods use the variable t = scale times chord tension +
+offset. It is a chord, horizontal or frame-end tension, possibly weighted. Limits and minimum norm refer to t - offset.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue
 from sagline.kernels.memory import Memory, block, vector
 
-SHORTEST_CHORD = 1e-9  # [m]
+SHORTEST_CHORD = 1e-9  # shortest chord [m]
 
 
 class Platform(NamedTuple):
@@ -34,14 +34,14 @@ class Platform(NamedTuple):
     body: Array  # row of the body_table, (BODY_COLUMNS,)
     robot: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
     pose: Array  # row of the poses, (POSE_COLUMNS,)
-    wrench: Array  # external plus inertial, about the center of mass, (6,)
+    wrench: Array  # external plus inertial wrench, about the center of mass, (6,)
 
 
 class TensionLimits(NamedTuple):
     """Limits of the tensions."""
 
     quantity: int  # code of the tension to which the robot's limits apply
-    validity: float  # the article's T_adj of (54) [N], T_x > w D/(2 |tan phi|) + T_adj; NaN leaves the bound out
+    validity: float  # T_adj [N] of the article's bound (54), T_x > w D/(2 |tan phi|) + T_adj; NaN omits the bound
 
 
 class Balance(NamedTuple):
@@ -98,7 +98,7 @@ def set_pose(
     cables: Cables,
     balance: Balance,
 ) -> int:
-    """Fill the cables (first-order sag forces) and balance of one pose; returns POSE_SOLVED or the status of failure.
+    """Fill cables and balance of one pose, with first-order sag forces; returns POSE_SOLVED or the failure.
 
     weight: root weights of the cables in the distribution's variable, (m,).
     """
@@ -113,7 +113,7 @@ def set_pose(
 
 @glue
 def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Array, cables: Cables) -> bool:
-    """Fill chords, material, first sag forces and limits of the chord tensions; False where a cable has no chord."""
+    """Fill chords, material, first-order sag forces and chord tension limits; False if a cable has no chord."""
     for i in range(robot.shape[0]):
         chord, sine = geometry[g.CHORD, i], geometry[g.SINE, i]
         if not chord >= SHORTEST_CHORD:
@@ -134,9 +134,9 @@ def place_cables(model: Model, limits: TensionLimits, robot: Array, geometry: Ar
         if limits.quantity == codes.LIMITS_OF_FRAME_END:
             line, material, pulley = chord_of(cables, i), material_of(cables, i), pulley_of(cables, i)
             low = chord_tension_at_frame_end(model, line, material, pulley, low)
-            high = taut_at_frame_end(model, line, material, pulley, high, 0.0)  # 0: no cable has so little tension
+            high = taut_at_frame_end(model, line, material, pulley, high, 0.0)  # 0: no cable has so small a tension
         if not math.isnan(limits.validity):
-            # on a vertical cable T_x is zero, and so is a margin of zero
+            # the horizontal tension T_x of a vertical cable is zero; a T_adj of zero is then satisfied too
             margin = limits.validity / cables.cosine[i] if limits.validity > 0.0 else 0.0
             low = max(low, cables.half_weight[i] / abs(sine) + margin)
         cables.low[i] = low

@@ -1,6 +1,6 @@
 """Structure matrix and needed wrench, also along the free motions of a platform; docs/model.md, section 4.
 
-The rows `free` (n, 6) select the free motions, each times the unit of its motion; each row has one nonzero entry.
+The rows `free` (n, 6) select the free motions. Each row has one nonzero entry, the unit of its motion.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sagline.kernels.jit import entry, formula, glue, kernel
 
 @glue
 def translation_count(freedom: Array) -> int:
-    """Number of free translations; they come before the free rotations."""
+    """Number of free translations, which are listed before the free rotations."""
     count = 0
     for k in range(freedom.shape[0]):
         count += 0 if is_rotation(freedom, k) else 1
@@ -24,7 +24,7 @@ def translation_count(freedom: Array) -> int:
 
 @formula
 def is_rotation(freedom: Array, k: int) -> bool:
-    """True if free motion k of the platform is a rotation; the translations come first."""
+    """True if free motion k of the platform is a rotation; the translations are listed first."""
     return freedom[k, 3] * freedom[k, 3] + freedom[k, 4] * freedom[k, 4] + freedom[k, 5] * freedom[k, 5] > 0.5
 
 
@@ -89,7 +89,7 @@ def norm(vector: Array) -> float:
 
 @formula
 def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
-    """Fill J (6, m): columns (u; r x u), u the unit vector from platform end to frame end."""
+    """Fill J (6, m): its columns are (u; r x u) with u the unit vector from platform end to frame end."""
     for i in range(geometry.shape[1]):
         x = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_X, i]
         y = -geometry[g.COSINE, i] * geometry[g.AZIMUTH_Y, i]
@@ -107,8 +107,9 @@ def fill_structure_matrix(geometry: Array, matrix: Array) -> None:
 def needed_wrench(geometry: Array, body: Array, wrench: Array, sag_force: Array, needed: Array) -> None:
     """Fill the wrench (6,) that the chord tensions must supply: J tau = needed.
 
-    It balances the platform's weight (counted here, once), the given wrench (external plus inertial,
-    about the center of mass) and the cables' sag forces T_z - tau sin phi (m,), which act at the platform ends.
+    It balances three loads: the platform's weight, which no other argument includes; the given wrench (external plus
+    inertial, about the center of mass); and the cables' sag forces T_z - tau sin phi (m,), which act at the platform
+    ends.
     """
     fz = body[tables.MASS] * body[tables.GRAVITY] - wrench[2]
     mx = -wrench[3]

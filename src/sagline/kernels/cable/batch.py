@@ -1,4 +1,4 @@
-"""Loops over many cables: states, shapes, sags, closure errors, and creep. An operand of length 1 applies to all."""
+"""Loops over many cables: states, shapes, sags, closure errors, and creep. Operands of length 1 apply to all cables."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sagline.kernels.cable.models import from_length, from_tension, sag_of_shall
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.jit import entry, kernel
 
-CHUNK = 256  # cables at a time: so many buffers of this length stay in the fastest cache
+CHUNK = 256  # cables per chunk: the buffers of this length fit into the fastest cache of the processor
 BUFFERS = 11
 
 
@@ -49,9 +49,9 @@ def batch_from_tension(
 ) -> None:
     """Length, forces on the platform end and status of every cable at its chord tension.
 
-    Ordinary catenaries are solved for a whole chunk in loops without branches; other cables
-    are solved again, one by one. Each loop has one result, because the compiler does not vectorize more.
-    buffer is a work array, (BUFFERS, CHUNK).
+    Loops without branches solve all cables of a chunk as ordinary catenaries. Other cables are then solved again, one
+    by one. Each loop has one result, because the compiler does not vectorize more. buffer is a work array, (BUFFERS,
+    CHUNK).
     """
     model = model_of(terms)
     count = length_out.shape[0]
@@ -141,7 +141,7 @@ def batch_end(
 def catenary_point(
     fraction: float, horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> tuple[float, float]:
-    """Point at a fraction of the unstrained length from the frame end: the end of the cable's first part."""
+    """Point at a fraction of the unstrained length from the frame end; it is the end of the cable's first part."""
     part = fraction * length
     return catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
 
@@ -159,7 +159,7 @@ def shape_points(
     tension: Array,
     points_out: Array,
 ) -> None:
-    """Points (cables, points, 2) at equal steps of unstrained length; the shallow models draw a parabola."""
+    """Points (cables, points, 2) at equal steps of unstrained length; parabolas for the shallow models."""
     model = model_of(terms)
     count = points_out.shape[1]
     for i in range(points_out.shape[0]):
@@ -178,7 +178,7 @@ def shape_points(
 
 @kernel
 def _shallow_drop(t: float, model: Model, span: float, rise: float, vertical: float, tension: float) -> float:
-    """Drop below the chord [m] at a fraction t of it: b D t (1 - t)/tau, with b the sag force on the end."""
+    """Drop below the chord [m] at a fraction t of the chord: b D t (1 - t)/tau; b: sag force at the platform end."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or tension == 0.0:
         return 0.0
     chord = math.hypot(span, rise)
@@ -192,7 +192,7 @@ def _catenary_sag(
 ) -> float:
     """Largest drop below the chord [m]; on a vertical chord, the drop below its lower end."""
     slope = rise / span if span > 0.0 else 0.0
-    # point with a tangent parallel to the chord (vertical chord: the turning point), as a length from the frame end
+    # length from the frame end to the point whose tangent is parallel to the chord (to the turning point if vertical)
     part = length - (vertical - horizontal * slope) / weight
     part = min(max(part, 0.0), length)
     x, z = catenary_end(horizontal, vertical - weight * (length - part), part, weight, stiffness)
@@ -239,7 +239,7 @@ def closures(
 ) -> None:
     """Error of each cable in the equations of its model [m].
 
-    Catenary: distance of its computed end from the platform end. Others: the error in length.
+    Catenary: distance of its computed end from the platform end. Other models: error of the length.
     """
     model = model_of(terms)
     for i in range(residual_out.shape[0]):
@@ -265,16 +265,16 @@ def closures(
 def creep_strains(
     time: Array, tension: Array, stiffness: Array, delay: Array, settled: Flags, strain_out: Array
 ) -> None:
-    """Sum of the late strains of springs with dampers beside them, exact for tensions that change evenly.
+    """Sum of the delayed strains of springs with parallel dampers, exact for piecewise linear tensions.
 
-    Samples whose tension is NaN are left out: the tension changes evenly over the gap.
+    Samples whose tension is NaN are omitted; the tension is then linear in time between their neighbors.
 
     Args:
         time: Times of the samples [s], increasing, (N,).
         tension: Tensions [N], (N, m).
         stiffness: Stiffness of each element [N], (k,).
         delay: Delay time of each element [s], (k,).
-        settled: Whether the first tension has long acted, (1,); else the strain begins at zero.
+        settled: True if the first tension has acted for a long time, (1,); otherwise the initial strain is zero.
         strain_out: (N, m).
     """
     for i in range(tension.shape[1]):
@@ -289,9 +289,7 @@ def creep_strains(
                     strain = tension[p, i] / stiffness[k] if settled[0] else 0.0
                 else:
                     step = time[p] - time[before]
-                    late = (
-                        (tension[p, i] - tension[before, i]) / step * delay[k]
-                    )  # by how much it lags when it has run in
+                    late = (tension[p, i] - tension[before, i]) / step * delay[k]  # lag after the initial transient
                     begin, end = tension[before, i] - late, tension[p, i] - late
                     strain = (end + (strain * stiffness[k] - begin) * math.exp(-step / delay[k])) / stiffness[k]
                 strain_out[p, i] += strain

@@ -12,10 +12,10 @@ from sagline.kernels.memory import Memory, block
 
 
 class Cables(NamedTuple):
-    """Data of the cables of one pose, m values per field.
+    """Data of the cables of one pose, with m values per field.
 
-    The free span of a cable runs from where it leaves its pulley to its platform end. Where nothing is behind any
-    cable the free spans are the cables themselves, and the words for them name the same memory.
+    The free span of a cable is its part between the exit point of its pulley and its platform end. If no cable has a
+    pulley or dead length, the free spans are the whole cables, and their fields share the memory of the cables' fields.
     """
 
     machine: bool  # True if any cable has a pulley or dead length
@@ -42,14 +42,14 @@ class Cables(NamedTuple):
     wrap_sine: Array  # sine of the wrap angle psi
     wrap_cosine: Array  # cosine of psi
     radius: Array  # pulley radius [m]
-    entry: Array  # +1 where a cable enters its pulley from below, -1 from above
+    entry: Array  # +1 if the cable enters its pulley from below, -1 if from above
     dead: Array  # dead length [m]
     rise: Array  # height of the frame anchor above the drum [m]
 
 
 @glue
 def new_cables(memory: Memory, m: int, machine: bool) -> tuple[Cables, Memory]:
-    """Work arrays for m cables, behind which there may be something (machine), and the memory that is left."""
+    """Work arrays for m cables, with pulleys or dead lengths if `machine` is true, and the remaining memory."""
     own, memory = block(memory, 20, m)
     other, memory = block(memory, 6, m)
     free = other if machine else own[:6]

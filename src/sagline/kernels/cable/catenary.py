@@ -1,4 +1,4 @@
-"""One elastic catenary (Irvine), all three directions, without cancellation.
+"""One elastic catenary (Irvine), solved for any of its three unknowns without cancellation.
 
 docs/model.md, section 2. Forces act on the cable at its platform end; z points up. The equations
 are written in ratios that stay regular as the weight per length w goes to zero.
@@ -23,21 +23,21 @@ from sagline.kernels.algebra.functions import (
 from sagline.kernels.cable.terms import Force
 from sagline.kernels.jit import formula, kernel
 
-RANGE = 500.0  # largest X = wD/(2 tau): sinh X overflows beyond it; practical cables are far below
-TAUT_STRAIN = 0.01  # largest e = tau/EA at which two Newton steps reach the last digit
-ORDINARY_STRAIN = 0.1  # largest e at which three Newton steps do
+RANGE = 500.0  # largest X = wD/(2 tau): sinh X overflows above it; practical cables are far below
+TAUT_STRAIN = 0.01  # largest e = tau/EA at which two Newton steps reach full precision
+ORDINARY_STRAIN = 0.1  # largest e at which three Newton steps reach full precision
 STEPS = 80
-# Relative steps after which the next one is below rounding: Newton's method squares the error, Halley's cubes it.
+# Relative steps after which the next step is below rounding: Newton's method squares the error, Halley's cubes it.
 SMALL_NEWTON_STEP = 1e-9
 SMALL_HALLEY_STEP = 1e-6
 
 
 @kernel
 def slack_series(horizontal: float, vertical_a: float, vertical: float, tension_a: float, tension_b: float) -> float:
-    """atanh(u)/u of P1 where u = (T_zB - T_zA)/(T_A + T_B) may be close to 1; infinite for a fold."""
+    """The ratio atanh(u)/u of P1 if u = (T_zB - T_zA)/(T_A + T_B) may be close to 1; infinite for a fold."""
     total = tension_a + tension_b
     u = (vertical - vertical_a) / total
-    # total (1 - u) from sums of positive terms, not by subtraction
+    # T_A + T_B times (1 - u), from sums of positive terms instead of a subtraction
     square = horizontal * horizontal
     rest = square / (tension_b + abs(vertical)) + square / (tension_a + abs(vertical_a))
     if vertical * vertical_a > 0.0:
@@ -65,7 +65,7 @@ def catenary_end(
 
 @formula
 def is_ordinary(half_weight: float, strain: float) -> bool:
-    """True if the ordinary steps are exact to the last digit: X <= 2 and e <= 0.1."""
+    """True if the steps for ordinary cables reach full precision: X <= 2 and e <= 0.1."""
     return half_weight * half_weight <= POLYNOMIAL_LIMIT and strain <= ORDINARY_STRAIN
 
 
@@ -86,15 +86,15 @@ def _ordinary_newton_step(ratio: float, square: float, cosine2: float, sine2: fl
 
 @formula
 def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> float:
-    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; up to 0.1 it needs a third.
+    """P3 by two Newton steps: L/D for X = wD/(2 tau) <= 2 and e = tau/EA <= 0.01; a third step is needed up to e = 0.1.
 
-    Free of branches, so that a loop over cables vectorizes: two calls, not a loop, for the same reason.
+    The function has no branches and no loop, so that a loop over cables vectorizes.
     """
     cosine2 = cosine * cosine
     sine2 = sine * sine
     square = half_weight * half_weight
     start = sinhc_polynomial(square)
-    ratio = math.sqrt(start * start * cosine2 + sine2)  # the inextensible answer
+    ratio = math.sqrt(start * start * cosine2 + sine2)  # solution of the inextensible cable
     ratio = ratio / (1.0 + strain * ratio)
     ratio = _ordinary_newton_step(ratio, square, cosine2, sine2, strain)
     return _ordinary_newton_step(ratio, square, cosine2, sine2, strain)
@@ -102,13 +102,13 @@ def ordinary_length_ratio(half_weight: float, sine: float, cosine: float, strain
 
 @formula
 def ordinary_length_ratio_near(half_weight: float, sine: float, cosine: float, strain: float, ratio: float) -> float:
-    """One Newton step from an approximate ratio: that of a similar tension, or the result of two steps."""
+    """One Newton step from an approximate ratio: the ratio at a similar tension, or the result of two steps."""
     return _ordinary_newton_step(ratio, half_weight * half_weight, cosine * cosine, sine * sine, strain)
 
 
 @kernel
 def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) -> tuple[float, int]:
-    """P3 anywhere: L/D and a status, by Newton steps kept inside a bracket."""
+    """P3 for any cable: L/D and a status, by Newton steps within a bracket."""
     if is_ordinary(half_weight, strain):
         ratio = ordinary_length_ratio(half_weight, sine, cosine, strain)
         if strain > TAUT_STRAIN:
@@ -151,7 +151,7 @@ def length_ratio(half_weight: float, sine: float, cosine: float, strain: float) 
 
 @kernel
 def sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
-    """Contribution of the weight to the vertical platform-end force, in chord tensions: T_z/tau - sin phi."""
+    """Part of the vertical platform-end force due to weight, divided by the chord tension: T_z/tau - sin phi."""
     taut = 1.0 - strain * ratio
     h = half_weight * taut
     s = taut * sinhc(h)
@@ -161,7 +161,7 @@ def sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float
 
 @formula
 def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, ratio: float) -> float:
-    """`sag_force_ratio` of an ordinary cable, free of branches."""
+    """`sag_force_ratio` of an ordinary cable, without branches."""
     taut = 1.0 - strain * ratio
     y = half_weight * half_weight * taut * taut
     s = taut * sinhc_polynomial(y)
@@ -171,7 +171,7 @@ def ordinary_sag_force_ratio(half_weight: float, sine: float, strain: float, rat
 
 @formula
 def _product_error(a: float, product: float) -> float:
-    """a*a - product exactly, where product is a*a rounded (Dekker)."""
+    """a*a - product exactly; product is a*a with rounding (Dekker)."""
     split = 134217729.0 * a  # 2^27 + 1
     high = split - (split - a)
     low = a - high
@@ -203,7 +203,7 @@ def _parameter_start(xi: float, zeta: float, kappa: float, excess: float) -> flo
     h = math.sqrt(max(-p, 0.0)) + np.cbrt(q)
     if p * h > q:
         h = q / p
-    for _ in range(2):  # from above on a convex cubic: monotone
+    for _ in range(2):  # Newton steps from above on a convex cubic are monotone
         h -= (h * (h * h + p) - q) / (3.0 * h * h + p)
     if h > 1.0:
         steep = zeta / (1.0 + kappa)
@@ -240,7 +240,7 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
             high = h
         else:
             low = h
-        if error > 1.0:  # exponential there: Newton on its logarithm
+        if error > 1.0:  # the function is exponential here: Newton steps on its logarithm
             new = h - math.log1p(error) * (1.0 + error) / slope
         else:  # Halley
             new = h - error * slope / (slope * slope - error * bend)
@@ -255,14 +255,14 @@ def _catenary_parameter(xi: float, zeta: float, kappa: float, excess: float) -> 
 
 @formula
 def _vertical_from_length(rise: float, length: float, weight: float, stiffness: float) -> tuple[float, float, int]:
-    """P2 on a vertical chord, in closed form: vertical force, chord tension and a status."""
+    """P2 on a vertical chord, in closed form: returns vertical force, chord tension and a status."""
     height = abs(rise)
     kappa = 0.5 * weight * length / stiffness
     stretch = (height - length) / length  # exact difference for a taut cable
     if stretch >= kappa:
         sag_force = stiffness * stretch
         vertical = math.copysign(sag_force, rise) + 0.5 * weight * length
-        # tanh h = kappa/stretch; a weightless cable has h = 0 and carries the sag force alone
+        # tanh h = kappa/stretch; a weightless cable has h = 0
         h = math.atanh(kappa / stretch) if stretch > kappa else math.inf
         tension = sag_force if weight == 0.0 else 0.5 * weight * height / (h + kappa)
         return vertical, tension, codes.CABLE_SOLVED if tension > 0.0 else codes.CABLE_SLACK

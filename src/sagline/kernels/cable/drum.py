@@ -1,4 +1,4 @@
-"""Cable on a drum: number of turns as a function of the length off the drum, and memory of the winding tension.
+"""Cable on a drum: number of turns as a function of the length off the drum, and the strain at which it was wound.
 
 Turns count from the drum's first groove, where the cable is fastened, and increase with the cable on the drum.
 Layer k lies in the grooves between the turns of the layer below it, and advances in the opposite direction.
@@ -15,16 +15,16 @@ from sagline.kernels.jit import entry, formula
 # columns of the table of drums
 PITCH_RADIUS, LAYER_RISE, GROOVE_PITCH, LAYER_TURNS, LAYERS, DISTANCE, OFFSET = range(7)
 DRUM_COLUMNS = 7
-# rows of what a drum remembers: a piece of cable from its deeper end, where it began to be wound in, to its upper one
+# rows of a drum's memory: each column is a piece of cable from its deeper end, which was wound first, to its upper end
 DEEP_LENGTH, DEEP_PATH, DEEP_STRAIN, TOP_STRAIN = range(4)
 MEMORY_ROWS = 4
-STEPS = 60  # a convex function of one variable: Newton needs two or three
-SETTLED = 1e-8  # turns, or of all turns: the step after would be its square
+STEPS = 60  # limit of Newton steps; a convex function of one variable needs two or three
+SETTLED = 1e-8  # last step in turns, or relative to all turns: the next step would be its square
 
 
 @formula
 def _slant_length(distance: float, offset: float) -> float:
-    """Extra length of the run to the pulley because it is slanted; zero at infinite distance [m]."""
+    """Extra length [m] of the slanted cable between drum and pulley; zero at infinite distance."""
     return offset * offset / (math.sqrt(distance * distance + offset * offset) + distance)
 
 
@@ -37,7 +37,7 @@ def _turn_length(drum: Array, layer: int) -> float:
 
 @formula
 def _exit_position(drum: Array, layer: int, turns: float) -> tuple[float, float]:
-    """Place where the cable leaves the drum in a layer, from the pulley's middle, and its advance per turn."""
+    """Axial position at which the cable leaves the drum, from the pulley's middle, and its change per turn."""
     if layer % 2 == 0:
         return drum[OFFSET] + drum[GROOVE_PITCH] * turns, drum[GROOVE_PITCH]
     return drum[OFFSET] + drum[GROOVE_PITCH] * (drum[LAYER_TURNS] - turns), -drum[GROOVE_PITCH]
@@ -107,17 +107,17 @@ def lengths_of_turns(drums: Array, starts: Array, turns: Array, length_out: Arra
 def follow_memory(
     given: Array, strain: Array, rest_strain: Array, unstrained: bool, found_out: Array, memory: Array
 ) -> None:
-    """From unstrained lengths off the drum to those at the tensions with which the rest was wound, or back.
+    """Conversion between unstrained lengths off the drum and lengths along the path of winding.
 
-    Cable that is wound in keeps its strain, which changes evenly from sample to sample, until it is paid out again;
-    below what was ever off the drum lies cable of one strain. Samples that are NaN are left out.
+    Cable keeps the strain at which it is wound in until it is let out again. This strain is linear between two samples.
+    Cable that was never off the drum has the initial strain. Samples that are NaN are omitted.
 
     Args:
-        given: Lengths off the drum [m], (N, m): unstrained ones, or those along the path of winding.
+        given: Lengths off the drum [m], (N, m): unstrained, or along the path of winding.
         strain: Strain of the cable at the drum, at each sample, (N, m).
         rest_strain: Initial strain of the cable on the drum, (m,).
         unstrained: True if the given lengths are unstrained.
-        found_out: Lengths of the other kind [m], (N, m).
+        found_out: Filled with the lengths of the other kind [m], (N, m).
         memory: Work array, (MEMORY_ROWS, N).
     """
     for i in range(given.shape[1]):

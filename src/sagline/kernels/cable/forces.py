@@ -1,8 +1,8 @@
 """Forces of all cables of one pose at their unstrained lengths.
 
-Most calls come from a pose close by. Ordinary catenaries therefore take two Halley steps from the parameter h they
-had there, in loops without branches, which vectorize; cables that have not converged then are solved alone, from the
-start.
+Most calls are for a pose close to the previous one. Ordinary catenaries therefore take two Halley steps from the
+parameter h of the previous pose. These loops have no branches, so that they vectorize. Cables that have not converged
+afterwards are solved one by one, from the beginning.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from sagline.kernels.cable.over_pulleys import fill_equivalent_cables, start_pas
 from sagline.kernels.cable.terms import Material, Model
 from sagline.kernels.jit import formula, glue
 
-CLOSE = 0.1  # relative first step within which two Halley steps are trusted
-ORDINARY = 2.0  # largest h at which the polynomials are exact
-PASSES = 30  # largest number of passes over pulleys; one or two suffice from a close pose
+CLOSE = 0.1  # relative first step up to which two Halley steps are accurate
+ORDINARY = 2.0  # largest h at which the polynomials have full precision
+PASSES = 30  # largest number of passes over pulleys; one or two suffice from a nearby pose
 MISSED = 1e-13  # tolerance of the platform end, relative to the cable's length
 
 
 @formula
 def _halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float) -> float:
-    """One Halley step on P2 (docs/model.md, section 2) for h <= 2, free of branches."""
+    """One Halley step on P2 (docs/model.md, section 2) for h <= 2, without branches."""
     y = h * h
     more = h * y * sinh_excess_polynomial(y)  # sinh h - h
     s = h + more
@@ -51,13 +51,13 @@ def _halley_step(h: float, xi2: float, zeta2: float, kappa: float, excess: float
 
 @formula
 def _square_share(part: float, length: float) -> float:
-    """(part/length)^2."""
+    """The square of part/length."""
     ratio = part / length
     return ratio * ratio
 
 
 class _EquivalentCables(NamedTuple):
-    """The cables that are solved, each of m values: span, rise and unstrained length [m], EA [N]."""
+    """Data of the cables to solve, m values each: span, rise and unstrained length [m], EA [N]."""
 
     span: Array
     rise: Array
@@ -67,7 +67,7 @@ class _EquivalentCables(NamedTuple):
 
 @glue
 def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
-    """Two Halley steps for every cable from the remembered parameter; one result a loop, so that each vectorizes."""
+    """Two Halley steps for every cable from the stored parameter; one result per loop, so that each loop vectorizes."""
     m = cables.shape[0]
     for i in range(m):
         rows[g.KAPPA, i] = 0.5 * cables[i, tables.DENSITY] * gravity * asked.length[i] / asked.stiffness[i]
@@ -85,7 +85,7 @@ def _two_halley_steps(gravity: float, cables: Array, asked: _EquivalentCables, r
 
 @formula
 def _has_converged(rows: Array, i: int) -> bool:
-    """True if the second step is exact; false for NaN."""
+    """True if the second step has full precision; False for NaN."""
     first, second, kappa = rows[g.FIRST, i], rows[g.SECOND, i], rows[g.KAPPA, i]
     near = abs(first - rows[g.PARAMETER, i]) <= CLOSE * (first + kappa)
     return near and abs(second - first) <= SMALL_HALLEY_STEP * (second + kappa) and 0.0 < second < ORDINARY
@@ -95,10 +95,11 @@ def _has_converged(rows: Array, i: int) -> bool:
 def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool | None) -> None:
     """Fill T_x, T_z, tau and status of every cable of a pose from its geometry and length.
 
-    Cables over pulleys are solved in passes, as cables that start where the chord touches; docs/model.md, section 10.
+    Cables over pulleys are solved in passes, as cables that start where the chord touches the pulley; docs/model.md,
+    section 10.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m);
-    behind: that of the model, by itself, so that what it rules out is not compiled.
+    behind: that of the model, as a separate argument, so that None excludes unused code from compilation.
     """
     if behind is None:
         bare = _EquivalentCables(rows[g.SPAN], rows[g.RISE], rows[g.LENGTH], cables[:, tables.STIFFNESS])
@@ -120,7 +121,7 @@ def forces_from_lengths(model: Model, cables: Array, rows: Array, behind: bool |
 
 @glue
 def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCables, rows: Array) -> None:
-    """Fill T_x, T_z, tau and status of the cables that are asked for."""
+    """Fill T_x, T_z, tau and status of the cables given by `asked`."""
     exact = model.code == codes.CATENARY
     if exact:
         _two_halley_steps(model.gravity, cables, asked, rows)
@@ -145,6 +146,6 @@ def _solve_equivalent_cables(model: Model, cables: Array, asked: _EquivalentCabl
         rows[g.VERTICAL, i] = force.vertical
         rows[g.TENSION, i] = force.tension
         rows[g.STATUS, i] = status
-        # h back from tau = wD/(2 (h + kappa)), for the next pose
+        # h from tau = wD/(2 (h + kappa)), for the next pose
         h = 0.5 * weight * chord / force.tension - rows[g.KAPPA, i] if force.tension > 0.0 else math.nan
         rows[g.PARAMETER, i] = h

@@ -1,6 +1,6 @@
-"""Span, rise and azimuth of each cable from anchors and pose, and the rows of the array of all cables of a pose.
+"""Span, rise and azimuth of each cable from anchors and pose, and the rows of the array for all cables of a pose.
 
-This is the only place where they are computed; docs/model.md, section 1.
+No other module computes span, rise and azimuth; docs/model.md, section 1.
 """
 
 from __future__ import annotations
@@ -35,11 +35,12 @@ def _rotation_matrix(pose: Array, rotation: Array) -> None:
 
 @formula
 def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[float, float, float]:
-    """Length, sin phi and cos phi of the line from a pulley that touches it and ends at a point; NaN if there is none.
+    """Length, sin phi and cos phi of the tangent from a pulley to a point; NaN if no tangent exists.
 
-    The pulley is in the cable's vertical plane; span and rise count from where the cable enters it, entry is +1
-    for one that comes from below. No tangent leads to a point inside the pulley, or past its near side: straight
-    below (above, for a cable from above) the exit is twice the radius from the entry.
+    The pulley is in the cable's vertical plane. Span and rise are measured from the point where the cable enters the
+    pulley. entry is +1 for a cable that enters from below. No tangent leads to a point inside the pulley, or past its
+    near side: for a point straight below (above, for a cable from above), the exit is twice the radius away from the
+    entry.
     """
     across = span - radius
     along = entry * rise
@@ -55,7 +56,7 @@ def tangent(radius: float, entry: float, span: float, rise: float) -> tuple[floa
 def cable_geometry(cables: Array, body: Array, pose: Array, rotation: Array, geometry: Array) -> None:
     """Fill the geometry rows (GEOMETRY_ROWS, m) of one pose; a vertical cable gets azimuth 0.
 
-    The chord of a cable over a pulley is the tangent from its platform end; NaN where there is none.
+    The chord of a cable over a pulley is the tangent from its platform end, NaN if no tangent exists.
     """
     _rotation_matrix(pose, rotation)
     for i in range(cables.shape[0]):
@@ -105,17 +106,18 @@ def cable_geometries(robots: Array, bodies: Array, poses: Array, rotation: Array
 LENGTH = GEOMETRY_ROWS  # unstrained length [m]
 HORIZONTAL, VERTICAL, TENSION = LENGTH + 1, LENGTH + 2, LENGTH + 3  # T_x, T_z, tau [N]
 STATUS = LENGTH + 4  # status of the cable
-# of `cable_forces`; PARAMETER is h, kept from pose to pose, NaN where there was none
+# rows of `cable_forces`; PARAMETER is h, kept from pose to pose, NaN if the previous pose had none
 PARAMETER, KAPPA, EXCESS, FIRST, SECOND = LENGTH + 5, LENGTH + 6, LENGTH + 7, LENGTH + 8, LENGTH + 9
 XX, XZ, ZX, ZZ = LENGTH + 10, LENGTH + 11, LENGTH + 12, LENGTH + 13  # in-plane stiffness [N/m]
-SOFT = LENGTH + 14  # EA that `cable_forces` computes with [N]
-# Of cables over pulleys. What a cable without one is asked for in its stead: span and rise [m], length [m]; and what is
-# added to them so that the answer is that of the cable, kept from pose to pose.
+SOFT = LENGTH + 14  # EA of the cable that `cable_forces` solves [N]
+# Rows of cables over pulleys. The ASKED rows contain span, rise and length [m] of an equivalent cable without a pulley.
+# The OFF rows contain the corrections [m] of these values with which its forces are those of the cable; they are kept
+# from pose to pose.
 ASKED_SPAN, ASKED_RISE, ASKED_LENGTH = LENGTH + 15, LENGTH + 16, LENGTH + 17
 OFF_X, OFF_Z, OFF_LENGTH = LENGTH + 18, LENGTH + 19, LENGTH + 20
 FREE_SPAN, FREE_RISE, FREE_LENGTH = LENGTH + 21, LENGTH + 22, LENGTH + 23  # of the free span [m]
 WRAP, WRAP_SINE, WRAP_COSINE = LENGTH + 24, LENGTH + 25, LENGTH + 26  # psi [rad]
-LEAVING, TOTAL = LENGTH + 27, LENGTH + 28  # tension where it leaves, T_A, and T_A + T_B [N]
-BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # straight cable behind the chord; where the span ends [m]
+LEAVING, TOTAL = LENGTH + 27, LENGTH + 28  # tension T_A at the exit point, and T_A + T_B [N]
+BEHIND, END_X, END_Z = LENGTH + 29, LENGTH + 30, LENGTH + 31  # cable behind the chord; end of the free span [m]
 ACROSS = LENGTH + 32  # stiffness normal to the plane [N/m]
 CABLE_ROWS = LENGTH + 33

@@ -24,7 +24,7 @@ STEPS = 60
 
 @kernel
 def stretching_tension(tension: float, sine: float, cosine: float, sag_force: float) -> float:
-    """Magnitude of the force on the platform end [N]; the chord tension itself where sag force is 0."""
+    """Magnitude of the force on the platform end [N]; the chord tension if the sag force is 0."""
     return math.hypot(tension * cosine, tension * sine + sag_force)
 
 
@@ -32,7 +32,7 @@ def stretching_tension(tension: float, sine: float, cosine: float, sag_force: fl
 def shallow_length_ratio(
     tension: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float
 ) -> float:
-    """L/D; sag = k (rho D cos phi)^2 [N^2], sag force = b [N] where the stretch includes it."""
+    """L/D; sag = k (rho D cos phi)^2 [N^2]; sag force = b [N] if the stretching tension includes it, else 0."""
     return (1.0 + sag / (tension * tension)) / (1.0 + stretching_tension(tension, sine, cosine, sag_force) / stiffness)
 
 
@@ -40,10 +40,10 @@ def shallow_length_ratio(
 def shallow_tension(
     chord: float, sine: float, cosine: float, sag_force: float, sag: float, stiffness: float, length: float
 ) -> tuple[float, bool]:
-    """Chord tension at which the shallow cable has the given length, and whether it was found.
+    """Chord tension at which the shallow cable has the given length, and True if it was found.
 
-    Newton from above on the cubic of the parabolic model, then on the model's own length, bracketed.
-    A cable without sag that is longer than its chord carries nothing: 0.
+    Newton steps start from above on the cubic of the parabolic model, and continue on the model's own length within a
+    bracket. A cable without sag that is longer than its chord has the tension 0.
     """
     p = (length - chord) / length * stiffness
     q = stiffness * chord * sag / length
@@ -82,7 +82,7 @@ def shallow_tension(
 
 @kernel
 def shallow_sag_force(model: Model, chord: float, density: float) -> float:
-    """First-order sag force T_z - tau sin phi of the weight on the platform end [N]; 0 for weightless models."""
+    """First-order sag force T_z - tau sin phi at the platform end [N]; 0 for weightless models."""
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC:
         return 0.0
     if model.code == codes.EMPIRICAL:
@@ -123,7 +123,7 @@ def from_tension(model: Model, chord: Chord, material: Material, tension: float)
 
 @kernel
 def from_length(model: Model, span: float, rise: float, material: Material, length: float) -> tuple[Force, int]:
-    """Force on the platform end and status of a cable of a length."""
+    """Force on the platform end and status of a cable of given length."""
     if model.code == codes.STRAIGHT:
         return Force(math.nan, math.nan, math.nan), codes.CABLE_NO_TENSION
     weight = material.density * model.gravity

@@ -1,8 +1,9 @@
-"""The cables of one pose over pulleys, of given unstrained lengths; docs/model.md, section 10.
+"""Cables over pulleys, of given unstrained lengths, at one pose; docs/model.md, section 10.
 
-A cable is solved as one that starts where its chord touches the pulley, is shorter by what is behind that point and
-softer by the share it has of the stretch. What that one misses is added to what is asked for, pass by pass; from a pose
-close by it was missed there already, and one or two passes do. Loops of one result each, without branches, vectorize.
+Each cable is replaced by an equivalent cable without a pulley, which starts where the chord touches the pulley. The
+equivalent cable is shorter by the length behind that point, and softer because that length stretches too. The error of
+its platform end is added to its span and rise in the next pass. The corrections are kept from pose to pose, so that one
+or two passes suffice for a nearby pose. Each loop has one result and no branches, so that it vectorizes.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from sagline.kernels.cable.pulley import (
 from sagline.kernels.cable.terms import Chord, Material, Model, PlaneStiffness
 from sagline.kernels.jit import formula, glue
 
-LEAST_FREE = 1e-3  # of a cable's length: what is asked for is never shorter
+LEAST_FREE = 1e-3  # shortest equivalent cable, relative to the cable's length
 TINY = 1e-300  # [N]; avoids a division by zero force
-ORDINARY_END = math.sqrt(EXCESS_LIMIT)  # of u = wL/(T_A + T_B): up to here the series of P1 is a polynomial
+ORDINARY_END = math.sqrt(EXCESS_LIMIT)  # largest u = wL/(T_A + T_B) for which the series of P1 is a polynomial
 
 
 @formula
@@ -55,7 +56,7 @@ def _wrap_at(rows: Array, i: int) -> Wrap:
 
 @glue
 def start_passes(cables: Array, rows: Array) -> None:
-    """Fill the cable behind the chords, and reset the errors where the previous pose left no parameter."""
+    """Fill the cable lengths behind the chords, and reset corrections if the previous pose left no parameter."""
     for i in range(rows.shape[1]):
         rows[g.BEHIND, i] = straight_behind(pulley_at(cables, i), chord_at(rows, i))
     for i in range(rows.shape[1]):
@@ -65,7 +66,7 @@ def start_passes(cables: Array, rows: Array) -> None:
 
 @glue
 def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
-    """Fill the equivalent cables, which are solved in place of those over pulleys."""
+    """Fill the equivalent cables, which are solved in place of the cables over pulleys."""
     m = rows.shape[1]
     for i in range(m):
         length = rows[g.LENGTH, i]
@@ -90,10 +91,10 @@ def fill_equivalent_cables(model: Model, cables: Array, rows: Array) -> None:
 
 @glue
 def update_from_equivalent_cables(model: Model, cables: Array, rows: Array) -> float:
-    """Fill the forces and free spans from those of the cables asked for; returns the largest miss, of the length.
+    """Fill forces and free spans from the equivalent cables; returns the largest error, relative to the length.
 
-    A miss is added to what is asked for next time: of the exact cable by how much its platform end is missed, of the
-    shallow ones by how much their length.
+    The error corrects the equivalent cables of the next pass. It is the error of the platform end for the exact cable,
+    and the error of the length for the shallow cables.
     """
     if model.code == codes.CATENARY:
         _exit_points_from_forces(model, cables, rows)
@@ -134,7 +135,7 @@ def _exit_points_from_forces(model: Model, cables: Array, rows: Array) -> None:
 
 @glue
 def _fill_free_span_ends(model: Model, cables: Array, rows: Array) -> None:
-    """Fill where the free spans of exact cables end; `catenary_end`, its ordinary cases in loops that vectorize."""
+    """Fill the ends of the free spans of exact cables, as `catenary_end`; loops for ordinary cables vectorize."""
     m = rows.shape[1]
     for i in range(m):
         x, z = rows[g.HORIZONTAL, i], rows[g.VERTICAL, i]
@@ -176,7 +177,7 @@ def _end_errors(rows: Array) -> float:
 
 @glue
 def _length_errors(model: Model, cables: Array, rows: Array) -> float:
-    """`_end_errors` for cables that leave along their chord: shallow cables, and weightless ones without error."""
+    """`_end_errors` for shallow and weightless cables, which leave along their chord; weightless ones have no error."""
     largest = 0.0
     for i in range(rows.shape[1]):
         material, pulley, chord = material_at(cables, i), pulley_at(cables, i), chord_at(rows, i)
@@ -200,7 +201,7 @@ def _length_errors(model: Model, cables: Array, rows: Array) -> float:
 
 @formula
 def _weight_per_length(model: Model, material: Material) -> float:
-    """Weight per length of the part behind P [N/m]; nonzero for the exact cable only."""
+    """Weight per length of the cable behind P [N/m]; nonzero for the exact cable only."""
     return material.density * model.gravity if model.code == codes.CATENARY else 0.0
 
 
@@ -212,9 +213,10 @@ def behind_at(model: Model, cables: Array, rows: Array, i: int) -> Behind:
 
 @formula
 def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> tuple[float, float, float]:
-    """Motion of the platform end at a fixed force per meter of cable, x and z, and per newton of H.
+    """Motion of the platform end at fixed force: x and z per meter of cable, and the share of it per newton of H.
 
-    The last is along the first, of which it is the share by which the part behind P gives way.
+    A newton of H moves the platform end in the same direction as cable that is let out. The third value is the length
+    of cable that has the same effect, because the part behind P stretches.
     """
     material, pulley, wrap, tension = (
         material_at(cables, i),
@@ -232,7 +234,7 @@ def end_motion_per_length(model: Model, cables: Array, rows: Array, i: int) -> t
 
 @formula
 def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane: PlaneStiffness) -> PlaneStiffness:
-    """In-plane stiffness of a cable, whose free span's is given, with the part behind P that gives way along it."""
+    """In-plane stiffness of a cable from that of its free span, in series with the part behind P."""
     if not rows[g.LEAVING, i] > 0.0:
         return plane
     x, z, gives = end_motion_per_length(model, cables, rows, i)
@@ -249,7 +251,7 @@ def stiffness_in_series(model: Model, cables: Array, rows: Array, i: int, plane:
 
 @formula
 def across_pulley(cables: Array, rows: Array, i: int) -> float:
-    """Stiffness of a cable normal to its plane [N/m]: the whole plane turns about the swivel axis."""
+    """Stiffness of a cable normal to its plane [N/m]; the whole plane turns about the swivel axis."""
     pulley = pulley_at(cables, i)
     if pulley.radius == 0.0:
         return rows[g.TENSION, i] / rows[g.CHORD, i]
@@ -258,7 +260,7 @@ def across_pulley(cables: Array, rows: Array, i: int) -> float:
 
 @formula
 def energy_over(model: Model, cables: Array, rows: Array, i: int) -> float:
-    """Energy [J] that the part behind P adds to that of the free span."""
+    """Energy [J] that the part behind P adds to the energy of the free span."""
     material, tension = material_at(cables, i), rows[g.LEAVING, i]
     weight, free = _weight_per_length(model, material), rows[g.FREE_LENGTH, i]
     return energy_behind(pulley_at(cables, i), weight, material.stiffness, tension, _wrap_at(rows, i), free)

@@ -1,9 +1,11 @@
 """A cable over the pulley at its frame anchor, and the straight run behind it; docs/model.md, section 10.
 
-The pulley swivels about a vertical axis through the anchor A, where the cable enters it, and so is in the cable's
-vertical plane. The cable leaves it at P along the force there, F_A = (T_x, T_zA): that force alone says where.
-Nothing rubs: H = T + T^2/(2 EA) - w z is one number along all of a cable, and -H its energy's slope by its length.
-With beta = w R/EA and E_A = 1 + T_A/EA, what is neglected on the pulley is of the order R beta^2.
+The pulley swivels about a vertical axis through the anchor A, where the cable enters it. It is therefore in the cable's
+vertical plane. The cable leaves the pulley at the point P in the direction of the force F_A = (T_x, T_zA) there. This
+force alone determines P.
+The model has no friction. H = T + T^2/(2 EA) - w z is therefore constant along the whole cable, and -H is the
+derivative of its energy by its length. With beta = w R/EA and E_A = 1 + T_A/EA, the neglected terms on the pulley are
+of the order R beta^2.
 """
 
 from __future__ import annotations
@@ -22,8 +24,8 @@ class Pulley(NamedTuple):
     """Pulley and dead length behind one frame anchor."""
 
     radius: float  # R [m]; 0 for an eyelet
-    entry: float  # s, +1 where the cable enters from below, -1 from above
-    dead: float  # length of the straight run from drum to anchor [m]
+    entry: float  # s, +1 if the cable enters from below, -1 if from above
+    dead: float  # length of the straight cable from drum to anchor [m]
     rise: float  # height of the anchor above the drum [m]
 
 
@@ -36,7 +38,7 @@ class Wrap(NamedTuple):
 
 
 class Behind(NamedTuple):
-    """Unstrained cable behind the point P where it leaves the pulley [m]."""
+    """Unstrained lengths [m] of the cable behind P: on the pulley, and between drum and pulley."""
 
     wrapped: float
     dead: float
@@ -90,7 +92,7 @@ def robots_have_machine(robots: Array) -> bool:
 
 @formula
 def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
-    """Horizontal distance from where a cable leaves its pulley to its platform end [m]; cosine of the wrap angle.
+    """Horizontal distance from the exit point to the platform end [m]; cosine: of the wrap angle.
 
     chord: that of the tangent from the platform end.
     """
@@ -99,13 +101,13 @@ def free_span(pulley: Pulley, chord: Chord, cosine: float) -> float:
 
 @formula
 def free_rise(pulley: Pulley, chord: Chord, sine: float) -> float:
-    """Height of the platform end above where a cable leaves its pulley [m]; sine of the wrap angle."""
+    """Height of the platform end above the exit point [m]; sine: of the wrap angle."""
     return chord.length * chord.sine + pulley.radius * (pulley.entry * (chord.cosine - sine))
 
 
 @formula
 def straight_behind(pulley: Pulley, chord: Chord) -> float:
-    """Length behind where the chord touches, of a cable that is not strained [m]."""
+    """Length of an unstrained cable behind the point where the chord touches the pulley [m]."""
     return pulley.radius * angle(chord.cosine, pulley.entry * chord.sine) + pulley.dead
 
 
@@ -119,7 +121,7 @@ def from_axis(pulley: Pulley, chord: Chord) -> float:
 def _strains(
     pulley: Pulley, weight: float, stiffness: float, tension: float, sine: float
 ) -> tuple[float, float, float]:
-    """E = 1 + e at P, where the cable enters the pulley, and where it leaves the drum; sine of the wrap angle."""
+    """E = 1 + e at three points: P, the entry of the pulley, and the drum; sine: of the wrap angle."""
     leaving = 1.0 + tension / stiffness
     entering = math.sqrt(leaving * leaving - 2.0 * pulley.entry * weight * pulley.radius / stiffness * sine)
     return leaving, entering, math.sqrt(entering * entering - 2.0 * weight * pulley.rise / stiffness)
@@ -127,7 +129,7 @@ def _strains(
 
 @formula
 def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> Behind:
-    """Unstrained length on the pulley and behind it, from the tension at P; weight per length, 0 for weightless."""
+    """Unstrained length on the pulley and behind it, from the tension at P; weight: per length [N/m]."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     beta = weight * pulley.radius / stiffness
     falls = pulley.entry * beta * (1.0 - wrap.cosine - wrap.angle * wrap.sine)
@@ -137,7 +139,7 @@ def behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap
 
 @formula
 def behind_cable(model: Model, material: Material, pulley: Pulley, tension: float, wrap: Wrap) -> Behind:
-    """`behind` for any model; only the exact cable has weight there, and the straight one does not stretch."""
+    """`behind` for any model; only the exact cable has weight there, and the straight cable does not stretch."""
     if model.code == codes.STRAIGHT:
         return Behind(pulley.radius * wrap.angle, pulley.dead)
     weight = material.density * model.gravity if model.code == codes.CATENARY else 0.0
@@ -146,7 +148,7 @@ def behind_cable(model: Model, material: Material, pulley: Pulley, tension: floa
 
 @formula
 def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap) -> float:
-    """S: how much unstrained length the part behind P gives for a newton more of H, E_A^2 S that at P [m/N]."""
+    """S [m/N]: unstrained length that the part behind P releases per newton of H; at P it is E_A^2 S."""
     strained, first, last = _strains(pulley, weight, stiffness, tension, wrap.sine)
     on_pulley = pulley.radius * wrap.angle / (strained * strained * strained)
     return (on_pulley + 2.0 * pulley.dead / ((first + last) * first * last)) / stiffness
@@ -154,7 +156,7 @@ def softness(pulley: Pulley, weight: float, stiffness: float, tension: float, wr
 
 @formula
 def energy_behind(pulley: Pulley, weight: float, stiffness: float, tension: float, wrap: Wrap, free: float) -> float:
-    """Energy [J] of the part behind P, and of lifting the free one (of unstrained length `free`) to P; z from A."""
+    """Energy [J] of the part behind P, and of lifting the free span (unstrained length `free`) from A to P."""
     radius, entry, dead, _rise = pulley
     strained, entering, drawn = _strains(pulley, weight, stiffness, tension, wrap.sine)
     first, last = entering - 1.0, drawn - 1.0
@@ -178,9 +180,9 @@ def _length_behind_by(
 ) -> tuple[float, float]:
     """Derivatives of wrap angle and unstrained length behind P at a fixed force on the platform end.
 
-    weight: weight per length [N/m]; stiffness: EA [N]; free: unstrained length of the free span [m]; change: what
-    changes; its length plays no part here; grown: by how much the free span's unstrained length grows. Returns changes
-    of psi, and of the length behind P.
+    weight: weight per length [N/m]; stiffness: EA [N]; free: unstrained length of the free span [m]; change: changes of
+    the parameters, of which the length has no effect here; grown: increase of the free span's unstrained length.
+    Returns the changes of psi and of the length behind P.
     """
     radius, entry, dead, rise = pulley
     vertical_a = force.vertical - weight * free
@@ -212,9 +214,9 @@ def _length_behind_by(
 def end_by(
     pulley: Pulley, material: Material, weight: float, force: Force, free: float, change: Change, by_weight: EndMotion
 ) -> EndMotion:
-    """Motion of the platform end at a fixed force on it per change of a cable's data; docs/model.md, section 10.
+    """Motion of the platform end at a fixed force on it due to a change of a cable's data; docs/model.md, section 10.
 
-    by_weight: how it moves by w alone at a fixed free length [m^2/N].
+    by_weight: motion per change of w alone at a fixed free length [m^2/N].
     """
     vertical_a = force.vertical - weight * free
     tension = math.sqrt(force.horizontal * force.horizontal + vertical_a * vertical_a)
@@ -224,7 +226,7 @@ def end_by(
     more = _length_behind_by(pulley, weight, material.stiffness, force, free, change, 1.0)[1] - still
     grown = (change.length - still) / (1.0 + more)
     turned = _length_behind_by(pulley, weight, material.stiffness, force, free, change, grown)[0]
-    # the free span grows at P, where it is strained by E_A, and P goes along the tangent
+    # the free span grows at P, where its stretch is E_A, and P moves along the tangent
     feed = strained * grown + pulley.radius * turned
     softer = -free * change.stiffness / (material.stiffness * material.stiffness)
     x = softer * force.horizontal + by_weight.x * change.weight

@@ -1,8 +1,8 @@
 """Sag forces T_z - tau sin phi of the cables of one pose as curves over their chord tensions.
 
-Weight makes the sag force of a cable below its frame end rise and fall with the tension: it falls while the
-sag is deep, rises while the sag grows shallow, and falls again by stretch. On a range of tensions it is therefore
-within its ends and at most two turns between them; docs/model.md, section 5.
+The sag force of a cable whose platform end is below its frame end is not monotone in the tension. It falls while the
+sag is deep, rises while the sag becomes shallow, and falls again because of the stretch. On a range of tensions it
+therefore lies between its values at the two ends and at up to two extrema; docs/model.md, section 5.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block
 
-LOOSEST = 5.0  # largest X = wD/(2 tau): a cable fifteen times as long as its chord, which no winch pulls on
+LOOSEST = 5.0  # largest X = wD/(2 tau): the cable is fifteen times as long as its chord, almost without tension
 SLOPE_STEP = 1e-4  # relative step of the central difference of the sag force
-EXITS = 4  # passes over pulleys: for X up to 1 the sag force is then known to 1e-9 of the tension
+EXITS = 4  # passes over pulleys: the error of the sag force is then 1e-9 of the tension for X up to 1
 SHRINKINGS = 30
-TURN_ERROR = 1e-10  # relative to half the cable's weight: bound of the error of the sag force at a turn
-SHRINKS = 0.9  # of the section before: what shrinks less does not shrink
-SMALLEST_GAIN = 1e-15  # of the numbers at hand
+TURN_ERROR = 1e-10  # relative to half the cable's weight: bound of the error of the sag force at an extremum
+SHRINKS = 0.9  # relative to the previous section: the search ends if a section shrinks by less
+SMALLEST_GAIN = 1e-15  # smallest gain relative to the terms of the sum
 
-# Rows of the turns of the cables' sag forces, (TURN_ROWS, m): NaN where there is none.
+# Rows of the extrema of the cables' sag forces, (TURN_ROWS, m); NaN if a cable has no such extremum.
 LEAST_TENSION, LEAST_SAG_FORCE, MOST_TENSION, MOST_SAG_FORCE = 0, 1, 2, 3
 TURN_ROWS = 4
 
@@ -52,7 +52,7 @@ class Section(NamedTuple):
 
 @glue
 def new_curves(model: Model, cables: Cables, statuses: Codes, memory: Memory) -> tuple[Curves, Memory]:
-    """Work arrays for the curves of cables in place, and the memory that is left."""
+    """Work arrays for the curves of cables in place, and the remaining memory."""
     turns, memory = block(memory, TURN_ROWS, cables.low.size)
     return Curves(model, cables, turns, statuses), memory
 
@@ -65,7 +65,7 @@ def sag_forces_at(curves: Curves, tau: Array, sag_force: Array) -> None:
     for k in range(EXITS if curves.cables.machine else 1):
         solve_cable_states(curves.model, curves.cables, k == 0, False, curves.statuses)
     for i in range(tau.size):
-        if curves.model.code != codes.CATENARY:  # the same at every tension, one of zero included
+        if curves.model.code != codes.CATENARY:  # the same at every tension, including zero
             curves.cables.sag_force[i] = shallow_sag_force(
                 curves.model, curves.cables.chord[i], curves.cables.density[i]
             )
@@ -97,7 +97,7 @@ def slopes_at(curves: Curves, tau: Array, slope: Array, bend: Array) -> None:
 
 @kernel
 def sag_force_at(curves: Curves, i: int, tau: float) -> float:
-    """Pull of one cable at a chord tension [N]; zero at an infinite one, which leaves no cable to weigh."""
+    """Sag force of one cable at a chord tension [N]; zero at an infinite tension, at which the cable has no length."""
     cables = curves.cables
     if curves.model.code != codes.CATENARY:
         return shallow_sag_force(curves.model, cables.chord[i], cables.density[i])
@@ -124,12 +124,13 @@ def sag_force_range(curves: Curves, i: int, section: Section) -> tuple[float, fl
 
 @kernel
 def most_along(curves: Curves, i: int, section: Section, along: float, hanging: float) -> float:
-    """Upper bound of along tau - weight sag_force(tau) on a section [N]; exact if an end of the section is optimal.
+    """Upper bound of along tau - b sag_force(tau) on a section [N]; exact if an end of the section is optimal.
 
-    That end, and the range of the sag force, say how far from it anything better can be; so the section shrinks.
+    The value at that end and the range of the sag force limit the distance to any better tension. The section shrinks
+    to this distance, repeatedly.
 
-    section: of its chord tensions; the upper end may be infinite; along: what a newton of chord tension counts;
-    hanging: weight of a newton of sag force.
+    section: range of its chord tensions, whose upper end may be infinite; along: weight of a newton of chord tension;
+    hanging: b, weight of a newton of sag force.
     """
     low, high, at_low, at_high = section
     if along > 0.0 and high == math.inf:
@@ -153,16 +154,18 @@ def most_along(curves: Curves, i: int, section: Section, along: float, hanging: 
     return bound
 
 
-TURN_PRECISION = 1e-4  # relative, of a turn's tension: its sag force, flat there, is known to 1e-11 of the weight
+TURN_PRECISION = 1e-4  # relative, of an extremum's tension; its sag force is exact to 1e-11 of the weight
 STEPS = 30
 PEAK_STEPS = 40
-PEAK_PRECISION = 1e-3  # relative, of the tension where the sag force rises fastest
+PEAK_PRECISION = 1e-3  # relative, of the tension at which the sag force rises fastest
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
-# Where the search begins: the first-order turns are at X = |sin phi|/cos^2 phi and at sqrt(EA wD |sin phi|/6), the true
-# ones, on 200,000 random cables with X <= 1 and e <= 0.01, at 0.28 to 1.03 of that X and 0.58 to 1.0 of that tension.
+# Start of the search, relative to first order. The first-order extrema are at X = |sin phi|/cos^2 phi and at the
+# tension sqrt(EA wD |sin phi|/6). On 200,000 random cables with X <= 1 and e <= 0.01, the exact extrema are at 0.28 to
+# 1.03 times this X and at 0.58 to 1.0 times this tension.
 START_OF_LEAST, START_OF_MOST = 1.25, 0.9
-# A growth that is this share of its parts below zero where first order has its peak is so everywhere: between there and
-# the true peak it changes by less, in all random cables of the tests. Nearer to zero golden sections look for the peak.
+# The growth of the sag force is negative everywhere if, at its first-order peak, it is below zero by more than this
+# share of the sum of its terms. It changes by less than this between that point and the exact peak, in all random
+# cables of the tests. Otherwise golden sections search the peak.
 FALLS_FOR_SURE = 0.3
 
 # Rows of the work array.
@@ -172,7 +175,7 @@ ROWS = 8
 
 @kernel
 def _growths(curves: Curves, tau: Array, growth: Array) -> None:
-    """Fill the growth of the sag forces with the logarithm of the chord tensions [N], (m,)."""
+    """Fill the derivatives of the sag forces by the logarithm of the chord tensions [N], (m,)."""
     cables = curves.cables
     for i in range(tau.size):
         cables.last_sag_force[i] = tau[i] * (1.0 + SLOPE_STEP)
@@ -186,14 +189,14 @@ def _growths(curves: Curves, tau: Array, growth: Array) -> None:
 
 @formula
 def _growth_of(curves: Curves, i: int, tau: float) -> float:
-    """Growth of the sag force of cable i with the logarithm of its chord tension [N]."""
+    """Derivative of the sag force of cable i by the logarithm of its chord tension [N]."""
     above, below = sag_force_at(curves, i, tau * (1.0 + SLOPE_STEP)), sag_force_at(curves, i, tau * (1.0 - SLOPE_STEP))
     return (above - below) / (2.0 * SLOPE_STEP)
 
 
 @formula
 def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, float, float]:
-    """Stretch, slope and depth of the first-order growth of one cable's sag force [N]."""
+    """The three terms of the first-order growth of one cable's sag force [N]: stretch, slope and depth."""
     cables = curves.cables
     half_weight = cables.half_weight[i]
     x = half_weight / tau
@@ -203,9 +206,9 @@ def _first_order_growth(curves: Curves, i: int, tau: float) -> tuple[float, floa
 
 @kernel
 def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> float:
-    """A chord tension between two at which the sag force rises, where it falls at both; NaN where it never rises.
+    """A chord tension at which the sag force rises, between two at which it falls; NaN if it never rises.
 
-    Its growth has one peak, which golden sections find.
+    The growth of the sag force has one peak, which golden sections find.
     """
     a, b = math.log(low), math.log(high)
     c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
@@ -228,7 +231,7 @@ def _rising_tension_between(curves: Curves, i: int, low: float, high: float) -> 
 
 @glue
 def _find_rises(curves: Curves, work: Array) -> None:
-    """Fill for each cable a tension between A and B at which its sag force rises: RISEN, NaN where it never does."""
+    """Fill RISEN: for each cable a tension between A and B at which its sag force rises; NaN if it never rises."""
     cables = curves.cables
     for i in range(work.shape[1]):
         best = 1.5 * cables.half_weight[i] * cables.cosine[i] * cables.cosine[i] / abs(cables.sine[i])
@@ -255,11 +258,11 @@ def _find_rises(curves: Curves, work: Array) -> None:
 def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, sag_forces: Array) -> None:
     """Fill tension and sag force at the extremum between A and B, for the cables whose tension is not NaN.
 
-    Newton steps from TENSION on, with the slope of first order, then with that of the last two points, within what is
-    left of A to B.
+    Newton steps start from TENSION and stay within the remaining range from A to B. The first step uses the first-order
+    slope, the others use the slope between the last two points.
 
-    rising: whether the sag forces rise at A and fall at B, or the other way round; tensions: anything, or NaN for no
-    turn, (m,); filled; sag forces: filled, (m,).
+    rising: True if the sag forces rise at A and fall at B, False for the opposite; tensions: NaN for cables to skip,
+    (m,), filled; sag forces: filled, (m,).
     """
     m = tensions.size
     for step in range(STEPS):
@@ -293,7 +296,7 @@ def _find_extremum(curves: Curves, rising: bool, work: Array, tensions: Array, s
 
 @kernel
 def find_extrema(curves: Curves, low: Array, high: Array, memory: Memory) -> None:
-    """Fill the turns of the cables' sag forces between chord tensions (m,), which are finite."""
+    """Fill the extrema of the cables' sag forces between finite chord tensions low and high, (m,) each."""
     cables, turns = curves.cables, curves.turns
     m = cables.low.size
     work, memory = block(memory, ROWS, m)

@@ -1,4 +1,4 @@
-"""Derivatives of a cable's force on its platform end, ends held: by L, rho and EA, in its plane."""
+"""In-plane derivatives of a cable's force on its platform end by L, rho and EA, with both ends fixed."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def force_change(plane: PlaneStiffness, end: PlaneVector) -> PlaneVector:
 def _catenary_by_length(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> PlaneVector:
-    """Motion of P1's end for a meter of cable at fixed force: it enters at the frame end, along the tangent there."""
+    """Motion of the platform end per meter of cable at fixed force; the cable enters at the frame end."""
     vertical_a = vertical - weight * length
     grown = 1.0 / math.sqrt(horizontal * horizontal + vertical_a * vertical_a) + 1.0 / stiffness
     return PlaneVector(grown * horizontal, grown * vertical_a)
@@ -57,7 +57,7 @@ def _catenary_by_length(
 def _catenary_by_weight(
     horizontal: float, vertical: float, length: float, weight: float, stiffness: float
 ) -> PlaneVector:
-    """Motion of P1's end by the weight per length at fixed force [m^2/N]."""
+    """Motion of the platform end per change of the weight per length, at fixed force [m^2/N]."""
     vertical_a = vertical - weight * length
     tension_a = math.hypot(horizontal, vertical_a)
     total = tension_a + math.hypot(horizontal, vertical)
@@ -81,7 +81,7 @@ def _catenary_by_weight(
 def force_by_length(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force, plane: PlaneStiffness
 ) -> PlaneVector:
-    """dT/dL [N/m] of a cable of the exact or the weightless model; zero where a weightless one is slack."""
+    """dT/dL [N/m] of a cable of the exact or the weightless model; zero for a slack weightless cable."""
     weight = material.density * model.gravity
     if model.code == codes.CATENARY and weight > 0.0:
         end = _catenary_by_length(force.horizontal, force.vertical, length, weight, material.stiffness)

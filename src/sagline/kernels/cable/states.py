@@ -1,4 +1,4 @@
-"""All cables of one pose: ratios and sag forces at chord tensions, limits as chord tensions, lengths off drums."""
+"""All cables of one pose: ratios and sag forces at chord tensions, limits as chord tensions, and lengths off drums."""
 
 from __future__ import annotations
 
@@ -22,25 +22,26 @@ from sagline.kernels.cable.pulley import Pulley, Wrap, behind_cable, free_rise, 
 from sagline.kernels.cable.terms import Chord, Material, Model, Terms, model_of
 from sagline.kernels.jit import entry, glue, kernel
 
-# Relative change of tension within which one Newton step from the last ratio will do: it leaves 3e-8 of the ratio at
-# X = 2, 5e-15 at X = 0.01, and the square of a smaller change, so that converged iterations end in the last digit.
+# Relative change of tension up to which one Newton step from the last ratio suffices. The relative error of the ratio
+# is then 3e-8 at X = 2 and 5e-15 at X = 0.01. It falls with the square of the change, so that converged iterations have
+# full precision.
 NEAR = 1e-3
-# passes until a cable leaves its pulley where its force says; a taut one is 1e-4, 4e-8, 1e-11, 0 off
+# largest number of passes for the exit point; a taut cable has errors of 1e-4, 4e-8, 1e-11 and 0 in the first four
 CONTACTS = 40
 SAME_SAG_FORCE = 4e-16  # relative to the tension: smaller changes of a sag force count as converged
 LIMIT_STEPS = 30
 LIMIT_PRECISION = 1e-13  # relative
-LIMIT_MISS = 1e-6  # relative: more than what the passes for a slack cable's pulley leave
+LIMIT_MISS = 1e-6  # relative: larger than the error that the passes leave for a slack cable
 SECANT = 1e-6  # relative step below which a secant slope is dominated by rounding
-TAUT = 1.25  # of wD/2: a chord tension above that of the least tension at the frame end
+TAUT = 1.25  # in units of wD/2: a chord tension above the one with the least tension at the frame end
 
 
 @glue
 def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
-    """Fill the free spans and their tensions, from where the forces at the pulleys say that the cables leave them.
+    """Fill the free spans and their tensions; the forces at the pulleys determine the exit points.
 
-    The forces are those of the last length and sag force (fresh: of first order) at the present chord tensions. Cables
-    of the shallow models leave along their chord.
+    The forces result from the last length and sag force at the present chord tensions; if fresh, from first-order
+    values. Cables of the shallow models leave along their chord.
     """
     exact = model.code == codes.CATENARY
     for i in range(cables.tau.size):
@@ -70,11 +71,11 @@ def _fill_exit_points(model: Model, cables: Cables, fresh: bool) -> None:
 def solve_cable_states(model: Model, cables: Cables, fresh: bool, near: bool, statuses: Codes) -> int:
     """Fill slackness, strain, ratio and sag force of all cables, and the statuses (m,), at their chord tensions.
 
-    Ordinary catenaries go through loops without branches, which vectorize; the others follow one by one. Cables leave
-    their pulleys where the lengths and sag forces before said.
+    Ordinary catenaries are solved in loops without branches, which vectorize; the others follow one by one. The exit
+    points result from the previous lengths and sag forces.
 
-    fresh: whether there are no lengths and sag forces yet; near: whether their ratios are the answer at tensions less
-    than NEAR away; statuses: filled. Returns the gravest status.
+    fresh: True if lengths and sag forces do not exist yet; near: True if the present ratios belong to tensions that
+    differ by less than NEAR; statuses: filled. Returns the most serious status.
     """
     m = cables.tau.size
     if cables.machine:
@@ -154,7 +155,7 @@ def frame_end_tension(model: Model, chord: Chord, material: Material, pulley: Pu
 def chord_tension_at_frame_end(model: Model, chord: Chord, material: Material, pulley: Pulley, tension: float) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
-    Without such a cable the result is the chord tension, if any, of the least frame-end tension of a parabola.
+    If no such cable exists, the result is the chord tension, if any, of the least frame-end tension of a parabola.
     """
     loosest = 0.5 * material.density * model.gravity * chord.length * chord.sine
     return taut_at_frame_end(model, chord, material, pulley, tension, max(loosest, 0.0))
@@ -166,11 +167,11 @@ def taut_at_frame_end(
 ) -> float:
     """Chord tension at which the tension at the frame end has a given value, on the taut side.
 
-    A sagging cable's frame-end tension has a least value, up to 3/4 wD cos(phi). It is convex in the chord tension,
-    with a slope of at most 1 + wD/EA: from the taut side steps by secants come down to the root, or to where the slope
-    is none.
+    The frame-end tension of a sagging cable has a least value, at most 3/4 wD cos(phi). It is convex in the chord
+    tension, with a slope of at most 1 + wD/EA. Secant steps from the taut side therefore descend to the root, or to the
+    least value.
 
-    tension: at the frame end [N]; otherwise: the result where no cable has so little.
+    tension: at the frame end [N]; otherwise: the result if no cable has so small a tension.
     """
     weight = material.density * model.gravity
     if model.code == codes.STRAIGHT or model.code == codes.ELASTIC or weight == 0.0 or tension == math.inf:
@@ -203,13 +204,13 @@ class _CableAtTension(NamedTuple):
 
 @kernel
 def hold_cable(model: Model, chord: Chord, material: Material, pulley: Pulley, tau: float) -> _CableAtTension:
-    """A cable at a chord tension, with what is on its pulley and behind it; sag force: T_z - tau sin phi."""
+    """A cable at a chord tension, including the cable on its pulley and behind it; sag force: T_z - tau sin phi."""
     weightless = model.code == codes.STRAIGHT or model.code == codes.ELASTIC
     weight = 0.0 if weightless else material.density * model.gravity
     length, sag_force, _status = solve_cable_state(model, chord, material, pulley, tau)
     horizontal, vertical = tau * chord.cosine, tau * chord.sine + sag_force - weight * length
     tension = math.sqrt(horizontal * horizontal + vertical * vertical)
-    # cables of the shallow models leave along their chord, and have its tension behind it
+    # cables of the shallow models leave along their chord, and have the chord tension behind it
     sine, cosine, there = chord.cosine, pulley.entry * chord.sine, tau
     if model.code == codes.CATENARY:
         there = tension
@@ -230,7 +231,7 @@ def lengths_at_frame_ends(
     rotation: Array,
     geometry: Array,
 ) -> None:
-    """Unstrained lengths off the drums [m] of cables that are held at a pose, each by itself.
+    """Unstrained lengths off the drums [m] of cables at a pose, each cable independent of the others.
 
     Args:
         terms: Terms of the cable model.
@@ -238,7 +239,8 @@ def lengths_at_frame_ends(
         body: Row of the body_table.
         pose: Pose row.
         tension: Tensions at the frame ends [N], (m,).
-        tension_out: Tensions at these lengths; they differ where no cable has so little [N], (m,).
+        tension_out: Tensions at these lengths [N], (m,); they differ from the given ones if no cable has so small a
+            tension.
         length_out: (m,).
         rotation: Work array, (3, 3).
         geometry: Work array, (GEOMETRY_ROWS, m).

@@ -2,8 +2,8 @@
 
 In the vertical plane of the cable the stiffness is a 2 x 2 matrix; normal to that plane it is T_x/x_B = tau/D, regular
 on a vertical chord. The weightless and the exact cable have an energy, whose gradient is the force on the platform end.
-The shallow models have none: their forces are not the gradient of anything (the curl of the parabolic one is of the
-order of its own error), and their equilibria are reached from the exact cable's.
+The shallow models do not have an energy, because their forces are not a gradient. The curl of the parabolic model's
+force is of the order of the model's error. Their equilibria are reached from those of the exact cable.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def catenary_stiffness(
 ) -> PlaneStiffness:
     """In-plane stiffness of the exact cable: the inverse of dB/dT of P1, without cancellation.
 
-    With p, q the parts of dx/dT_x, dz/dT_z that go with length/(T_A + T_B), and c that of -dx/dT_z,
-    p + q = 2 and p q = c^2 hold exactly, so that the determinant is a sum of positive terms.
+    Let p, q and c be the coefficients of length/(T_A + T_B) in dx/dT_x, dz/dT_z and -dx/dT_z. Then p + q = 2 and p q =
+    c^2 hold exactly, so that the determinant is a sum of positive terms.
     """
     vertical_a = vertical - weight * length
     square = horizontal * horizontal
@@ -77,7 +77,7 @@ def catenary_stiffness(
         p = 1.0 - level
         q = c * c / p
     zz = stretch + turn * q
-    if excess == math.inf:  # a fold does not resist a first sideways motion
+    if excess == math.inf:  # a fold does not resist small sideways motions
         return PlaneStiffness(0.0, 0.0, 0.0, 1.0 / (length * zz))
     xx = stretch + turn * (2.0 * excess + p)
     determinant = stretch * (stretch + 2.0 * turn * (1.0 + excess)) + 2.0 * turn * turn * q * excess
@@ -88,7 +88,7 @@ def catenary_stiffness(
 
 @formula
 def _elastic_stiffness(span: float, rise: float, length: float, tension: float, stiffness: float) -> PlaneStiffness:
-    """In-plane stiffness of the weightless cable; zero where it is slack."""
+    """In-plane stiffness of the weightless cable; zero if it is slack."""
     if tension == 0.0:
         return PlaneStiffness(0.0, 0.0, 0.0, 0.0)
     chord = math.sqrt(span * span + rise * rise)
@@ -120,7 +120,7 @@ def shallow_slopes(
     square = tension * tension
     share = sag / square
     by_tension = length * (tension + sag_force * sine) / (stretch * stiffness) + 2.0 * chord * share / tension
-    # derivative of s by the chord at fixed tau: by sin phi and by the sag force, which is proportional to D
+    # derivative of s by the chord at fixed tau, through sin phi and through the sag force, which is proportional to D
     by_sag_force = (sag_force + tension * sine) / stretch
     by_sine = tension * sag_force / stretch
     stretch_x = by_sag_force * sag_force * cosine / chord - by_sine * sine * cosine / chord
@@ -138,7 +138,7 @@ def shallow_slopes(
 def _shallow_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, tension: float
 ) -> PlaneStiffness:
-    """In-plane stiffness of a shallow cable, not symmetric: its forces are no gradient."""
+    """In-plane stiffness of a shallow cable; not symmetric, because its forces are not a gradient."""
     slopes = shallow_slopes(model, span, rise, material, length, tension)
     chord = math.sqrt(span * span + rise * rise)
     cosine = span / chord
@@ -157,7 +157,7 @@ def _shallow_stiffness(
 def cable_stiffness(
     model: Model, span: float, rise: float, material: Material, length: float, force: Force
 ) -> PlaneStiffness:
-    """In-plane stiffness of a cable of any model; NaN for the straight one, which has none."""
+    """In-plane stiffness of a cable of any model; NaN for the straight cable."""
     if model.code == codes.STRAIGHT:
         return PlaneStiffness(math.nan, math.nan, math.nan, math.nan)
     weight = material.density * model.gravity
@@ -195,7 +195,7 @@ def plane_of(rows: Array, i: int) -> PlaneStiffness:
 
 @formula
 def catenary_energy(span: float, rise: float, length: float, force: Force, weight: float, stiffness: float) -> float:
-    """V = T.B - C(T) [J] of the exact cable, strain and height of its mass included, frame end at height 0."""
+    """V = T.B - C(T) [J] of the exact cable: energy of strain and weight, with the frame end at height 0."""
     horizontal, vertical, _ = force
     weight_length = weight * length
     vertical_a = vertical - weight_length
@@ -213,7 +213,7 @@ def catenary_energy(span: float, rise: float, length: float, force: Force, weigh
 
 @formula
 def elastic_energy(chord: float, length: float, tension: float, stiffness: float) -> float:
-    """Strain energy [J] of the weightless cable; zero where it is slack."""
+    """Strain energy [J] of the weightless cable; zero if it is slack."""
     return 0.5 * tension * (chord - length) if tension > 0.0 else 0.0
 
 
@@ -230,10 +230,11 @@ def _cable_energy(model: Model, span: float, rise: float, material: Material, le
 
 @formula
 def energy_of_cables(model: Model, cables: Array, rows: Array, behind: bool | None) -> tuple[float, float]:
-    """Energy [J] of all cables of a pose, and the sum of the parts that cancel in it.
+    """Energy [J] of all cables of a pose, and the sum of the magnitudes of its terms.
 
     cables: rows of the cable_table, (m, CABLE_COLUMNS); rows: as in `sagline.kernels.cable.geometry`, (CABLE_ROWS, m),
-    after `cable_forces`; behind: that of the model, by itself, so that what it rules out is not compiled.
+    after `cable_forces`; behind: that of the model, as a separate argument, so that None excludes unused code from
+    compilation.
     """
     x = g.SPAN if behind is None else g.FREE_SPAN
     z = g.RISE if behind is None else g.FREE_RISE

@@ -1,6 +1,6 @@
 """Scalar data of one cable: inputs and outputs of kernels for a single cable.
 
-They cost nothing in compiled code, where a NamedTuple of numbers is its numbers.
+They cost nothing in compiled code, where a NamedTuple of numbers becomes separate numbers.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from sagline.kernels.jit import glue
 
-Terms = tuple[int, float, float, float]  # a Model as it comes from Python: numba knows plain tuples three times faster
+Terms = tuple[int, float, float, float]  # a Model as passed from Python: numba identifies plain tuples faster
 
 
 class Model(NamedTuple):
@@ -19,8 +19,7 @@ class Model(NamedTuple):
     k_h: float  # the empirical model's constant of the sag force
     k_p: float  # the empirical model's constant of the sag
     gravity: float  # [m/s^2]
-    # whether cables of given lengths may have something behind them; None leaves that out of the machine code, which
-    # then is that of bare cables
+    # True if cables of given lengths may have pulleys or dead lengths; None removes their code from the machine code
     behind: bool | None = None
 
 
@@ -46,15 +45,15 @@ class Chord(NamedTuple):
 
 
 class Force(NamedTuple):
-    """Force on a cable at its platform end."""
+    """Force on a cable at its platform end, in the cable's vertical plane."""
 
     horizontal: float  # T_x [N]
     vertical: float  # T_z [N], up positive
-    tension: float  # tau, the chord tension [N]
+    tension: float  # chord tension tau [N]
 
 
 class PlaneStiffness(NamedTuple):
-    """Stiffness of a cable's platform end in the cable's vertical plane [N/m]: rows force, columns displacement."""
+    """Stiffness of a cable's platform end in the cable's vertical plane [N/m]; rows: force, columns: displacement."""
 
     xx: float
     xz: float

@@ -66,7 +66,7 @@ def scaled(factor: float, vector: Triple) -> Triple:
 
 @glue
 def fill_motion_by_wrench(free: Array, wrench: Array, space: CalibrationArrays, motion: Array) -> None:
-    """Fill the motion of the platform due to a wrench on it; the stiffness must be factored."""
+    """Fill the motion of the platform due to a wrench on it; requires the factored stiffness."""
     components_along(free, wrench, space.part)
     solve_lower(space.factor, space.part)
     solve_upper(space.factor, space.part)
@@ -88,7 +88,7 @@ def fill_length(space: CalibrationArrays, i: int, force: Triple, moment: Triple,
 
 @glue
 def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
-    """Add to the columns the effect of wrench changes on the readings through the platform's motion."""
+    """Add the effect of wrench changes on the readings, through the platform's motion, to the columns."""
     for j in range(slopes.work.shape[0]):
         for k in range(6):
             share = space.moved[j, k]
@@ -98,7 +98,7 @@ def add_motion(space: CalibrationArrays, slopes: Slopes) -> None:
 
 @glue
 def fill_motion(free: Array, space: CalibrationArrays, slopes: Slopes, motion: Array) -> None:
-    """Fill the motion of the platform per length, and in the last row per unit of the first column's unknown."""
+    """Fill the platform's motion per cable length; the last row is its motion per unit of the first unknown."""
     m = space.by_wrench.shape[0]
     for k in range(6):
         space.six[k] = slopes.wrench[k, 0]
@@ -133,7 +133,7 @@ def _force_by_motion(ends: Array, i: int, vector: Triple) -> Triple:
 
 @formula
 def _tension_by_motion(ends: Array, i: int, shares: Array) -> Triple:
-    """Change of the frame-end tension by a motion of the platform end, except for its height: K^T times the shares."""
+    """Change of the frame-end tension due to a motion of the platform end without its height: K^T times the slopes."""
     x, y, z = shares[i, 0], shares[i, 1], shares[i, 2]
     return (
         ends[i, 0] * x + ends[i, 3] * y + ends[i, 6] * z,
@@ -166,7 +166,7 @@ def _add_wrench_change(slopes: Slopes, at: int, scale: float, force: Triple, mom
 def _add_force_change(
     slopes: Slopes, space: CalibrationArrays, i: int, at: int, scale: float, force: Triple, direct: float
 ) -> None:
-    """Add the effect of a change of one cable's force to a column; the cable's own reading also changes directly."""
+    """Add the effect of a change of one cable's force to a column; the reading of this cable also changes directly."""
     _add_wrench_change(slopes, at, scale, force, cross(_lever_of(space.rows, i), force))
     slopes.work[i, at] += scale * direct
 
@@ -182,7 +182,7 @@ def _add_parameter_change(
     space: CalibrationArrays,
     slopes: Slopes,
 ) -> None:
-    """Add to a column the effect of a parameter of cable i on its platform-end force and directly on its tension."""
+    """Add to a column the effects of a parameter of cable i: on its platform-end force, and directly on its tension."""
     at = sought.where[row, i]
     if at >= 0:
         change = _in_world_axes(space.rows, i, pair)
@@ -205,7 +205,7 @@ def fill_ends(model: Model, cables: Array, space: CalibrationArrays) -> None:
 
 @glue
 def fill_readings_by_wrench(sensing: Sensing, free: Array, m: int, reach: Triple, space: CalibrationArrays) -> None:
-    """Fill the change of every reading per wrench on the platform, through its motion; needs the factored stiffness."""
+    """Fill the change of every reading per wrench on the platform, which moves it; requires the factored stiffness."""
     for j in range(space.moved.shape[0]):
         six = space.six
         if j < m:
@@ -286,9 +286,9 @@ def _free_displacement(free: Array, vector: Triple) -> Triple:
 def _fill_center(
     cables: Array, sensing: Sensing, sought: Unknowns, free: Array, axis: int, space: CalibrationArrays, slopes: Slopes
 ) -> None:
-    """Add to the columns the effect of a shift of the center of mass in the platform, about which the platform moves.
+    """Add the effect of a shift of the center of mass, the reference point of the platform's motion, to the columns.
 
-    Only free motions count: a planar platform stays in its plane.
+    Only the part along free motions counts, because a planar platform stays in its plane.
     """
     m = cables.shape[0]
     at, scale = sought.where[kinds.CENTER + axis, 0], sought.scale[kinds.CENTER + axis, 0]

@@ -48,7 +48,7 @@ from sagline.kernels.memory import Memory
 
 @glue
 def whiten(sensing: Sensing, residual: Array, space: CalibrationArrays, work: Array) -> None:
-    """Omit missing readings, and fill W, the inverse of the covariance's factor: W^T W inverts the covariance."""
+    """Omit missing readings, and fill W, the inverse of the covariance's factor: W^T W is the inverse covariance."""
     readings, m = work.shape[0], residual.size - BESIDE
     for j in range(residual.size):
         if not (abs(residual[j]) < math.inf and space.deviation[j] < math.inf):
@@ -142,7 +142,7 @@ def _fill_residual(
     space: CalibrationArrays,
     residual: Array,
 ) -> None:
-    """Fill readings less predictions, and the standard deviations, infinite for missing readings."""
+    """Fill readings minus predictions, and the standard deviations, which are infinite for missing readings."""
     m = residual.size - BESIDE
     for i in range(m):
         residual[i] = readings.cells[p, i] - (sensing.gain[i] * space.shares[i, 4] + sensing.bias[i])
@@ -166,15 +166,15 @@ def observe(
     memory: tuple[Array, Indices],
     found: LinearizationArrays,
 ) -> None:
-    """Residuals and derivatives at N equilibria; NaN where the equilibrium is not stable.
+    """Residuals and derivatives at N equilibria; NaN for equilibria that are not stable.
 
     Args:
-        model: Cable model, the exact or the weightless one, as of `forward_poses`.
-        given: `ForwardSamples`, its starts the poses, which are equilibria at the lengths.
+        model: Cable model as in `forward_poses`: the exact or the weightless one.
+        given: `ForwardSamples`, whose initial poses are equilibria at the lengths.
         sensing: `Sensing`.
         reading_arrays: `PoseReadings`.
         unknown_arrays: `Unknowns`.
-        memory: `memory_for` as many cables.
+        memory: `memory_for` the number of cables.
         found: `Linearization`, filled.
     """
     batch, sensors, readings = ForwardSamples(*given), Sensing(*sensing), PoseReadings(*reading_arrays)

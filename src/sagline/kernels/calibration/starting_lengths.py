@@ -1,4 +1,4 @@
-"""Initial lengths from a pose and measured tensions, which are corrected to balance the platform."""
+"""Initial lengths from a pose and measured tensions, with the tensions corrected to balance the platform."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from sagline.kernels.cable.terms import Chord, Material, Terms, model_of
 from sagline.kernels.jit import entry
 from sagline.kernels.memory import Memory, block, vector
 
-ITERATIONS = 3  # of balancing: the sag forces depend weakly on the tensions
-LEAST = 0.2  # smallest ratio of a balanced tension to the measured one
+ITERATIONS = 3  # iterations of balancing, few because the sag forces depend weakly on the tensions
+LEAST = 0.2  # smallest ratio of a corrected tension to the measured one
 
 
 @entry
@@ -42,7 +42,7 @@ def starting_lengths(
         body: Row of the body_table.
         poses: Pose rows (N, POSE_COLUMNS).
         tension: Tensions at the frame ends [N], (N, m).
-        memory: `memory_for` as many cables.
+        memory: `memory_for` the number of cables.
         length_out: Filled, (N, m).
     """
     model = model_of(terms)

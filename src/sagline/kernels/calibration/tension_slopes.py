@@ -15,7 +15,7 @@ from sagline.kernels.jit import formula
 
 
 class _FrameEndSlopes(NamedTuple):
-    """Frame-end tension and its derivatives; the force on the platform end is constant except in `along` and `up`."""
+    """Frame-end tension and its derivatives, at constant force on the platform end except for `along` and `up`."""
 
     tension: float  # T_A [N]
     along: float  # derivative with respect to the horizontal part of the platform-end force, in the cable's plane
@@ -53,7 +53,7 @@ def frame_end_slopes(model: Model, cables: Array, rows: Array, i: int) -> _Frame
     share = 1.0 / strained
     grown = (1.0 + end / stiffness) / end * share
     lifted = weight * pulley.radius * entry * cosine * share  # derivative with respect to the wrap angle
-    turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # of the wrap angle with respect to the force at P
+    turned_x, turned_z = cosine / leaving, -entry * sine / leaving  # derivative of the wrap angle by the force at P
     rise = rows[g.FREE_RISE, i]
     return _FrameEndSlopes(
         leaving,

@@ -22,10 +22,10 @@ class Sensing(NamedTuple):
 
     gain: Array  # gain of the load cells, (m,)
     bias: Array  # bias of the load cells [N], (m,)
-    tension_deviation: Array  # [N], (m,); infinite without a load cell
-    length_deviation: Array  # [m], (m,)
-    position_deviation: Array  # [m], (3,); infinite if not measured
-    rotation_deviation: Array  # [rad], (3,); infinite if not measured
+    tension_deviation: Array  # standard deviations of load cells [N], (m,); infinite without a load cell
+    length_deviation: Array  # standard deviations of lengths [m], (m,)
+    position_deviation: Array  # standard deviations of positions [m], (3,); infinite if not measured
+    rotation_deviation: Array  # standard deviations of rotations [rad], (3,); infinite if not measured
     frame: Array  # pose row of the measuring system in the world
     target: Array  # measured point, platform frame [m], (3,)
 
@@ -33,10 +33,10 @@ class Sensing(NamedTuple):
 class PoseReadings(NamedTuple):
     """Readings at N poses; NaN for a missing reading, whose residual is zero."""
 
-    lengths: Array  # measured by the winches [m], (N, m)
+    lengths: Array  # lengths measured by the winches [m], (N, m)
     cells: Array  # readings of the load cells [N], (N, m)
-    positions: Array  # [m], (N, 3)
-    rotations: Array  # unit quaternions, scalar last, (N, 4)
+    positions: Array  # measured positions [m], (N, 3)
+    rotations: Array  # measured rotations, unit quaternions, scalar last, (N, 4)
 
 
 class Unknowns(NamedTuple):
@@ -50,15 +50,15 @@ class Unknowns(NamedTuple):
 class Linearization(NamedTuple):
     """Output arrays; the rows of a pose are its load cells, then three of its position and three of its rotation.
 
-    R is m + 6, or m where no system measures positions or rotations.
+    R is m + 6, or m if neither positions nor rotations are measured.
     """
 
     matrix: Array  # whitened slopes, (N, R, P); rows without a reading are zero
     misfit: Array  # whitened residuals, (N, R)
-    residual: Array  # readings less predictions at the given lengths [N, m, rad], (N, m + 6); NaN if missing
+    residual: Array  # readings minus predictions at the given lengths [N, m, rad], (N, m + 6); NaN if missing
     back: Array  # change of the true lengths per whitened residual [m], (N, m, R)
-    # motion of the platform about its center of mass [m, rad], world axes: per cable length, and in the last row per
-    # unit of the first unknown, (N, m + 1, 6); (0, m + 1, 6) if not requested
+    # motion of the platform about its center of mass [m, rad], world axes, (N, m + 1, 6): per cable length, in the last
+    # row per unit of the first unknown; (0, m + 1, 6) if not requested
     motion: Array
     work: Array  # work array: slopes of the readings and of the wrench on the platform, (R + 6, P)
 

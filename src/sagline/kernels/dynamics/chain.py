@@ -1,8 +1,9 @@
-"""A cable with mass as a chain: nodes at fixed material points, elements that pull and do not push.
+"""A cable with mass as a chain: nodes at fixed material points, elements transmit tension only.
 
-docs/model.md, section 11. Node 0 is the platform's end, the last one the frame's, so that nodes are born and merged at
-the end of the arrays. All elements have the same unstrained length but the one at the frame, which has what is left.
-Each gives half its mass to both of its nodes; what lies on the platform's end belongs to the platform.
+docs/model.md, section 11. Node 0 is the platform end, and the last node is the frame end, so that nodes are added and
+removed at the end of the arrays. All elements have the same unstrained length, except the element at the frame, which
+has the remaining length. Each element adds half of its mass to each of its two nodes. The mass at node 0 belongs to the
+platform.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from sagline.kernels.jit import formula, kernel
 
 @formula
 def wind_across(wind: Array, along: float, x: float, y: float, z: float, drag: float) -> tuple[float, float, float]:
-    """Force of a wind (3,) across a line [N].
+    """Force of a wind, across a line, on this line [N].
 
-    wind: velocity of the air [m/s], (3,); along: what of it is along the line, by the length of (x, y, z); drag: force
-    by the square of the speed across [N s^2/m^2].
+    wind: velocity of the air [m/s], (3,); along: its component along the line (x, y, z), divided by the line's length;
+    drag: force per square of the speed across the line [N s^2/m^2].
     """
     nx, ny, nz = wind[0] - along * x, wind[1] - along * y, wind[2] - along * z
     size = drag * math.sqrt(nx * nx + ny * ny + nz * nz)
@@ -30,15 +31,15 @@ EXIT_X, EXIT_Y, EXIT_Z = 0, 1, 2  # exit point of the chain, world axes [m]
 ELEMENT = 3  # unstrained length of an element [m]
 DENSITY, STIFFNESS = 4, 5  # [kg/m], [N]
 LOSS_TIME = 6  # [s]
-AIR_RATE = 7  # force of the air on a length, by its velocity and its mass [1/s]
-BEHIND, RUN = 8, 9  # cable on the pulley and dead length: unstrained, and its path from drum to exit [m]
-WIND = 10  # force of the wind on a length, by the square of its speed [N s^2/m^3]
-SMOOTH = 11  # share of a step's mean tension in that by which a slack cable is known
+AIR_RATE = 7  # force of the air per velocity and mass of the cable [1/s]
+BEHIND, RUN = 8, 9  # cable between drum and exit: unstrained length, and length of its path [m]
+WIND = 10  # force of the wind per length and square of the speed [N s^2/m^3]
+SMOOTH = 11  # share of a new value in the filtered mean tension that detects a slack cable
 GRAVITY = 12  # [m/s^2]
-REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and the rate at which cable is let out [m/s]
+REST, RATE = 13, 14  # unstrained length of the element at the frame [m], and rate of the cable that is let out [m/s]
 CHAIN_COLUMNS = 15
 
-LEAST, MOST = 0.4, 1.6  # limits of the element at the frame, in elements, for merging and splitting
+LEAST, MOST = 0.4, 1.6  # shortest and longest element at the frame, relative to the other elements
 TINY = 1e-300
 
 
@@ -46,8 +47,8 @@ TINY = 1e-300
 def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pulls: Array) -> float:
     """Fill the force of every element divided by its length [N/m]; returns the power that they lose [W].
 
-    place: of the nodes [m], (3, nodes): node 0 is the platform's, node count + 1 the frame's; speed: of the nodes
-    [m/s]; used where the elements lose energy; pulls: to be filled, (elements,).
+    place: of the nodes [m], (3, nodes): node 0 is at the platform, node count + 1 at the frame; speed: of the nodes
+    [m/s], used if the elements have damping; pulls: filled, (elements,).
     """
     element, stiffness = row[ELEMENT], row[STIFFNESS]
     inverse = 1.0 / element
@@ -66,13 +67,13 @@ def fill_element_forces(place: Array, speed: Array, count: int, row: Array, pull
 
 @formula
 def _strain_at_exit(row: Array, distance: float) -> float:
-    """Strain of the element at the frame; it equals the strain of the cable behind it, which slides."""
+    """Strain of the element at the frame; it equals the strain of the cable behind it, which slides freely."""
     return (distance + row[RUN]) / (row[REST] + row[BEHIND]) - 1.0
 
 
 @formula
 def _element_distance(place: Array, j: int) -> float:
-    """Length of the element between node j and the next towards the frame [m]."""
+    """Length of the element between node j and the next node toward the frame [m]."""
     x = place[0, j + 1] - place[0, j]
     y = place[1, j + 1] - place[1, j]
     z = place[2, j + 1] - place[2, j]
@@ -95,7 +96,8 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
             + y * (speed[1, j + 1] - speed[1, j])
             + z * (speed[2, j + 1] - speed[2, j])
         )
-        # d(strain)/dt; at the frame the node's speed is that of what enters, which holds the change of rest already
+        # d(strain)/dt; the frame node has the velocity of the entering cable, which includes the change of the rest
+        # length
         slope = along / (math.sqrt(square) * length)
         before = pulls[j]
         after = max(before + viscous * slope / math.sqrt(square), 0.0) if before > 0.0 else 0.0
@@ -106,7 +108,7 @@ def _add_damping(place: Array, speed: Array, count: int, row: Array, pulls: Arra
 
 @formula
 def fill_frame_node_velocity(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Fill the velocity of the frame's node, which is that of the entering cable: L' (1 + strain) along the cable."""
+    """Fill the velocity of the frame node: that of the entering cable, L' (1 + strain) along the cable."""
     for c in range(3):
         speed[c, count + 1] = row[RATE] * (place[c, count] - place[c, count + 1]) / row[REST]
 
@@ -130,10 +132,10 @@ def kick_nodes(place: Array, speed: Array, count: int, row: Array, pulls: Array,
 
 @formula
 def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: float, h: float) -> None:
-    """Move the nodes for h [s]; the one next to the frame keeps its momentum while its mass changes.
+    """Move the nodes for h [s]; the node next to the frame keeps its momentum while its mass changes.
 
-    place: of the nodes [m]; speed: of the nodes [m/s]; before: unstrained length of the element at the frame before
-    [m]; the row knows it as it is afterwards; h: time [s].
+    place: of the nodes [m]; speed: of the nodes [m/s]; before: unstrained length of the element at the frame before the
+    motion [m]; the row contains the length after it; h: time [s].
     """
     old, new = row[ELEMENT] + before, row[ELEMENT] + row[REST]
     middle = 0.5 * (old + new)
@@ -147,7 +149,7 @@ def drift_nodes(place: Array, speed: Array, count: int, row: Array, before: floa
 
 @kernel
 def slow_by_air(speed: Array, count: int, row: Array, h: float) -> float:
-    """Slow the nodes down by the air for h [s]; returns the energy lost [J]."""
+    """Apply the damping of the air to the nodes for h [s]; returns the energy lost [J]."""
     if row[AIR_RATE] == 0.0:
         return 0.0
     factor = math.exp(-row[AIR_RATE] * h)
@@ -219,7 +221,7 @@ def whole_force(place: Array, speed: Array, count: int, row: Array, pulls: Array
 
 @kernel
 def tension_at_exit(place: Array, count: int, row: Array, pulls: Array) -> float:
-    """Tension where the chain leaves the frame [N]: force of its last element plus half the element's weight."""
+    """Tension at the chain's exit point [N]: force of its last element plus half the weight of this element."""
     x = pulls[count] * (place[0, count + 1] - place[0, count])
     y = pulls[count] * (place[1, count + 1] - place[1, count])
     z = pulls[count] * (place[2, count + 1] - place[2, count]) + 0.5 * row[DENSITY] * row[GRAVITY] * row[REST]
@@ -237,10 +239,10 @@ def mean_tension(pulls: Array, count: int, row: Array) -> float:
 
 @kernel
 def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Put a node on the element at the frame, one element from its end; count is then one more, rest less.
+    """Insert a node on the element at the frame, one element length from its end; count grows by one, rest shrinks.
 
-    Tension, mass and momentum stay, the frame's half element included; without cable behind the exit place and speed
-    are linear along the element, and the center of mass stays too.
+    Tension, mass and momentum do not change, with the half element at the frame included. Without cable behind the
+    exit, position and velocity are linear along the element, and the center of mass does not change either.
     """
     rest, rate = row[REST], row[RATE]
     distance, left = _element_distance(place, count), rest - row[ELEMENT]
@@ -257,16 +259,17 @@ def insert_node(place: Array, speed: Array, count: int, row: Array) -> None:
 
 @kernel
 def merge_nodes(place: Array, speed: Array, count: int, row: Array) -> None:
-    """Join the element at the frame with its neighbor: the node between them goes; count is then one less, rest more.
+    """Merge the element at the frame with its neighbor and remove the node between them; count shrinks, rest grows.
 
-    Its momentum goes to the next, less what the frame's half element takes with it at the velocity of what enters.
+    The next node takes its momentum. The momentum of the half element at the frame, at the velocity of the entering
+    cable, is subtracted.
     """
     element, rest, rate = row[ELEMENT], row[REST], row[RATE]
     whole = element + rest
     for c in range(3):
         exit_place = place[c, count + 1]
         entering = rate * (place[c, count - 1] - exit_place) / whole
-        # in halves of the density
+        # in units of half the density
         momentum = rest * speed[c, count + 1] + whole * speed[c, count] + 2.0 * element * speed[c, count - 1]
         speed[c, count - 1] = (momentum - whole * entering) / (element + whole)
         place[c, count], speed[c, count] = exit_place, entering

@@ -1,4 +1,4 @@
-"""A run of a platform on chains: its arrays, its inputs in time, and the forces and powers of its steps."""
+"""Simulation of a platform on chains: arrays, inputs over time, and forces and powers of the steps."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from sagline.kernels.memory import Memory, block, vector
 
 ROOM = 21
 
-Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], share of a new reading in a load cell's filtered one
-Rules = tuple[int, int, int]  # kind of winches, remembered, loops' stride
-Body = tuple[Array, Array, Array, Array]  # cables, inertia, what of a wrench moves the body, where the given one acts
+Numbers = tuple[float, float, float]  # step [s], gravity [m/s^2], weight of a new reading in a load cell's filter
+Rules = tuple[int, int, int]  # kind of winches, remembered, steps per control period
+Body = tuple[Array, Array, Array, Array]  # cables, inertia, projection onto free motions, point of the given wrench
 Courses = tuple[
     progress.CubicTableArrays, progress.CubicTableArrays, progress.CubicTableArrays
-]  # of lengths, wrenches, the wind
-Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
+]  # of lengths, wrenches, and wind velocity
+Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives, layers, audit, counters
 ChainArrays = tuple[Array, Array, Array, Array, Indices]
 Records = tuple[Array, Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes, points
 
@@ -172,7 +172,7 @@ def power_of_given_wrench(run: ChainRun) -> float:
 
 @kernel
 def kick_chains(run: ChainRun, h: float, begins: bool) -> None:
-    """Change the nodes' velocities by forces, wind and air of a time; in reverse order where a step begins."""
+    """Update the nodes' velocities from forces, wind and air during a time; in reverse order at the start of a step."""
     chains, audit = run.chains, run.drives.audit
     blows = run.wind[0] != 0.0 or run.wind[1] != 0.0 or run.wind[2] != 0.0
     for i in range(chains.counts.shape[0]):

@@ -1,7 +1,7 @@
-"""The platform on cables with mass, in time: chains in the place of exact catenaries, one force a step.
+"""Motion of the platform on cables with mass: chains instead of exact catenaries, one force evaluation per step.
 
-The symplectic splitting of `sagline.kernels.dynamics.motion`, with the chains' nodes in its kicks and drifts; winches,
-time tables and audit are the same. docs/model.md, section 11.
+The integrator is the symplectic splitting of `sagline.kernels.dynamics.motion`, whose kicks and drifts also include the
+nodes of the chains. Winches, time tables and audit are the same. docs/model.md, section 11.
 """
 
 from __future__ import annotations
@@ -48,12 +48,10 @@ from sagline.kernels.dynamics.rigid_body import (
 )
 from sagline.kernels.jit import entry, glue, kernel
 
-ENDED = (
-    progress.COUNTERS
-)  # one counter more than a run without cable mass has: how it ended, FAILED being the cable to blame
+ENDED = progress.COUNTERS  # one counter more than without cable mass; FAILED: cable that caused the end
 DONE, LONG, SHORT, GROWN = range(4)
 FEWEST = 2  # smallest number of free nodes of a chain
-GROWTH = 0.5  # relative to the energy convertible into motion; phase errors alone create less
+GROWTH = 0.5  # energy error relative to the energy convertible into motion; phase errors alone are smaller
 
 
 @glue
@@ -83,7 +81,7 @@ def change_node_count(run: ChainRun, i: int) -> None:
     row[c.REST] -= more * row[c.ELEMENT]
     after, entering = _energy_of(run, i)
     audit[d.LOST] += before - after
-    audit[d.SUPPLIED] -= entering - entering_before  # the winch supplies the half element at the exit
+    audit[d.SUPPLIED] -= entering - entering_before  # the winch supplies the energy of the half element at the exit
     c.fill_element_forces(place, speed, n + more, row, chains.pulls[i])
     run.drives.now[d.WHOLE, i] = c.whole_force(place, speed, n + more, row, chains.pulls[i])
 
@@ -104,7 +102,7 @@ def _sample_points(place: Array, count: int, row: Array, points: Array) -> None:
 
 @kernel
 def record_chain_step(run: ChainRun, records: Records, stock: Array) -> None:
-    """Record a step, and check that energy has not grown without supply."""
+    """Record a step, and check that energy has not increased without supply."""
     states, tensions, lengths, energies, _notes, points = records
     state, drives, chains, at, r = run.state, run.drives, run.chains, run.at, run.at[progress.RECORDS]
     audit = drives.audit
@@ -193,26 +191,25 @@ def run_chains(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps; a prepared run continues at the end of the last call, identical to the last bit.
+    """Integrate some steps; a prepared run continues from the end of the last call, bit by bit identical.
 
     Args:
         rules: See `Rules`; the loops of drums are closed every so many steps.
         numbers: See `Numbers`.
-        body: Rows of the cable_table, anchors in the platform's principal axes from its center of mass, which holds
-            what it carries of the chains; inertia; a projection (6, 6) onto its free motions; and in these axes the
-            place that the given wrench is about, (3,).
+        body: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass,
+            which includes the chains' mass at node 0; inertia; a projection (6, 6) onto the free motions; and the
+            reference point of the given wrench in these axes, (3,).
         data: Of the drives, (DATA_ROWS, m).
         courses: Of lengths, of wrenches and of the wind's velocity, as in `motion.run_massless`.
-        kept: As there, with one counter more, and ROOM numbers to work in, with
-            two for every number of the course of lengths.
+        kept: As there, with one counter more, and ROOM numbers as work array plus two for every number of the length
+            table.
         chain_arrays: `Chains`, in and out.
-        stock: Energies of the start that could become motion, (2,), in and out; NaN at first.
+        stock: Initial energies that are convertible into motion, (2,), in and out; NaN before the first call.
         records: Filled as in `motion.run_massless`; and points of the cables (R, m, points, 3) at equal material steps
         from the
             exit on.
-        steps: Number of steps, fewer without space for the records of another. With 0 the state at
-            hand is recorded.
-        every: After how many steps one is recorded, the start first.
+        steps: Number of steps, fewer if the space for records ends. With 0 the present state is recorded.
+        every: Number of steps per record; the first record is the start.
     """
     kind, _remembered, stride = rules
     step, gravity, filtering = numbers

@@ -1,8 +1,9 @@
 """Exact dynamic stiffness of one cable, and the number of its natural frequencies below a given frequency.
 
-Elements are joined from the frame end on; docs/model.md, section 11. The transfer matrix of an element is exact:
-u' = C f, f' = -mu u about rest, by collocation at eight Gauss points. Out of the cable's plane it is one equation, in
-it two; both go through the same code, with real numbers or, where something takes energy, with complex ones.
+Elements are joined one by one, starting at the frame end; docs/model.md, section 11. The transfer matrix of an element
+solves u' = C f, f' = -mu u about the state of rest, by collocation at eight Gauss points. The motion has one equation
+normal to the cable's plane and two equations in it. The same code solves both, with real numbers, or with complex
+numbers if there is damping.
 """
 
 from __future__ import annotations
@@ -37,15 +38,15 @@ def _gauss() -> tuple[Array, Array, Array]:
     values = np.array([one(nodes) for one in basis])
     integrals = np.array([one.integ(lbnd=-1.0)(nodes) for one in basis])
     scale = np.arange(STAGES) + 0.5
-    lagrange = values * weights * scale[:, None]  # of Legendre's polynomials, one node a column
+    lagrange = values * weights * scale[:, None]  # Legendre polynomials, one node per column
     return 0.5 * (nodes + 1.0), 0.5 * weights, np.ascontiguousarray(0.5 * (integrals.T @ lagrange))
 
 
-NODES, WEIGHTS, INTEGRALS = (locked(values) for values in _gauss())  # kernels take them as they are once compiled
+NODES, WEIGHTS, INTEGRALS = (locked(values) for values in _gauss())  # compiled kernels contain them as constants
 
 
 class Wave(NamedTuple):
-    """Terms of the two wave equations at a frequency: mu, and the factors of C across and along the cable."""
+    """Terms of the two wave equations at a frequency: mu, and the factors of C across the cable and along it."""
 
     mu: Any
     across: Any
@@ -54,7 +55,7 @@ class Wave(NamedTuple):
 
 @glue
 def fill_flexibility(string: String, wave: Wave, start: float, size: float, normal: bool, c: Numbers) -> None:
-    """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz; normal to the plane the first only."""
+    """Fill C at the stages of an element, (STAGES, 3): xx, xz, zz; only the first of them normal to the plane."""
     for k in range(STAGES):
         vertical = vertical_at(string, start + NODES[k] * size)
         square = string.horizontal * string.horizontal + vertical * vertical
@@ -131,7 +132,7 @@ def _solve_in_place(system: Numbers, n: int, columns: int) -> None:
 
 @glue
 def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Numbers) -> None:
-    """Fill the transfer matrix (2 d, 2 d) of an element: u, f at its end by u, f at its start."""
+    """Fill the transfer matrix (2 d, 2 d) of an element: from (u, f) at its start to (u, f) at its end."""
     n = STAGES * d
     _fill_stages(c, mu, size, d, system)
     _solve_in_place(system, n, n + 2 * d)
@@ -153,20 +154,20 @@ def transfer(c: Numbers, mu: Any, size: float, d: int, system: Numbers, phi: Num
 OMEGA, SQUARE, DRAG, ACROSS, ALONG = 0, 1, 2, 3, 4
 WAVE_COLUMNS = 5
 ROOM = (5 * STAGES, 20)  # shape of the work array
-MESHES = 8  # tried in turn if a joint of elements is near a node of the cable up to that joint
-SHORTER = 0.0618034  # by which share each has shorter elements: no ratio of small numbers, which would meet nodes again
-ROUNDING = 2.0**-52  # by which mu grows with them, should the frequency be a held one to the last bit
-CLEAR = 1e-6  # of what a joint moves at rest: one that moves less is at a node, and digits would be lost
-# columns of what is found of a cable: in its plane, and normal to it
+MESHES = 8  # number of meshes that are tried if a joint of elements is near a vibration node of the cable up to it
+SHORTER = 0.0618034  # relative decrease of the element length per mesh; not a ratio of small integers
+ROUNDING = 2.0**-52  # growth of mu per mesh, in case omega is exactly a held frequency
+CLEAR = 1e-6  # relative to a joint's static motion: a joint that moves less is at a node and loses accuracy
+# columns of a cable's result: in its plane, and normal to it
 XX, XZ, ZZ, YY = 0, 1, 2, 3
 FOUND = 4
 MOST_ELEMENTS = 10_000
-SINGULAR, TOO_MANY = -1, -2  # in place of a count
+SINGULAR, TOO_MANY = -1, -2  # returned instead of a count
 
 
 @glue
 def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> None:
-    """Fill displacement and force at an element's end for a unit at its start, where f = k u: (d, d) each in moved."""
+    """Fill an element's end displacement and force, (d, d) each, for unit displacements of its start, where f = k u."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, b], phi[d + a, b]
@@ -179,7 +180,7 @@ def _transfer_stiffness(phi: Numbers, d: int, k: Numbers, moved: Numbers) -> Non
 
 @glue
 def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, moved: Numbers) -> None:
-    """The same of the first element, whose start moves by give (d, d) lost for a unit of force; give 0: it is held."""
+    """`_transfer_stiffness` of the first element; its start moves by give (d, d) times lost per force, give 0: held."""
     for a in range(d):
         for b in range(d):
             end, force = phi[a, d + b], phi[d + a, d + b]
@@ -193,7 +194,7 @@ def _first_transfer(phi: Numbers, d: int, give: Numbers, lost: Any, k: Numbers, 
 
 @formula
 def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
-    """Fill k = force end^-1, the two on top of each other in moved."""
+    """Fill k = force end^-1; moved contains end above force."""
     if d == 1:
         k[0, 0] = moved[2, 0] / moved[0, 0]
     else:
@@ -206,9 +207,10 @@ def _stiffness_from_transfer(moved: Numbers, d: int, k: Numbers) -> None:
 
 @glue
 def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
-    """Negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; SINGULAR where it is not clear of that.
+    """Number of negative eigenvalues of the pivot Phi_uf^-1 moved, a symmetric matrix; SINGULAR if it is close to that.
 
-    The determinant of moved is one or a little more at rest, and zero where the cable up to there has a node.
+    The determinant of moved is at least one at zero frequency, and zero if the joint is at a node of the cable up to
+    it.
     """
     if d == 1:
         pivot = moved[0, 0].real * phi[0, 1].real
@@ -226,7 +228,7 @@ def _negative_pivots(phi: Numbers, d: int, clear: float, moved: Numbers) -> int:
 
 @glue
 def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
-    """Negative eigenvalues of the pivot 1/give + k00 at a start that is flexible along one direction."""
+    """Number of negative eigenvalues of the pivot 1/give + k00 at a start that is flexible in one direction."""
     if d == 1:
         return int(1.0 + (give[0, 0] * phi[0, 0] / phi[0, 1]).real < 0.0)
     determinant = phi[0, 2] * phi[1, 3] - phi[0, 3] * phi[1, 2]
@@ -242,9 +244,10 @@ def _negative_spring_pivots(phi: Numbers, d: int, give: Numbers) -> int:
 def _cable_stiffness_at(
     string: String, wave: Wave, omega: float, phase: float, d: int, give: Numbers, room: Numbers, found: Numbers
 ) -> int:
-    """Fill K(omega) - K(0) of a cable's platform end, (d, d); returns how many held frequencies lie below omega.
+    """Fill K(omega) - K(0) of a cable's platform end, (d, d); returns the number of held frequencies below omega.
 
-    SINGULAR where a joint of elements is about at a node, TOO_MANY where the elements are too many.
+    A held frequency is a natural frequency of the cable with a fixed platform end. The result is SINGULAR if a joint of
+    elements is close to a node, and TOO_MANY if the number of elements is too large.
     """
     c, system, phi = room[2 * STAGES : 3 * STAGES], room[: 2 * STAGES], room[3 * STAGES : 3 * STAGES + 4]
     rest, k = room[3 * STAGES + 4 :, :2], room[3 * STAGES + 4 :, 2:4]
@@ -257,7 +260,7 @@ def _cable_stiffness_at(
     for number in range(MOST_ELEMENTS + 1):
         size = element_length(string, start, omega, phase)
         last = is_at_end(string, start + size)
-        # at rest the end moves by the sum of all C, for a unit of force
+        # at zero frequency the end moves by the integral of C per unit of force
         fill_flexibility(string, Wave(wave.mu, 1.0, 1.0), start, size, d == 1, c)
         fill_integral(c, size, d, moved)
         for a in range(d):
@@ -297,11 +300,11 @@ def dynamic_stiffnesses(
 
     Args:
         strings: (N, m, STRING_COLUMNS).
-        waves: (1 or N, F, WAVE_COLUMNS), of the type of room and found.
+        waves: (1 or N, F, WAVE_COLUMNS), with the data type of room and found.
         phase: Phase of a transverse wave in an element [rad], < pi.
         room: Work array of shape ROOM.
         found: Filled: K(omega) - K(0), (N, F, m, FOUND) [N/m]; NaN without horizontal and vertical force.
-        counts: Filled: held frequencies below omega in the plane and normal to it, (N, F, m, 2); negative where
+        counts: Filled: numbers of held frequencies below omega in the plane and normal to it, (N, F, m, 2); negative if
             the cable has too many elements.
     """
     give, block = room[4 * STAGES : 4 * STAGES + 2, :2], room[4 * STAGES : 4 * STAGES + 2, 2:4]

@@ -1,6 +1,6 @@
 """Drives: ideal winch, second-order winch, or drum with motor, control loops and friction; cable on the drum.
 
-Lengths s count along the path of winding, outward; docs/model.md, sections 10 and 11.
+Lengths s are measured along the path of winding, outward; docs/model.md, sections 10 and 11.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ from sagline.kernels import tables
 from sagline.kernels.cable import geometry as g
 from sagline.kernels.jit import formula, glue, kernel
 
-BIN = 0.005  # m of cable on the drum that lie at one tension
+BIN = 0.005  # length of cable on the drum with one common strain [m]
 
 
 @kernel
 def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: float) -> float:
     """Wind cable of a given strain onto a drum; returns the energy [J] lost by mixing strains within a bin.
 
-    What lies in a bin has one strain, that with which it is as long as it was, strained and unstrained.
+    The cable in a bin has one strain, which preserves its strained and its unstrained length.
 
-    layer: strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's; place:
-    what is let out before [m]; step: how much of it is wound in [m], > 0; stiffness: EA [N].
+    layer: strain of the cable on the drum, bin by bin, (B,), the last bin without end; place: length let out before
+    [m]; step: length that is wound in [m], > 0; stiffness: EA [N].
     """
     lost = 0.0
     first, last = _bin_of(layer, place - step), _bin_of(layer, place)
     for k in range(first, last + 1):
         begin = max(place - step, k * BIN) if k > first else place - step
         middle = min(place, (k + 1) * BIN) if k < last else place
-        if k == layer.shape[0] - 1:  # endless, it takes the winding strain
+        if k == layer.shape[0] - 1:  # the last bin has no end and keeps its strain
             lost += 0.5 * stiffness * (strain - layer[k]) ** 2 * (middle - begin) / (1.0 + strain)
             continue
         new, old = (middle - begin) / (1.0 + strain), max((k + 1) * BIN - middle, 0.0) / (1.0 + layer[k])
@@ -45,8 +45,8 @@ def wind_in(layer: Array, place: float, step: float, strain: float, stiffness: f
 def pay_out(layer: Array, place: float, step: float, stiffness: float) -> tuple[float, float]:
     """Mean strain of the cable that a drum lets out, and the energy [J] lost by averaging.
 
-    layer: strain of the cable on the drum, bin by bin, (B,); what is beyond the last border is the last bin's; place:
-    what is let out before [m]; step: how much more [m], > 0; stiffness: EA [N].
+    layer: strain of the cable on the drum, bin by bin, (B,), the last bin without end; place: length let out before
+    [m]; step: length that is let out in addition [m], > 0; stiffness: EA [N].
     """
     first, last = _bin_of(layer, place), _bin_of(layer, place + step)
     if first == last:
@@ -72,38 +72,38 @@ IDEAL, SECOND_ORDER, DRUMS = 0, 1, 2
 
 NO, YES, NEW = 0.0, 1.0, 2.0
 
-# rows of what the drives of m cables do, (DRIVE_ROWS, m)
+# rows of the state of the drives of m cables, (DRIVE_ROWS, m)
 RATE = 0  # dL/dt of the unstrained length [m/s]
-WOUND, SPEED = 1, 2  # s let out [m], and its rate [m/s]
-FORCE, INTEGRAL = 3, 4  # of the motor at the cable, outward; that of its loop [N]
-AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # tension at the frame end, damping with it; H, tension at the drum without [N]
+WOUND, SPEED = 1, 2  # length s that is let out [m], and its rate [m/s]
+FORCE, INTEGRAL = 3, 4  # force of the motor at the cable, outward; integral part of its controller [N]
+AT_FRAME, WHOLE, AT_DRUM = 5, 6, 7  # frame-end tension with damping; H and tension at the drum without damping [N]
 STRETCHING = 8  # damping part of H [N]
-FILTERED = 9  # tension at the frame end behind the load cell's filter [N]
+FILTERED = 9  # frame-end tension after the load cell's filter [N]
 PEAK = 10  # largest tension at the frame end [N]
-HELD, SATURATED, SLACK = 11, 12, 13  # NO, YES, or NEW until it is noted
+HELD, SATURATED, SLACK = 11, 12, 13  # NO, YES, or NEW for an event that is not recorded yet
 STORED = 14  # strain of the cable that enters or leaves the drum
 BEFORE, BEFORE_WHOLE, BEFORE_DRUM = 15, 16, 17  # L, H and tension at the drum one step before
-PULL = 18  # tension at the frame end without what damping adds [N]; of cables without mass
+PULL = 18  # frame-end tension without damping [N]; cables without mass only
 DRIVE_ROWS = 19
 
-# rows of what they are, (DATA_ROWS, m)
+# rows of the parameters of the drives, (DATA_ROWS, m)
 INERTIA = 0  # inertia of motor, gear and drum at the cable [kg]
-FORCE_LIMIT, SPEED_LIMIT = 1, 2  # [N], [m/s]
-FRICTION = 3  # [N]
+FORCE_LIMIT, SPEED_LIMIT = 1, 2  # of the motor [N], [m/s]
+FRICTION = 3  # Coulomb friction [N]
 POSITION_GAIN, SPEED_GAIN, INTEGRAL_GAIN = 4, 5, 6  # [1/s], [N s/m], [N/m]
 BANDWIDTH, RATIO = 7, 8  # second-order winch: omega [rad/s], damping ratio
 WINDING_STRAIN = 9  # strain of the cable on the drum
 BEHIND_RISE = 10  # height of the frame end above the drum [m]
-DRAG = 11  # force of the wind on a length, by the square of its speed [N s^2/m^3]
+DRAG = 11  # force of the wind per length and square of the speed [N s^2/m^3]
 DATA_ROWS = 12
 
 # sums over a run [J]
 SUPPLIED, LOST, ON_DRUMS, GIVEN_POWER, LOST_POWER = 0, 1, 2, 3, 4
-START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start, of which potential [J]; the time of step 0 [s]
-MOVED = 8  # largest sum so far: kinetic, changed potential, supplied and lost energy
+START, START_POTENTIAL, BEGIN = 5, 6, 7  # energy at the start and its potential part [J]; time of step 0 [s]
+MOVED = 8  # largest sum so far of kinetic energy, change of potential energy, supplied and lost energy
 AUDIT_SIZE = 9
 
-LOOP_PERIOD = 1e-3  # s
+LOOP_PERIOD = 1e-3  # [s]
 
 
 class Drives(NamedTuple):
@@ -184,7 +184,7 @@ def turn_drums(drives: Drives, cables: Array, rows: Array, gravity: float, time:
 
 @formula
 def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
-    """Add to the audit the strain change where cable leaves its drum; RATE must still be that of the step."""
+    """Add to the audit the strain change of the cable that leaves its drum; requires the RATE of the step."""
     for i in range(cables.shape[0]):
         stiffness = cables[i, tables.STIFFNESS]
         wound = stiffness * drives.now[STORED, i]
@@ -197,7 +197,7 @@ def _add_slip_energy(drives: Drives, cables: Array, time: float) -> None:
 def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> None:
     """Fill the motor forces from lengths and speeds: P-PI control with anti-windup.
 
-    targets: s to keep (m,), then the tensions that are expected at the drums (m,).
+    targets: set points of s (m,), then the expected tensions at the drums (m,).
     """
     m = drives.now.shape[1]
     for i in range(m):
@@ -216,14 +216,14 @@ def close_loops(drives: Drives, targets: Array, rates: Array, period: float) -> 
 
 @formula
 def tension_at_drum(whole: float, lifted: float, stiffness: float) -> float:
-    """Tension at the drum [N] from H there: H at the frame end less the weight of the cable in between."""
+    """Tension at the drum [N] from H there, which is H at the frame end minus the weight of the cable in between."""
     fallen = whole - lifted
     return 2.0 * fallen / (1.0 + math.sqrt(max(1.0 + 2.0 * fallen / stiffness, 0.0)))
 
 
 @glue
 def keep_set_points(drives: Drives, rows: Array, targets: Array, rates: Array) -> None:
-    """Fill lengths and rates of winches that keep their set points."""
+    """Fill lengths and rates of ideal winches."""
     if drives.kind == IDEAL:
         for i in range(rows.shape[1]):
             held = drives.now[HELD, i] > 0.0
@@ -252,7 +252,7 @@ def store_step_start(drives: Drives, rows: Array) -> None:
 
 @glue
 def turn_winches(drives: Drives, cables: Array, rows: Array, gravity: float, time: float) -> None:
-    """Let out or take in cable for a time; winches that keep their set points do so where these are taken."""
+    """Let out or take in cable for a time; ideal winches take their lengths from the set points elsewhere."""
     if drives.kind == DRUMS:
         turn_drums(drives, cables, rows, gravity, time)
     elif drives.kind == SECOND_ORDER:

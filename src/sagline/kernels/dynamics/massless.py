@@ -1,4 +1,4 @@
-"""A run of a platform on cables without mass: its arrays, loads of the cables, forces and powers at a time."""
+"""Simulation of a platform on massless cables: arrays, loads of the cables, and forces and powers at a time."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block
 
 SPLITTING, RUNGE_KUTTA = 0, 1
-DAMPED, LOADED, BLOWN = 1, 2, 4  # bits of what damps or loads
+DAMPED, LOADED, BLOWN = 1, 2, 4  # bits of the active damping and loads
 
 Losses = tuple[float, float]
-ModelTerms = tuple[int, float, float, float, bool | None]  # with gravity; anything behind the cables: True, or None
-Rules = tuple[int, int, int, int, int]  # integrator, kind of winches, remembered, what damps or loads, loops' stride
-Numbers = tuple[float, float, float, float]  # step [s], loss_time [s], air damping [N s/m^2], share of a new reading
+ModelTerms = tuple[int, float, float, float, bool | None]  # with gravity; True for pulleys or dead lengths, else None
+Rules = tuple[int, int, int, int, int]  # integrator, winches, remembered, damping and loads, steps per control period
+Numbers = tuple[float, float, float, float]  # step [s], loss_time [s], air damping [N s/m^2], weight of a new reading
 Robot = tuple[Array, Array, Array, Array]  # cables, body, inertia, freedom
 Courses = tuple[
     progress.CubicTableArrays, progress.CubicTableArrays, progress.CubicTableArrays
-]  # of lengths, wrenches, the wind
-Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives' now, layers, audit, counters
+]  # of lengths, wrenches, and wind velocity
+Kept = tuple[Array, Array, Array, Array, Array, Indices, Array]  # state, rows, drives, layers, audit, counters
 Records = tuple[Array, Array, Array, Array, Array]  # states, tensions, lengths, energies, notes
 
 
@@ -98,13 +98,13 @@ def massless_run_of(
 
 @glue
 def cable_gravity(run: MasslessRun) -> float:
-    """Gravity where cables weigh, else 0 [m/s^2]."""
+    """Gravity if the cables have weight, else 0 [m/s^2]."""
     return run.model.gravity if run.model.code == codes.CATENARY else 0.0
 
 
 @kernel
 def add_wind_on_cables(cables: Array, drag: Array, rows: Array, wind: Array, given: Array) -> None:
-    """Add half of the wind's force on every cable, acting along its chord, to a wrench (6,)."""
+    """Add half of the wind's force on every cable, which acts across its chord, to a wrench (6,)."""
     for i in range(cables.shape[0]):
         x = rows[g.AZIMUTH_X, i] * rows[g.COSINE, i]
         y = rows[g.AZIMUTH_Y, i] * rows[g.COSINE, i]
@@ -138,7 +138,7 @@ def project_on_freedom(freedom: Array, wrench: Array, part: Array) -> None:
 def fill_frame_end_tensions(
     weight_of: float, cables: Array, rows: Array, data: Array, now: Array, behind: bool | None
 ) -> None:
-    """Fill the tensions at frame ends and drums, and H = T + T^2/(2 EA) - w z, which is one number a cable."""
+    """Fill the tensions at frame ends and drums, and H = T + T^2/(2 EA) - w z, one value of H per cable."""
     for i in range(cables.shape[0]):
         weight, stiffness = cables[i, tables.DENSITY] * weight_of, cables[i, tables.STIFFNESS]
         if behind is None:
@@ -166,13 +166,14 @@ def damp_cables(
 ) -> float:
     """Fill the damping wrench (6,) of the cables; returns the power lost.
 
-    All of a cable stretches alike, what lies behind the free span with it, and what is let out lengthens the span by
-    what it is strained: EA/L times the chord's rate less that. Of this the stretch has the share of its compliance, 1
-    in a taut cable, 0 in a slack one. A cable moves in the air as its chord does.
+    The strain rate is the same along a whole cable, including the part behind the free span. Cable that is let out
+    lengthens the span by its strained length. The damping force is proportional to EA/L times the rate of the chord
+    minus this length. The stretch takes a share of the rate given by its compliance: 1 in a taut cable, 0 in a slack
+    one. In the air, a cable moves like its chord.
 
-    losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity where cables weigh, else 0 [m/s^2]; turning:
-    velocity of the center of mass, and angular velocity, (6,); now: of the drives; what damping adds to the tensions is
-    filled; wrench: filled.
+    losses: loss_time [s], and air damping [N s/m^2]; weight_of: gravity if the cables have weight, else 0 [m/s^2];
+    turning: velocity of the center of mass, and angular velocity, (6,); now: state of the drives, in which the damping
+    parts of the tensions are filled; wrench: filled.
     """
     lost = 0.0
     for k in range(6):
@@ -202,7 +203,7 @@ def damp_cables(
 
 @kernel
 def fill_set_points(run: MasslessRun, now: float, shift: float) -> None:
-    """Fill the set points at a time, and the lengths of winches that keep them."""
+    """Fill the set points at a time, and the lengths of ideal winches."""
     at = run.at
     at[progress.LENGTH_AT] = progress.interpolate_table(
         run.lengths, at[progress.LENGTH_AT], now, shift, run.targets, run.target_rates

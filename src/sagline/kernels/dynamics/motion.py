@@ -1,7 +1,8 @@
-"""The platform on cables without mass, in time: one loop over steps, with everything inside it.
+"""Motion of the platform on massless cables: one compiled loop over the time steps.
 
-Two codes: a symplectic splitting (kick, drift, free turn, kick; one evaluation of the cables a step, order 2, its
-energy has no trend), and the classical Runge-Kutta method (four evaluations, order 4). docs/model.md, section 11.
+There are two integrators. The symplectic splitting (kick, drift, free rotation, kick) has order 2, one evaluation of
+the cables per step, and an energy error without drift. The classical Runge-Kutta method has order 4 and four
+evaluations per step. docs/model.md, section 11.
 """
 
 from __future__ import annotations
@@ -53,12 +54,12 @@ from sagline.kernels.dynamics.rigid_body import (
 from sagline.kernels.forward.platform import platform_energy
 from sagline.kernels.jit import entry, glue, kernel
 
-GROWTH = 0.1  # relative to MOVED, the exchanged energy: a larger energy error means that the step is too long
+GROWTH = 0.1  # energy error relative to the exchanged energy MOVED; a larger error means that the step is too long
 
 
 @kernel
 def record_step(run: MasslessRun, records: Records) -> None:
-    """Record a step, and check that energy has not grown without supply."""
+    """Record a step, and check that energy has not increased without supply."""
     states, tensions, lengths, energies, _notes = records
     state, drives, rows, at = run.state, run.drives, run.rows, run.at
     audit, row = drives.audit, at[progress.RECORDS]
@@ -160,7 +161,7 @@ def splitting_step(run: MasslessRun, now: float) -> None:
     fill_forces(run, now + h)
     add_winch_energy(drives, run.cables, rows, h)
     kick_body(run.state, run.inertia, run.gradient, half)
-    if run.work & DAMPED:  # the adjoint of the first kick, by one correction
+    if run.work & DAMPED:  # the adjoint of the first kick, with one correction
         fill_damping(run)
         for k in range(6):
             run.before[k] = run.damping[k]
@@ -204,23 +205,22 @@ def run_massless(
     steps: int,
     every: int,
 ) -> None:
-    """Integrate some steps; a prepared run continues at the end of the last call, identical to the last bit.
+    """Integrate some steps; a prepared run continues from the end of the last call, bit by bit identical.
 
     Args:
         model: See `ModelTerms`.
         rules: See `Rules`; the loops of drums are closed every so many steps.
-        numbers: See `Numbers`; the share of a new reading in a load cell's filtered one.
-        robot: Rows of the cable_table, anchors in the platform's principal axes from its center of mass; body with
-            its center at zero; inertia; and free motions (n, 6).
+        numbers: See `Numbers`.
+        robot: Rows of the cable_table, with anchors in the platform's principal axes relative to its center of mass;
+            body with its center at zero; inertia; and free motions (n, 6).
         data: Of the drives, (DATA_ROWS, m).
-        courses: Of lengths, of wrenches and of the wind's velocity. Lengths (K, m) are unstrained, except for drums:
-            lengths s along the path of winding, then expected tensions, (K, 2 m).
+        courses: Of lengths, of wrenches and of the wind's velocity. Lengths (K, m) are unstrained. For drums the table
+            has lengths s along the path of winding, then expected tensions, (K, 2 m).
         kept: State of a run, in and out, and work arrays.
         records: Filled: states with the angular velocity in the momentum's place, tensions at the frame ends, lengths,
             energies, notes.
-        steps: Number of steps, fewer without space for the records of another. With 0 the start
-            alone is looked at.
-        every: After how many steps one is recorded, the start first; 0 for the last one.
+        steps: Number of steps, fewer if the space for records ends. With 0 only the start is evaluated.
+        every: Number of steps per record, starting with the initial state; 0 records only the last step.
     """
     integrator, kind, _remembered, _work, stride = rules
     step, filtering = numbers[0], numbers[3]

@@ -1,4 +1,4 @@
-"""Tasks before and after the steps of a controller's period: set points and sensor readings."""
+"""Tasks before and after the steps of a control period: set points and sensor readings."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def begin_period(
     with_wrench: bool,
     end: float,
 ) -> bool:
-    """Lead the course of set points on, straight to those that are given; false, and nothing done, if one cannot be.
+    """Extend the time table linearly to new set points; False, without any change, if one of them is invalid.
 
     Args:
-        given: Unstrained lengths (m,); of drums tensions that are expected (m,), else none; wrench (6,).
+        given: Unstrained lengths (m,); for drums also expected tensions (m,); wrench (6,).
         least: Lower bounds of the lengths, (m,).
-        stretch: From unstrained lengths to those that the course is of, (m,).
+        stretch: Factors from unstrained lengths to lengths of the time table, (m,).
         lengths: Unstrained lengths at the end of the last period and of this one, (2, m).
-        course: See `tables_in_time.Course`, of two instants.
+        course: See `tables_in_time.Course`, with two instants.
         load: Wrench on the platform, (6,).
         at: Counters of the run.
         with_tension: True if tensions are given; otherwise they do not change.
@@ -91,8 +91,8 @@ def read_encoders(
     Args:
         drums: Table and starts of layers, as `turns_of_lengths` takes them.
         wound: Lengths off the drums [m], (m,).
-        stretch: From these to those along the path of winding, (m,).
-        zero: Counts at no turns, (m,).
+        stretch: Factors from lengths off the drums to lengths along the path of winding, (m,).
+        zero: Counts at zero turns, (m,).
         rate: Counts per turn let out, (m,).
         room: (3, 1, m).
         counts: Filled.

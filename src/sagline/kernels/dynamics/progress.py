@@ -1,4 +1,4 @@
-"""Progress of runs in time: time tables, counters, columns of records, and notes of events that begin by themselves."""
+"""Progress of simulations: time tables, counters, columns of records, and notes of events."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from sagline.kernels.jit import formula, glue, kernel
 
 MOMENT = 1e-6  # relative to a step: two instants closer than this count as equal
 
-CubicTableArrays = tuple[Array, Array, Array, Array]  # a Course as it comes from Python
+CubicTableArrays = tuple[Array, Array, Array, Array]  # a Course as passed from Python
 
 
 class CubicTable(NamedTuple):
-    """n numbers in time: a cubic on every interval, by its values and rates at both ends; held before and after."""
+    """Piecewise cubic time table of n numbers, from values and rates at interval ends; constant before and after."""
 
     time: Array  # instants [s], (K,), increasing
     value: Array  # values at these instants, (K, n)
@@ -27,10 +27,10 @@ class CubicTable(NamedTuple):
 
 @formula
 def interpolate_table(course: CubicTable, at: int, now: float, shift: float, value: Array, rate: Array) -> int:
-    """Fill values and rates (n,) at a time, from a course whose interval at or before it is known; returns that now.
+    """Fill values and rates (n,) of a table at a time, starting from an interval at or before it; returns its interval.
 
-    shift: a moment by which the interval is looked for earlier or later: at an instant of the course that before it is
-    taken where it is negative, that after it where it is positive.
+    shift: small time offset for the choice of the interval. At an instant of the table, a negative shift selects the
+    interval before it, a positive shift the interval after it.
     """
     times, last, moment = course.time, course.time.shape[0] - 1, now + shift
     while at < last - 1 and moment >= times[at + 1]:
@@ -56,14 +56,14 @@ def interpolate_table(course: CubicTable, at: int, now: float, shift: float, val
 
 @glue
 def interval_ends(course: CubicTable, at: int, moment: float) -> bool:
-    """True if the current interval ends by a moment and another follows."""
+    """True if the current interval ends at or before a time and another interval follows."""
     return at < course.time.shape[0] - 1 and moment >= course.time[at + 1]
 
 
-# counters that go in and out
+# counters, in and out
 STEPS, LENGTH_AT, WRENCH_AT, WIND_AT, NOTES, RECORDS, READY, FAILED, RENEWED = range(9)
 COUNTERS = 9
-# columns of the notes: what began when, with which cable; largest tensions before and after
+# columns of the notes: event, time and cable; largest tensions before and after it
 NOTE_TIME, NOTE_KIND, NOTE_CABLE, NOTE_BEFORE, NOTE_AFTER = range(5)
 NOTE_COLUMNS = 5
 NOTE_SLACK, NOTE_SATURATED = 0.0, 1.0
@@ -71,7 +71,7 @@ NOTE_SLACK, NOTE_SATURATED = 0.0, 1.0
 KINETIC, POTENTIAL, SUPPLIED, LOST = range(4)
 ENERGY_COLUMNS = 4
 
-ROUNDING = 1e-9  # of the sum of all parts of the energy, of chains of the weights': it may be so much off
+ROUNDING = 1e-9  # tolerance of the energy, relative to the sum of all its parts (for chains, of the weights)
 
 
 @kernel
@@ -104,5 +104,5 @@ def note_events(
 
 @glue
 def has_room(at: Indices, notes: Array, cables: int) -> bool:
-    """True if the notes have space for all events that can begin in a step."""
+    """True if the notes have space for all events that one step can cause."""
     return at[NOTES] + 2 * cables <= notes.shape[0]

@@ -1,9 +1,9 @@
 """A rigid body in free motion and under forces: building blocks of the integrators.
 
-The body's own axes are its principal axes, with the origin at the center of mass. A state is a row: position of the
-center of mass, unit quaternion (scalar last) from these axes to the world, so that the first seven are a pose row,
-velocity, and angular momentum in world axes, which no free motion changes.
-docs/model.md, section 11; Dullweber, Leimkuhler & McLachlan, J. Chem. Phys. 107, 1997.
+The body's own axes are its principal axes, with the origin at the center of mass. A state is a row of 13 numbers:
+position of the center of mass; unit quaternion (scalar last) from these axes to the world; velocity; angular momentum
+in world axes. The first seven are a pose row. The angular momentum is constant in free motion. docs/model.md, section
+11; Dullweber, Leimkuhler & McLachlan, J. Chem. Phys. 107, 1997.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def kick_body(state: Array, inertia: Array, wrench: Array, time: float) -> None:
 
 @formula
 def drift_body(state: Array, time: float) -> None:
-    """Move the center of mass on at its velocity."""
+    """Move the center of mass at its velocity for a time [s]."""
     for k in range(3):
         state[CENTER + k] += time * state[VELOCITY + k]
 
@@ -48,10 +48,11 @@ def _into_body(state: Array, x: float, y: float, z: float) -> Triple:
 
 @formula
 def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc: float, share: float) -> Six:
-    """Turn about the first of three axes in cyclic order by share pa [rad].
+    """Rotate by the angle share times pa [rad] about the first of three axes in cyclic order.
 
-    Takes the quaternion along them with its scalar, and the angular momentum along them; returns the quaternion, and
-    the momentum along the two axes that turn away from it.
+    The arguments are the quaternion's components along the axes and its scalar, and the components of the angular
+    momentum along the axes. The results are the new quaternion, and the angular momentum along the second and third
+    axis.
     """
     angle = 0.5 * share * pa
     sine, cosine = math.sin(angle), math.cos(angle)
@@ -68,7 +69,7 @@ def _turn_about(a: float, b: float, c: float, w: float, pa: float, pb: float, pc
 
 @formula
 def free_turn(state: Array, inertia: Array, time: float) -> None:
-    """Turn the body for a time without any moment: exactly about one principal axis after the other, symmetrically."""
+    """Rotate the body for a time without moment: a symmetric sequence of exact rotations about principal axes."""
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
     px, py, pz = _into_body(state, state[MOMENTUM], state[MOMENTUM + 1], state[MOMENTUM + 2])
     by_x, by_y = 0.5 * time / inertia[MOMENTS], 0.5 * time / inertia[MOMENTS + 1]
@@ -77,7 +78,7 @@ def free_turn(state: Array, inertia: Array, time: float) -> None:
     z, x, y, w, px, py = _turn_about(z, x, y, w, pz, px, py, time / inertia[MOMENTS + 2])
     y, z, x, w, pz, px = _turn_about(y, z, x, w, py, pz, px, by_y)
     x, y, z, w, py, pz = _turn_about(x, y, z, w, px, py, pz, by_x)
-    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # removes rounding only
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)  # a correction of rounding errors only
     state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3] = x * scale, y * scale, z * scale, w * scale
 
 
@@ -110,7 +111,7 @@ def power_of(wrench: Array, state: Array, spinning: Triple) -> float:
 
 @formula
 def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
-    """Fill the time derivative (13,) of a state under a wrench; the quaternion keeps its length."""
+    """Fill the time derivative (13,) of a state under a wrench; the derivative preserves the quaternion's length."""
     wx, wy, wz = spin(state, inertia)
     x, y, z, w = state[TURN], state[TURN + 1], state[TURN + 2], state[TURN + 3]
     for k in range(3):
@@ -125,12 +126,12 @@ def rates_of(state: Array, inertia: Array, wrench: Array, rates: Array) -> None:
 
 @entry
 def platform_state(state: Array, inertia: Array, center: Array, turn: Array, out: Array) -> None:
-    """Fill what the platform's own frame does: position of its origin, quaternion, velocity and angular velocity (13,).
+    """Fill the state of the platform frame: position of its origin, quaternion, velocity and angular velocity (13,).
 
     Args:
-        state: As above.
-        inertia: As above.
-        center: Center of mass, from the frame's origin, in principal axes (3,).
+        state: State, as in the module's docstring.
+        inertia: Row of inertia.
+        center: Center of mass, relative to the frame's origin, in principal axes (3,).
         turn: Quaternion from the frame's axes to the principal ones (4,).
         out: Filled.
     """

@@ -1,7 +1,8 @@
-"""One cable in spectral elements: its stiffness and mass, from which its modes follow; docs/model.md, section 11.
+"""Stiffness and mass of one cable in spectral elements, for its modes; docs/model.md, section 11.
 
-Nodes are those of Gauss and Lobatto, so that the mass is diagonal. An element is as long as the cable's flexibility is
-smooth over it, and of the degree that the waves in it need. Unknowns are scaled by the roots of their masses.
+The nodes are Gauss-Lobatto nodes, so that the mass matrix is diagonal. The length of an element is limited so that the
+cable's flexibility C is smooth in it. Its degree follows from the number of waves in it. Unknowns are scaled by the
+square roots of their masses.
 """
 
 from __future__ import annotations
@@ -25,24 +26,24 @@ from sagline.kernels.jit import entry, formula, kernel
 
 LARGEST_DEGREE = 48
 LEAST_DEGREE = 6
-HALF_WAVE = 1.5  # polynomial degrees per half wave
-ALWAYS = 7.0  # degrees added to those of the waves
+HALF_WAVE = 1.5  # polynomial degrees per half wavelength
+ALWAYS = 7.0  # degrees in addition to those for the waves
 MOST_PHASE = math.pi * (LARGEST_DEGREE - ALWAYS) / HALF_WAVE
 
 Rule = tuple[Array, Array, Array, Array]
 
 
 class Lobatto(NamedTuple):
-    """Nodes on [-1, 1] and what belongs to them, by degree: each of LARGEST_DEGREE + 1 rows, what is unused zero."""
+    """Gauss-Lobatto nodes on [-1, 1], their weights, slopes and integrals; first axis: degree; unused entries: 0."""
 
     nodes: Array  # (p, i)
     weights: Array  # (p, i)
-    slopes: Array  # derivative of the polynomial that is 1 at node i, at node q, (p, q, i)
-    integrals: Array  # integral from -1 to node q of that polynomial, (p, q, i)
+    slopes: Array  # derivative at node q of the polynomial that is 1 at node i, (p, q, i)
+    integrals: Array  # integral of this polynomial from -1 to node q, (p, q, i)
 
 
 class _Element(NamedTuple):
-    """A part of a cable: where it begins and its length [m], its first node, and its degree."""
+    """A part of a cable: its start and its length [m], its first node, and its degree."""
 
     start: float
     size: float
@@ -52,7 +53,7 @@ class _Element(NamedTuple):
 
 @formula
 def element_from(string: String, omega: float, start: float, first: int) -> _Element:
-    """The element that begins at a material point and a node."""
+    """The element that starts at a given material point and node."""
     size = element_length(string, start, omega, MOST_PHASE)
     vertical = vertical_at(string, start + 0.5 * size)
     force = math.sqrt(string.horizontal * string.horizontal + vertical * vertical)
@@ -76,7 +77,7 @@ def _element_flexibility(string: String, s: float) -> tuple[float, float, float,
 
 @kernel
 def add_element(string: String, part: _Element, lobatto: Lobatto, plane: Array, normal: Array) -> None:
-    """Add the stiffness of an element: to plane with two unknowns a node, to normal with one."""
+    """Add the stiffness of an element: to `plane` with two unknowns per node, to `normal` with one unknown per node."""
     n = part.degree + 1
     slopes = lobatto.slopes[part.degree]
     half = 0.5 * part.size
@@ -101,7 +102,7 @@ def add_element(string: String, part: _Element, lobatto: Lobatto, plane: Array, 
 
 @kernel
 def add_sums(string: String, part: _Element, lobatto: Lobatto, points: Array) -> None:
-    """Fill of an element's nodes: s, the mass (added), and the integral of C from the frame end on."""
+    """Fill s and the integral of C from the frame end, and add the mass, at the nodes of an element."""
     n = part.degree + 1
     half = 0.5 * part.size
     for q in range(n):
@@ -140,7 +141,7 @@ def add_stretch(string: String, part: _Element, lobatto: Lobatto, plane: Array) 
 
 @formula
 def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None:
-    """Fill the polynomials that are 1 at one node at a place on [-1, 1], by barycentric weights."""
+    """Fill the values of the Lagrange polynomials at a point of [-1, 1], by barycentric weights."""
     total = 0.0
     sign = 1.0
     for i in range(degree + 1):
@@ -159,7 +160,7 @@ def lagrange(lobatto: Lobatto, degree: int, place: float, values: Array) -> None
 
 @entry
 def node_counts(strings: Array, omega: float, counts: Indices) -> None:
-    """Fill the number of nodes (m,) that each cable (m, STRING_COLUMNS) needs up to an angular frequency."""
+    """Fill the number of nodes (m,) that each cable needs for angular frequencies up to omega [rad/s]."""
     for i in range(strings.shape[0]):
         string = string_at(strings, i)
         start, nodes = 0.0, 0
@@ -173,7 +174,7 @@ def node_counts(strings: Array, omega: float, counts: Indices) -> None:
 
 @formula
 def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -> None:
-    """Fill the shape at rest times the root of the mass, (nodes, 5): xx, xz, zx, zz, yy; and the whole mass, (4,)."""
+    """Fill static shapes times root masses, (nodes, 5): xx, xz, zx, zz, yy; and the mass in this motion, (4,)."""
     end = points[count - 1]
     determinant = end[2] * end[4] - end[3] * end[3]
     for k in range(4):
@@ -195,7 +196,7 @@ def _fill_rest_shapes(points: Array, count: int, carried: Array, still: Array) -
 
 @formula
 def _constrain_unknown(matrix: Array, unknown: int, stiffness: float) -> None:
-    """Fix an unknown: decouple it and give it a stiffness of its own."""
+    """Fix an unknown: decouple it, and set its own stiffness."""
     for j in range(matrix.shape[0]):
         matrix[unknown, j] = matrix[j, unknown] = 0.0
     matrix[unknown, unknown] = stiffness
@@ -212,7 +213,7 @@ def _scale_by_masses(matrix: Array, points: Array, used: int, each: int) -> None
 
 @formula
 def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
-    """Let the frame end move along the one direction in which it gives way, its first unknown; the second is idle."""
+    """Make the frame end's only flexible direction its first unknown; the second unknown is not used."""
     x, z = strings[i, BEHIND_X], strings[i, BEHIND_Z]
     square = x * x + z * z
     if square > 0.0:
@@ -231,18 +232,18 @@ def _set_frame_end(strings: Array, i: int, count: int, plane: Array) -> None:
 def spectral_matrices(
     strings: Array, omega: float, rule: Rule, points: Array, plane: Array, normal: Array, carried: Array, still: Array
 ) -> None:
-    """Matrices of m cables whose eigenvalues are the squares of their angular frequencies with both ends held.
+    """Matrices of m cables; the eigenvalues are the squared angular frequencies with both ends fixed.
 
     Args:
         strings: (m, STRING_COLUMNS).
         omega: Largest angular frequency whose waves the elements resolve [rad/s].
         rule: `Lobatto`.
-        points: Filled: s, mass and integrals of C of every node, (m, nodes, 6); s is NaN of nodes that are not used.
-        plane: Filled: scaled stiffness in the plane, (m, 2 nodes, 2 nodes), a node after the other [1/s^2].
-        normal: Filled: the same normal to it, (m, nodes, nodes).
-        carried: Filled: motion of the nodes with the platform end at rest, times the roots of their masses,
-            (m, nodes, 5).
-        still: Filled: mass of the cable as it then moves: xx, xz, zz, yy, (m, 4) [kg].
+        points: Filled: s, mass and integrals of C of every node, (m, nodes, 6); s is NaN for unused nodes.
+        plane: Filled: scaled stiffness in the plane, (m, 2 nodes, 2 nodes), node by node [1/s^2].
+        normal: Filled: scaled stiffness normal to the plane [1/s^2], (m, nodes, nodes).
+        carried: Filled: static motion of the nodes per motion of the platform end, times the roots of their masses, (m,
+            nodes, 5).
+        still: Filled: mass of the cable in this static motion: xx, xz, zz, yy, (m, 4) [kg].
     """
     lobatto = Lobatto(*rule)
     stiff = 1e6 * omega * omega
@@ -270,7 +271,7 @@ def spectral_matrices(
         _scale_by_masses(normal[i], points[i], count, 1)
         gives = x * x + z * z > 0.0
         _fill_rest_shapes(points[i], count, carried[i], still[i])
-        if gives:  # the one direction in which the first node moves is its first unknown
+        if gives:  # the flexible direction of the frame end is the first unknown
             root = math.sqrt(x * x + z * z)
             for k in range(2):
                 carried[i, 0, k] = (x * carried[i, 0, k] + z * carried[i, 0, 2 + k]) / root
@@ -290,7 +291,7 @@ def spectral_matrices(
 
 @entry
 def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values: Array) -> None:
-    """Fill what turns the scaled motion of the nodes into displacements at equal steps of length, (m, count, nodes)."""
+    """Fill matrices from scaled motions of the nodes to displacements at equal steps of length, (m, count, nodes)."""
     lobatto = Lobatto(*rule)
     count = values.shape[1]
     for i in range(strings.shape[0]):
@@ -312,7 +313,7 @@ def interpolate(strings: Array, omega: float, rule: Rule, points: Array, values:
 
 @entry
 def stretch_matrices(strings: Array, omega: float, rule: Rule, points: Array, matrices: Array) -> None:
-    """Fill the part of the scaled stiffness in the plane that is of stretch, (m, 2 nodes, 2 nodes)."""
+    """Fill the stretch part of the scaled in-plane stiffness, (m, 2 nodes, 2 nodes)."""
     lobatto = Lobatto(*rule)
     for i in range(strings.shape[0]):
         string = string_at(strings, i)

@@ -12,17 +12,17 @@ from sagline.kernels.cable.pulley import pulley_at
 from sagline.kernels.cable.terms import Model, Terms, model_of
 from sagline.kernels.jit import entry, formula
 
-# columns of the table of strings
+# columns of the table of strings, which are cables in vibration
 HORIZONTAL, VERTICAL = 0, 1  # T_x, T_z on the platform end [N]
 LENGTH = 2  # unstrained length of the free span [m]
 WEIGHT = 3  # weight per length [N/m]
 STIFFNESS = 4  # EA [N]
 DENSITY = 5  # [kg/m]
-# compliance of what is behind the frame end: (x, z) times its transpose in the plane, and normal to it [m/N]
-BEHIND_X, BEHIND_Z, BEHIND_Y = 6, 7, 8  # [sqrt(m/N)] the first two
+# compliance of the cable behind the frame end: (x, z) times its transpose in the plane, and normal to it [m/N]
+BEHIND_X, BEHIND_Z, BEHIND_Y = 6, 7, 8  # the first two in [sqrt(m/N)]
 STRING_COLUMNS = 9
 
-SMOOTH = 0.5  # of min N/w: longest element for which what it is made of is smooth
+SMOOTH = 0.5  # longest element in units of min N/w, for which the flexibility C is smooth
 TINY = 1e-300
 
 
@@ -66,13 +66,13 @@ def _least_force(string: String, start: float, end: float) -> float:
 
 @formula
 def slowness(string: String, force: float) -> float:
-    """Time that a transverse wave takes for a meter of unstrained cable [s/m] under a force."""
+    """Travel time of a transverse wave per meter of unstrained cable [s/m] under a force."""
     return math.sqrt(string.density * (1.0 / (force + TINY) + 1.0 / string.stiffness))
 
 
 @formula
 def shortest_wave(string: String, omega: float) -> float:
-    """Half the length of a transverse wave where the force is largest [m]: it is shorter elsewhere."""
+    """Half the wavelength of a transverse wave at the largest force [m]; elsewhere it is shorter."""
     low, high = abs(vertical_at(string, 0.0)), abs(string.vertical)
     force = math.hypot(string.horizontal, max(low, high))
     return math.pi / (omega * slowness(string, force) + TINY)
@@ -80,14 +80,14 @@ def shortest_wave(string: String, omega: float) -> float:
 
 @formula
 def _longest_element(string: String, start: float, end: float, omega: float, phase: float) -> float:
-    """Longest element [m] that an interval allows: C smooth, and at most so much phase of a transverse wave [rad]."""
+    """Longest element [m] in an interval: C is smooth, and a transverse wave has at most the given phase [rad]."""
     force = _least_force(string, start, end)
     return min(SMOOTH * force / (string.weight + TINY), phase / (omega * slowness(string, force) + TINY))
 
 
 @formula
 def is_at_end(string: String, s: float) -> bool:
-    """True if the sum of the elements' lengths equals the cable's except for rounding."""
+    """True if the sum of the elements' lengths equals the cable's length except for rounding."""
     return s >= string.length * (1.0 - 1e-12)
 
 
@@ -107,15 +107,15 @@ def element_length(string: String, start: float, omega: float, phase: float) -> 
 def fill_routing_compliance(
     terms: Terms, robots: Array, wraps: Array, leaving: Array, rows: Array, strings: Array
 ) -> None:
-    """Fill the last columns of the table of strings, (N, m, STRING_COLUMNS), of cables with something behind them.
+    """Fill the last columns of the table of strings, (N, m, STRING_COLUMNS), for cables with pulleys or dead lengths.
 
     Args:
         terms: Cable model.
         robots: cable_table, (1 or N, m, CABLE_COLUMNS).
         wraps: Wrap angles [rad], (N, m).
-        leaving: Tensions where the cables leave their pulleys [N], (N, m).
+        leaving: Tensions at the exit points [N], (N, m).
         rows: Work array, (CABLE_ROWS, m).
-        strings: Table of strings; its other columns must be filled.
+        strings: Table of strings, with its other columns already filled.
     """
     bare = model_of(terms)
     model = Model(bare.code, bare.k_h, bare.k_p, bare.gravity, True)
@@ -127,6 +127,6 @@ def fill_routing_compliance(
             x, z, gives = end_motion_per_length(model, cables, rows, i)
             root = math.sqrt(gives)
             strings[p, i, BEHIND_X], strings[p, i, BEHIND_Z] = root * x, root * z
-            # the whole plane turns about the swivel axis
+            # the whole plane of the cable turns about the swivel axis
             slack = pulley_at(cables, i).radius * (1.0 - rows[g.WRAP_COSINE, i])
             strings[p, i, BEHIND_Y] = slack / strings[p, i, HORIZONTAL] if slack > 0.0 else 0.0

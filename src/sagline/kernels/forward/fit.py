@@ -1,7 +1,7 @@
-"""Forward kinematics of straight cables: the pose whose distances fit the lengths best, by Levenberg and Marquardt.
+"""Forward kinematics of straight cables: a least-squares pose by the Levenberg-Marquardt method.
 
-For comparison with the exact cable. Straight cables that are too long or too short are not distinguished from taut
-ones: every length counts alike, and mirrored poses fit as well as the right one.
+This model serves for comparison with the exact cable. Straight cables that are too long or too short are not
+distinguished from taut ones. All lengths have the same weight, and mirrored poses fit as well as the true one.
 """
 
 from __future__ import annotations
@@ -43,19 +43,19 @@ from sagline.kernels.memory import Memory
 
 FIT_STEPS = 200
 FIRST_DAMPING = 1e-3  # relative to the largest diagonal element
-SMALL_STEP = 1e-14  # in the problem's units
+SMALL_STEP = 1e-14  # largest last step, in the problem's units
 NOTHING = 1e-13  # relative decrease of the cost below which a fit ends
 
 
 @formula
 def _straight_length(cables: Array, rows: Array, i: int) -> float:
-    """Length of a straight cable that is not strained [m], with what is behind it."""
+    """Length of an unstrained straight cable [m], including pulley and dead length."""
     return rows[g.CHORD, i] + straight_behind(pulley_at(cables, i), chord_at(rows, i))
 
 
 @kernel
 def _half_square_error(cables: Array, body: Array, lengths: Array, pose: Array, rotation: Array, rows: Array) -> float:
-    """Half the sum of squared length errors [m^2] at a pose, whose geometry it fills."""
+    """Half the sum of squared length errors [m^2] at a pose; fills the geometry of the pose."""
     cable_geometry(cables, body, pose, rotation, rows)
     total = 0.0
     for i in range(lengths.shape[0]):
@@ -88,7 +88,7 @@ def _normal_equations(free: Array, cables: Array, lengths: Array, space: Forward
 
 @glue
 def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardArrays) -> tuple[float, int, bool]:
-    """Move pose to a least-squares fit; returns half the sum of squares [m^2], steps tried, and whether it is a fit."""
+    """Move pose to a least-squares fit; returns half the sum of squares [m^2], the steps tried, and True on success."""
     cables, body, free = problem.cables, problem.body, problem.free
     rotation, rows = space.rotation, space.rows
     cost = _half_square_error(cables, body, lengths, pose, rotation, rows)
@@ -116,7 +116,7 @@ def _fit_pose(problem: PoseProblem, lengths: Array, pose: Array, space: ForwardA
             _normal_equations(free, cables, lengths, space)
             fitted = gain <= NOTHING * cost
         else:
-            fitted = length <= 1e-7  # squares of errors are rounded off at the root of the last digit
+            fitted = length <= 1e-7  # rounding of squared errors: square root of machine precision
             damping = max(10.0 * damping, 1e-12 * largest)
         if fitted:
             steps = iteration + 1
@@ -133,7 +133,7 @@ def fit_poses(
     memory: tuple[Array, Indices],
     found: SolutionArrays,
 ) -> None:
-    """Fit every sample in turn; arguments as of `forward_poses`. Forces are NaN, energy is half the sum of squares."""
+    """Fit every sample in turn; arguments as in `forward_poses`. Forces are NaN, energy is half the sum of squares."""
     batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)
     count, m = batch.lengths.shape
     space, rest = new_forward_arrays(Memory(*memory), kept.rows, kept.factor)

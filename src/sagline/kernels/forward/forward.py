@@ -44,13 +44,13 @@ from sagline.kernels.jit import entry, glue
 from sagline.kernels.memory import Memory
 
 FLAT = 1e-9  # relative to the largest stiffness: smaller ones count as zero
-OVERSTRETCHED = 0.1  # strain that no cable survives
-PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for the equilibrium, in order of use
+OVERSTRETCHED = 0.1  # strain above which a result is unrealistic
+PREDICTION, FROM_START, DOWNHILL = 0, 1, 2  # methods for the equilibrium, in the order of use
 
 
 @glue
 def _stability(low: float, high: float) -> int:
-    """Stability of an equilibrium from its extreme stiffnesses."""
+    """Stability of an equilibrium from its smallest and largest stiffness."""
     if low < -FLAT * high:
         return codes.FORWARD_UNSTABLE
     return codes.FORWARD_SOLVED if low > FLAT * high else codes.FORWARD_SINGULAR
@@ -98,10 +98,10 @@ def _find_pose(
     space: ForwardArrays,
     pose: Array,
 ) -> tuple[int, float]:
-    """Fill the equilibrium by the first reliable method; returns the steps, and the sum of tensions there.
+    """Fill the equilibrium by the first reliable method; returns the number of steps and the sum of tensions.
 
-    On return space is that of the pose: unbalance, stiffness, and its factor, of which NaN at the first place says that
-    there is none. exact: the model with an energy that leads to where the problem's own takes over.
+    On return, space contains unbalance, stiffness and its factor at the pose. A factor with NaN as its first number
+    does not exist. exact: model with an energy, from whose equilibrium the problem's own model continues.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     steps, size, known = 0, 0.0, 0.0
@@ -135,7 +135,7 @@ def _find_pose(
 def _fill_stability(
     problem: PoseProblem, pose: Array, arcs: Array, size: float, space: ForwardArrays, numbers: Array
 ) -> int:
-    """Fill the numbers of the pose in the work arrays, except for residuals and steps; returns the status."""
+    """Fill the numbers of the pose in the work arrays, without residuals and steps; returns the status."""
     model, cables, body = problem.model, problem.cables, problem.body
     numbers[ENERGY] = platform_energy(model, cables, body, problem.wrench, pose, space.rotation, space.rows)[0]
     symmetric_part(arcs, space.stiffness, space.matrix)
@@ -191,12 +191,12 @@ def forward_poses(
     """Solve every sample in turn.
 
     Args:
-        model: Cable model and the empirical one's constants; the shallow ones go downhill as exact cables and are
-            polished as what they are. Whether anything may be behind the cables: True, or None for never.
-        chained: Whether each sample starts where the last solved one ended, the first at starts[0].
+        model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
+            None. For shallow models, the descent uses the exact cable, and the last steps use the model itself.
+        chained: True if each sample starts at the result of the last solved one, and the first at starts[0].
         given: `ForwardSamples`.
-        chain: `LastEquilibrium`; a chain of samples continues from it where it starts at the remembered pose.
-        memory: `memory_for` as many cables.
+        chain: `LastEquilibrium`; a chain of samples continues from it if it starts at its pose.
+        memory: `memory_for` the number of cables.
         found: `Solutions`, filled.
     """
     batch, answer, kept = ForwardSamples(*given), Solutions(*found), LastEquilibrium(*chain)

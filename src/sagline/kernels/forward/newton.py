@@ -1,6 +1,6 @@
-"""Steps to an equilibrium: Newton from near, and from far downhill in the energy with a trust region.
+"""Steps to an equilibrium: Newton's method from nearby poses, energy descent with a trust region from distant ones.
 
-docs/model.md, section 6. Downhill it ends in a stable equilibrium from almost any start. Steps are in the problem's
+docs/model.md, section 6. The descent ends in a stable equilibrium from almost any start. Steps are in the problem's
 units.
 """
 
@@ -24,10 +24,10 @@ from sagline.kernels.jit import glue, kernel
 
 @kernel
 def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, work: Array, step: Array) -> float:
-    """Fill the step that minimizes g.s + s.H s/2 within |s| <= radius; returns the shift mu it took.
+    """Fill the step that minimizes g.s + s.H s/2 within |s| <= radius; returns the shift mu.
 
-    More and Sorensen: (H + mu 1) s = -g with the smallest mu that makes the matrix positive definite and the step
-    short enough; 0 is a plain Newton step.
+    The method of More and Sorensen solves (H + mu 1) s = -g with the smallest mu for which the matrix is positive
+    definite and the step is short enough. mu = 0 is an ordinary Newton step.
     """
     n = gradient.shape[0]
     square = 0.0
@@ -73,12 +73,12 @@ def trust_step(matrix: Array, gradient: Array, radius: float, factor: Array, wor
 POLISH_STEPS = 30
 SHORTENINGS = 10
 NEAR_STEPS = 6
-NEAR = 3e-3  # a full Newton step shorter than this leaves the rest to Newton's method
+NEAR = 3e-3  # the descent ends and Newton's method continues if a full Newton step is shorter than this
 PREDICTED = 0.03  # the longest first-order step that is tried
-SHRINKING = 0.3  # of the step before: longer ones are in doubt
-FRESH = 1e-4  # distance up to which a factored stiffness is used again
-BALANCED = 1e-9  # relative to the sum of tensions and weight: a smaller unbalance counts as zero
-LAST_DIGIT = 1e-15  # a step that rounding hides
+SHRINKING = 0.3  # largest ratio of a Newton step to the previous one
+FRESH = 1e-4  # largest distance from its pose at which a factored stiffness is reused
+BALANCED = 1e-9  # an unbalance below this share of the sum of tensions and weight counts as zero
+LAST_DIGIT = 1e-15  # a shorter step is below rounding
 
 
 @glue
@@ -108,9 +108,9 @@ def solve_step(factor: Array, part: Array, step: Array) -> float:
 
 @glue
 def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, space: ForwardArrays, pose: Array) -> bool:
-    """Fill the first-order answer to new lengths and wrench; False without a memory of an equilibrium at the start.
+    """Fill the first-order change due to new lengths and wrench; False if no equilibrium is stored for the start.
 
-    The rows know the new lengths afterwards.
+    Afterwards the rows contain the new lengths.
     """
     known = problem.model.code == codes.CATENARY or problem.model.code == codes.ELASTIC
     for k in range(tables.POSE_COLUMNS):
@@ -130,11 +130,12 @@ def predict(problem: PoseProblem, lengths: Array, start: Array, last: Array, spa
 
 @glue
 def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tuple[int, float]:
-    """Full Newton steps from near by the symmetric stiffness; returns how many, and the sum of tensions at the pose.
+    """Full Newton steps with the symmetric stiffness; returns the number of steps and the sum of tensions at the pose.
 
-    0 steps where that is in doubt: the stiffness is not positive definite, or the first step is not short; the pose has
-    not moved then and matrix is its stiffness. -1 where the steps do not shrink as they should. On return space is that
-    of the pose, except for the stiffness. The skew part, half a given moment, is left out: it takes a step more.
+    The number is 0 if the stiffness is not positive definite or the first step is too long; the pose is then unchanged,
+    and matrix is its stiffness. The number is -1 if the steps do not decrease fast enough. On return, space belongs to
+    the pose, except for the stiffness. The skew part of the stiffness, half of a given moment, is neglected, which
+    costs one step more.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     rotation, rows, gradient = space.rotation, space.rows, space.gradient
@@ -179,10 +180,10 @@ def newton_from(problem: PoseProblem, pose: Array, space: ForwardArrays) -> tupl
 def _newton_steps(
     problem: PoseProblem, pose: Array, space: ForwardArrays, best: float, good: float
 ) -> tuple[float, float]:
-    """One Newton step on the wrench balance, shortened until the unbalance is below best; needs the stiffness.
+    """One Newton step on the wrench balance, shortened until the unbalance is below best; requires the stiffness.
 
-    Returns the new unbalance and the length of the step; length 0 and an unchanged pose where no step is better.
-    Close to balance (good) only the full step is tried: what it cannot improve is rounding.
+    Returns the new unbalance and the length of the step; length 0 and an unchanged pose if no step is better. Close to
+    the balance (unbalance below good) only the full step is tried, because only rounding prevents it from being better.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     step, trial, part = space.step, space.trial, space.part
@@ -215,10 +216,10 @@ def _newton_steps(
 
 @glue
 def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float) -> int:
-    """Newton on the wrench balance while it gets better, to the last digit; returns the number of steps.
+    """Newton steps on the wrench balance as long as it improves, to full precision; returns the number of steps.
 
-    good: an unbalance that counts as none. The work arrays are those of the pose before and after; the stiffness
-    may be that of a pose at the distance of a rounding error.
+    good: an unbalance below this counts as zero. The work arrays belong to the pose before and after the steps. The
+    stiffness may belong to a pose that differs by rounding errors.
     """
     best = components_along(problem.free, space.gradient, space.part)
     before = 0.0
@@ -226,7 +227,7 @@ def polish(problem: PoseProblem, pose: Array, space: ForwardArrays, good: float)
     for iteration in range(POLISH_STEPS):
         platform_stiffness(problem.model, problem.cables, space.rows, space.stiffness)
         best, length = _newton_steps(problem, pose, space, best, good)
-        # each step is as long as the error before it: the next would be about length^3/before^2
+        # each step is as long as the error before it; the next step would be about length^3/before^2
         if length == 0.0 or length * length * length <= LAST_DIGIT * before * before:
             steps = iteration + 1
             break
@@ -242,12 +243,12 @@ NOISE = 4e-15  # rounding error of an energy, relative to the sum of its parts
 
 @glue
 def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: float) -> tuple[int, float]:
-    """Move pose downhill until a full Newton step is short; a start in balance stays where it is, stable or not.
+    """Decrease the energy until a full Newton step is short; a start in balance does not move, stable or not.
 
-    known: the sum of tensions that `unbalance` gave at the pose, if space is still that of the pose with its stiffness
-    as matrix; else 0.
+    known: the sum of tensions that `unbalance` gave at the pose, if space still belongs to the pose and matrix is its
+    stiffness; else 0.
 
-    Returns the number of steps tried, and that sum at the pose; 0 where the last pose tried was another.
+    Returns the number of steps tried, and this sum at the pose, or 0 if the last pose tried is not the result.
     """
     model, cables, body, wrench, free = problem.model, problem.cables, problem.body, problem.wrench, problem.free
     trial, motion, rotation, rows, gradient = space.trial, space.motion, space.rotation, space.rows, space.gradient
@@ -270,7 +271,7 @@ def descend(problem: PoseProblem, pose: Array, space: ForwardArrays, known: floa
             for k in range(3):  # the work of a given moment along the motion
                 gain += wrench[3 + k] * motion[3 + k]
             noise = NOISE * (size + new_size)
-            fresh = gain + noise >= 0.1 * promised  # false for NaN too
+            fresh = gain + noise >= 0.1 * promised  # False for NaN too
             if not fresh:
                 radius = 0.3 * min(length, radius)
                 tensions = 0.0

@@ -1,7 +1,7 @@
-"""The platform on cables of given lengths: wrench at a pose, and its derivatives with respect to motions.
+"""The platform on cables of given lengths: wrench at a pose, and its derivatives by motions.
 
-A motion is (displacement of the center of mass, rotation vector), world axes: the rotation acts from the left.
-The unbalance is minus the whole wrench on the platform, the gradient of the energy.
+A motion consists of the displacement of the center of mass and a rotation vector in world axes, multiplied from the
+left. The unbalance is the negative total wrench on the platform, which is the gradient of the energy.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ def unbalance(
 ) -> float:
     """Fill rotation, geometry, cable forces and statuses, and the unbalance (6,) as gradient, at a pose.
 
-    The rows know the lengths already. Returns the sum of the tensions and the platform's weight [N]: what the unbalance
-    is to be compared with.
+    The rows must contain the lengths. Returns the sum of the tensions and the platform's weight [N], with which the
+    unbalance is compared.
     """
     cable_geometry(cables, body, pose, rotation, rows)
     forces_from_lengths(model, cables, rows, model.behind)
@@ -62,10 +62,10 @@ def add_force(rows: Array, i: int, horizontal: float, vertical: float, wrench: A
 def platform_energy(
     model: Model, cables: Array, body: Array, wrench: Array, pose: Array, rotation: Array, rows: Array
 ) -> tuple[float, float]:
-    """Energy [J] after `unbalance` at the pose, and the sum of its parts' magnitudes, by which rounding is judged.
+    """Energy [J] after `unbalance` at the pose, and the sum of its terms' magnitudes, a measure of rounding.
 
-    Cables, weight and given force; NaN where the model has none. The work of a given moment is left out: constant in
-    world axes, it has none but along a motion.
+    The energy is that of cables, weight and given force; it is NaN if the model does not have one. A given moment,
+    constant in world axes, does not have a potential energy and is not included.
     """
     energy, size = energy_of_cables(model, cables, rows, model.behind)
     for k in range(3):
@@ -94,7 +94,7 @@ def end_stiffness(rows: Array, i: int) -> tuple[Triple, Triple, Triple]:
 
 @formula
 def _add_row(target: Array, share: float, row: Six) -> None:
-    """Add a share of six numbers to a row (6,)."""
+    """Add a multiple of six numbers to a row (6,)."""
     target[0] += share * row[0]
     target[1] += share * row[1]
     target[2] += share * row[2]
@@ -105,9 +105,9 @@ def _add_row(target: Array, share: float, row: Six) -> None:
 
 @kernel
 def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Array) -> None:
-    """Fill the derivative (6, 6) of the unbalance after `unbalance`: elastic, sag and geometric stiffness together.
+    """Fill the derivative (6, 6) of the unbalance after `unbalance`: the sum of elastic, sag and geometric stiffness.
 
-    Its skew part is half the moment of the cables' forces: zero in an equilibrium without a given moment.
+    Its skew part is half the moment of the cables' forces, which is zero in an equilibrium without a given moment.
     """
     stiffnesses_in_plane(model, cables, rows, model.behind)
     for j in range(6):
@@ -146,14 +146,14 @@ def platform_stiffness(model: Model, cables: Array, rows: Array, stiffness: Arra
 
 @kernel
 def step_pose(free: Array, body: Array, pose: Array, step: Array, motion: Array, moved: Array) -> None:
-    """Fill the pose after a step (n,) along the free motions, and that step as a motion (6,)."""
+    """Fill the pose after a step (n,) along the free motions, and this step as a motion (6,)."""
     fill_motion_of_components(free, step, motion)
     moved_pose(body, pose, motion, moved)
 
 
 @formula
 def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
-    """Fill the pose after a motion (6,): the center of mass displaced, the platform turned about it."""
+    """Fill the pose after a motion (6,): displacement of the center of mass, then rotation about it."""
     angle2 = motion[3] * motion[3] + motion[4] * motion[4] + motion[5] * motion[5]
     angle = math.sqrt(angle2)
     w = math.cos(0.5 * angle)
@@ -166,7 +166,7 @@ def moved_pose(body: Array, pose: Array, motion: Array, moved: Array) -> None:
     aw = w * qw - x * qx - y * qy - z * qz
     scale = 1.0 / math.sqrt(ax * ax + ay * ay + az * az + aw * aw)
     moved[3], moved[4], moved[5], moved[6] = ax * scale, ay * scale, az * scale, aw * scale
-    # the origin goes with the center of mass, less what its lever turned: d = Q c - Q' c
+    # displacement of the origin: that of the center of mass plus d = Q c - Q' c from the rotation of its lever
     cx, cy, cz = body[tables.CENTER_X], body[tables.CENTER_Y], body[tables.CENTER_Z]
     before = turned(pose, cx, cy, cz)
     after = turned(moved, cx, cy, cz)

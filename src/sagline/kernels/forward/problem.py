@@ -12,7 +12,7 @@ from sagline.kernels.cable.terms import Model
 from sagline.kernels.jit import glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 
-UNIT_SHARE = 0.2  # of the mean length: the displacement that counts as much as a rotation by 1 rad
+UNIT_SHARE = 0.2  # displacement, relative to the mean length, that has the same weight as a rotation by 1 rad
 
 # columns of the numbers that describe one solution
 ENERGY, FORCE_RESIDUAL, MOMENT_RESIDUAL, STIFFNESS_MIN, ITERATIONS = 0, 1, 2, 3, 4
@@ -22,8 +22,8 @@ FORWARD_NUMBERS = 5
 LAST_WRENCH = tables.POSE_COLUMNS
 LAST_COLUMNS = LAST_WRENCH + 6
 
-ForwardTerms = tuple[int, float, float, bool | None]  # code, k_h, k_p; whether anything may be behind the cables
-SampleArrays = tuple[Array, Array, Array, Array, Array, Array]  # as they come from Python: exact tuples are fastest
+ForwardTerms = tuple[int, float, float, bool | None]  # code, k_h, k_p; True for pulleys or dead lengths, else None
+SampleArrays = tuple[Array, Array, Array, Array, Array, Array]  # as passed from Python: exact tuples are fastest
 SolutionArrays = tuple[Array, Array, Codes, Array, Codes]
 LastEquilibriumArrays = tuple[Array, Array, Array]
 
@@ -31,12 +31,12 @@ LastEquilibriumArrays = tuple[Array, Array, Array]
 class ForwardSamples(NamedTuple):
     """A batch of N samples to solve."""
 
-    freedom: Array  # rows that pick the free motions, (n, 6)
+    freedom: Array  # rows that select the free motions, (n, 6)
     bodies: Array  # body_table, (1 or N, BODY_COLUMNS)
     robots: Array  # cable_table, (1 or N, m, CABLE_COLUMNS)
-    lengths: Array  # unstrained lengths [m], (N, m); a row of NaN is left out
+    lengths: Array  # unstrained lengths [m], (N, m); a row of NaN is skipped
     starts: Array  # pose rows (1 or N, POSE_COLUMNS)
-    wrenches: Array  # external plus inertial, about the center of mass, (1 or N, 6)
+    wrenches: Array  # external plus inertial wrench, about the center of mass, (1 or N, 6)
 
 
 class Solutions(NamedTuple):
@@ -50,7 +50,7 @@ class Solutions(NamedTuple):
 
 
 class LastEquilibrium(NamedTuple):
-    """Last equilibrium of a sequence of samples, kept from one call to the next; NaN: none."""
+    """Last equilibrium of a sequence of samples, kept between calls; NaN if none exists."""
 
     rows: Array  # rows of the cables, (CABLE_ROWS, m)
     factor: Array  # Cholesky factor of the stiffness, scaled, (n, n)
@@ -61,15 +61,15 @@ class PoseProblem(NamedTuple):
     """Data for finding one pose: cable model, robot and wrench."""
 
     model: Model  # cable model
-    free: Array  # rows that pick the free motions, each times its unit: what counts as equally far, (n, 6)
+    free: Array  # rows that select the free motions, each times the unit of its motion, (n, 6)
     cables: Array  # rows of the cable_table, (m, CABLE_COLUMNS)
     body: Array  # row of the body_table, (BODY_COLUMNS,)
-    wrench: Array  # external plus inertial, about the center of mass, (6,)
-    unit: float  # norm of the units, by which a sum of forces becomes one of components along the free motions
+    wrench: Array  # external plus inertial wrench, about the center of mass, (6,)
+    unit: float  # norm of the units, which converts a sum of forces to components along the free motions
 
 
 class ForwardArrays(NamedTuple):
-    """Working memory for m cables and n free motions; `unbalance` and `platform_stiffness` say what they fill."""
+    """Working memory for m cables and n free motions, filled by `unbalance` and `platform_stiffness`."""
 
     rows: Array  # (CABLE_ROWS, m)
     rotation: Array  # (3, 3)
@@ -85,7 +85,7 @@ class ForwardArrays(NamedTuple):
 
 @glue
 def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[ForwardArrays, Memory]:
-    """Working memory, of which rows and factor are remembered, and the memory that is left."""
+    """Working memory, whose rows and factor are kept between calls, and the remaining memory."""
     n = factor.shape[0]
     rotation, memory = block(memory, 3, 3)
     gradient, memory = vector(memory, 6)
@@ -100,7 +100,7 @@ def new_forward_arrays(memory: Memory, rows: Array, factor: Array) -> tuple[Forw
 
 @glue
 def new_motions(memory: Memory, n: int) -> tuple[Array, Array, Array, Array]:
-    """Free motions (n, 6) in the units of steps and in those by which stiffnesses are compared, and two pose rows."""
+    """Free motions (n, 6) in the units of steps, and in the units for comparing stiffnesses; and two pose rows."""
     free, memory = block(memory, n, 6)
     arcs, memory = block(memory, n, 6)
     poses, memory = block(memory, 2, tables.POSE_COLUMNS)
@@ -115,7 +115,7 @@ def row_of(array: Array, p: int) -> Array:
 
 @glue
 def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: Array) -> PoseProblem:
-    """Sample p of a batch as a problem; the model's gravity becomes that of its body. Fills the free motions."""
+    """Sample p of a batch as a problem, with the gravity of its body in the model; fills the free motions."""
     body, cables = row_of(given.bodies, p), row_of(given.robots, p)
     placed = Model(model.code, model.k_h, model.k_p, body[tables.GRAVITY], model.behind)
     unit = _fill_free(given.freedom, cables, body, given.lengths[p], free, arcs)
@@ -124,10 +124,10 @@ def problem_at(model: Model, given: ForwardSamples, p: int, free: Array, arcs: A
 
 @kernel
 def _fill_free(freedom: Array, cables: Array, body: Array, lengths: Array, free: Array, arcs: Array) -> float:
-    """Fill the free motions in the units of steps, and in those by which stiffnesses are compared, (n, 6) each.
+    """Fill the free motions in the units of steps, and in the units for comparing stiffnesses, (n, 6) each.
 
-    In the latter a rotation counts by the arc it makes at the platform ends' root mean square distance from the
-    center of mass, so that every stiffness is in N/m. Returns the norm of the former units.
+    For the comparison, a rotation is measured by its arc at the root mean square distance of the platform ends from the
+    center of mass, so that every stiffness is in N/m. Returns the norm of the units of steps.
     """
     m = lengths.shape[0]
     total = 0.0
@@ -159,7 +159,7 @@ def copy_pose(source: Array, target: Array) -> None:
 
 @glue
 def clear_solution(found: Solutions, p: int, status: int, cable_status: int) -> None:
-    """Fill the answer of a sample that has none yet: NaN, no steps."""
+    """Fill NaN and zero steps for a sample without a result."""
     for k in range(tables.POSE_COLUMNS):
         found.poses[p, k] = math.nan
     for i in range(found.statuses.shape[1]):

@@ -1,4 +1,4 @@
-"""Stiffness of a platform in equilibrium, and its sensitivity to its cables' data."""
+"""Stiffness of a platform in equilibrium, and the sensitivities of the cable forces to the cables' data."""
 
 from __future__ import annotations
 
@@ -68,9 +68,10 @@ def describe_states(
     """Stiffness and sensitivities of N samples; NaN without lengths and for straight cables.
 
     Args:
-        model: Cable model and the empirical one's constants; whether anything may be behind the cables, or None.
-        given: `ForwardSamples`, its starts the poses.
-        memory: `memory_for` as many cables.
+        model: Cable model, the empirical model's constants, and True if cables may have pulleys or dead lengths, else
+            None.
+        given: `ForwardSamples`, whose initial poses are the equilibria.
+        memory: `memory_for` the number of cables.
         matrices: Filled: stiffness of the platform, (N, 6, 6).
         blocks: Filled: stiffness of every cable's platform end in world axes, (N, m, 3, 3).
         slopes: Filled: dT of every cable by its data, (N, DATA, m, 3).

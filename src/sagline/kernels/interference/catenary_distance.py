@@ -1,8 +1,9 @@
-"""Least distances of sagging cables from each other, from rods and from boxes: certified, by branch and bound.
+"""Least distances of sagging cables from each other, from rods and from boxes, with proved bounds by branch and bound.
 
-A piece of a cable lies within its bulge of its chord, so chords give a lower bound; points of the cables themselves
-give the upper one, which Newton's method takes to the last digit. Pieces whose lower bound is within the precision of
-it are set aside, the others split: pieces of a cable are shared by all its pairs. docs/model.md, section 13.
+A cable is divided into pieces. The bulge of a piece is an upper bound of its distance from its own chord. The distance
+of two chords minus the bulges is a lower bound of the distance. Points of the cables give the upper bound, which
+Newton's method improves to full precision. A pair of pieces is finished when its lower bound is within the precision of
+the upper bound; otherwise one piece is split. All pairs of a cable use the same pieces. docs/model.md, section 13.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ from sagline.kernels.interference.shapes import (
 )
 from sagline.kernels.jit import entry, kernel
 
-# Columns of a piece: its chord's ends (six), its bulge, its range as shares, and the first of its two parts (0: whole).
+# Columns of a piece: ends of its chord (six), bulge, range as shares of the cable, first of its two parts (0: not
+# split).
 BULGE = 6
 BEGIN = 7
 END = 8
@@ -39,10 +41,10 @@ PARTS = 9
 PIECE_COLUMNS = 10
 
 PIECES = 8192  # largest number of pieces of all cables of a pose
-COUNTER = PIECES - 1  # the row that is none: its last column says how many there are, the others take an edge
-WAITING = 4096  # pairs of pieces
-PAIRS = 100_000  # of pieces that are looked at for one distance: then the lower bound is what it is
-ROUNDING = 1e-13  # of the sizes at hand: what rounding may take off a lower bound
+COUNTER = PIECES - 1  # a row without a piece: its last column is the number of pieces, the other columns hold an edge
+WAITING = 4096  # largest number of waiting pairs of pieces
+PAIRS = 100_000  # largest number of pairs per distance; the search then ends with the lower bound reached
+ROUNDING = 1e-13  # relative to the coordinates: rounding error of a lower bound
 FAR = 1e300
 
 
@@ -53,7 +55,7 @@ def work_arrays_for_pieces() -> tuple[Array, Array]:
 
 @kernel
 def _set_piece(piece: Array, row: Array, first: float, last: float) -> None:
-    """Range and bulge of a piece whose ends are there."""
+    """Set range and bulge of a piece from its ends."""
     dx, dy, dz = piece[3] - piece[0], piece[4] - piece[1], piece[5] - piece[2]
     piece[BULGE] = bulge(row, first, last, dx * dx + dy * dy + dz * dz)
     piece[BEGIN] = first
@@ -71,7 +73,7 @@ def _whole_piece(piece: Array, row: Array) -> None:
 
 @kernel
 def _split_piece(pieces: Array, index: int, row: Array) -> None:
-    """Split a piece in the middle, or where the cable turns, which straightens a fold."""
+    """Split a piece in the middle, or at the cable's lowest point, which separates the two parts of a fold."""
     count = int(pieces[COUNTER, PARTS])
     piece, one, other = pieces[index], pieces[count], pieces[count + 1]
     middle = 0.5 * (piece[BEGIN] + piece[END])
@@ -110,7 +112,7 @@ def _chord_distance(pieces: Array, i: int, j: int, box: Array, to_a_box: bool) -
 
 @kernel
 def _refined_distance(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> tuple[float, float, float]:
-    """Distance where it is least around two points of a pair [m], and these points."""
+    """Local minimum of the distance near two points of a pair [m], and the points of the minimum."""
     if to_a_box:
         square, s = nearest_to_box(one, other, s)
     else:
@@ -132,9 +134,9 @@ def _square_at(one: Array, other: Array, to_a_box: bool, s: float, t: float) -> 
 def _least_of_pair(
     one: Array, other: Array, i: int, j: int, precision: float, enough: float, pieces: Array, waiting: Array
 ) -> tuple[float, float, float, float]:
-    """Least distance of a cable from another or a box [m], a proved lower bound, and where.
+    """Least distance of a cable from another cable or a box [m], a proved lower bound, and the two points.
 
-    What lies farther than `enough` is not looked at closely: the lower bound then is at least `enough` - precision.
+    Pairs farther apart than `enough` are not refined; their lower bound is at least `enough` - precision.
     """
     to_a_box = other[KIND] == BOX
     distance, low, s, t = _chord_distance(pieces, i, j, other, to_a_box)
@@ -198,7 +200,7 @@ def _edge_of(box: Array, axis: int, corner: int, edge: Array) -> None:
 
 @kernel
 def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: float) -> float:
-    """Least distance of a box's edges from another box [m], if it is below one that is known; its points if so."""
+    """Least distance of a box's edges from another box [m] and its points, if it is below a known distance."""
     for axis in range(3):
         for corner in range(4):
             _edge_of(box, axis, corner, edge)
@@ -215,7 +217,7 @@ def _edges_to_box(box: Array, other: Array, edge: Array, nearest: Array, best: f
 
 @kernel
 def _least_of_boxes(box: Array, other: Array, edge: Array, nearest: Array) -> float:
-    """Least distance of two boxes [m], 0 where they touch: an edge of one is part of it, or lies in the other."""
+    """Least distance of two boxes [m], 0 if they touch; it is that of an edge of one box from the other box."""
     best = _edges_to_box(box, other, edge, nearest, FAR)
     turned = _edges_to_box(other, box, edge, nearest, best)
     if turned < best:
@@ -248,14 +250,15 @@ def least_distances(
     low_out: Array,
     nearest_out: Array,
 ) -> None:
-    """Least distances of pairs at every pose, less their radii, with proved lower bounds and the nearest points.
+    """Least distances of pairs at every pose, minus their radii, with proved lower bounds and the nearest points.
 
     Args:
-        moving: Shapes that differ between poses, shape (N, K, COLUMNS).
-        still: Shapes that do not, shape (S, COLUMNS).
-        pairs: Which, numbered through both, a box behind what is none, shape (P, 2).
+        moving: Shapes that move with the pose, shape (N, K, COLUMNS).
+        still: Fixed shapes, shape (S, COLUMNS).
+        pairs: Indices of two shapes, counted through moving and fixed shapes, shape (P, 2); a box is the second of a
+            pair.
         precision: Largest difference of the lower bound from the distance [m].
-        together: Whether the least of all distances of a pose is enough: of the others then only so much is known.
+        together: True if only the least distance of a pose is required; the other distances are then only bounded.
         pieces: Work array from `work_arrays_for_pieces`.
         waiting: Work array from `work_arrays_for_pieces`.
         distance_out: [m], shape (N, P).

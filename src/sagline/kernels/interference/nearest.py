@@ -1,4 +1,4 @@
-"""From a pair of points near each other to the nearest ones around: Newton's method within the cables' ends."""
+"""Local minimum of the distance from two given points, by Newton's method within the ends of the cables."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sagline.kernels.jit import kernel
 
 STEPS = 30
 HALVINGS = 6
-SMALL = 1e-8  # last step, as a share of a cable's length: Newton's method squares the error
+SMALL = 1e-8  # last step, relative to the cable's length; Newton's method squares the error
 FLAT = 1e-13  # relative to the product of curvatures: a smaller determinant means parallel cables
 
 
@@ -22,7 +22,7 @@ def square_between(one: Array, other: Array, s: float, t: float) -> float:
 
 @kernel
 def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
-    """Squared distance at two shares and where a Newton step leads to, within both ranges."""
+    """Squared distance at two shares, and the shares after a Newton step, within both ranges."""
     ax, ay, az = point(one, s)
     bx, by, bz = point(other, t)
     rx, ry, rz = ax - bx, ay - by, az - bz
@@ -40,12 +40,12 @@ def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, f
     ds, dt = 0.0, 0.0
     if s_free and t_free:
         determinant = hss * htt - hst * hst
-        if not (hss > 0.0 and determinant > FLAT * uu * vv):  # far from the nearest points, or side by side
+        if not (hss > 0.0 and determinant > FLAT * uu * vv):  # far from the nearest points, or parallel cables
             hss, htt = uu * (1.0 + 1e-9), vv * (1.0 + 1e-9)
             determinant = max(hss * htt - hst * hst, FLAT * uu * vv)
         ds = -(gs * htt - gt * hst) / determinant
         dt = -(gt * hss - gs * hst) / determinant
-        # a bound that is reached stays active: the other share alone continues
+        # a bound that is reached stays active; only the other share changes further
         new_s, new_t = min(max(s + ds, one[FIRST]), one[LAST]), min(max(t + dt, other[FIRST]), other[LAST])
         if new_s != s + ds and new_t == t + dt:
             new_t = min(max(t - (gt + hst * (new_s - s)) / htt, other[FIRST]), other[LAST])
@@ -62,7 +62,7 @@ def _newton_step(one: Array, other: Array, s: float, t: float) -> tuple[float, f
 
 @kernel
 def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[float, float, float]:
-    """Squared distance of two cables [m^2] where it is least around two points, and these points."""
+    """Local minimum of the squared distance of two cables [m^2] near two points, and the points of the minimum."""
     square, new_s, new_t = _newton_step(one, other, s, t)
     for _ in range(STEPS):
         ds, dt = new_s - s, new_t - t
@@ -84,7 +84,7 @@ def nearest_of_curves(one: Array, other: Array, s: float, t: float) -> tuple[flo
 
 @kernel
 def _box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
-    """Squared distance of a cable's point from a box [m^2] and where a Newton step leads to, within the range."""
+    """Squared distance of a cable's point from a box [m^2], and the share after a Newton step, within the range."""
     x, y, z = point(curve, s)
     px, py, pz = in_box_axes(box, x - box[PLACE], y - box[PLACE + 1], z - box[PLACE + 2])
     ex, ey, ez = outside(px, box[HALF]), outside(py, box[HALF + 1]), outside(pz, box[HALF + 2])
@@ -108,7 +108,7 @@ def _box_step(curve: Array, box: Array, s: float) -> tuple[float, float]:
 
 @kernel
 def nearest_to_box(curve: Array, box: Array, s: float) -> tuple[float, float]:
-    """Squared distance of a cable from a box [m^2] where it is least around a point, and this point."""
+    """Local minimum of the squared distance of a cable from a box [m^2] near a point, and the point of the minimum."""
     square, new = _box_step(curve, box, s)
     for _ in range(STEPS):
         step = new - s

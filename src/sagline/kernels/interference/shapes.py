@@ -1,6 +1,6 @@
-"""Shapes between which distances are measured: catenaries, straight rods and boxes, each a row of numbers in the world.
+"""Shapes for distances: catenaries, straight rods and boxes, each a row of numbers in world axes.
 
-A rod is a cable without weight; a capsule is a rod with a radius, a sphere one without length.
+A rod is a cable without weight; a capsule is a rod with a radius, and a sphere is a capsule without length.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from sagline.kernels.jit import kernel
 
 # Columns of a row.
 KIND = 0
-PLACE = 1  # three: where a cable leaves the frame, a rod's start, a box's center [m]
+PLACE = 1  # three: exit point of a cable, start of a rod, or center of a box [m]
 RADIUS = 4  # half the diameter, which is subtracted from distances [m]
 FIRST = 5  # first and last measured point of a cable or rod, as shares of its unstrained length
 LAST = 6
@@ -24,8 +24,8 @@ LENGTH = 11  # L [m]                               |                four times i
 WEIGHT = 12  # w [N/m]
 STIFFNESS = 13  # EA [N]
 SPAN, RISE, DROP = HORIZONTAL, VERTICAL, LENGTH
-AXES = 5  # nine: the edges' directions of a box as columns of a matrix, row by row
-HALF = 14  # three: half its edges [m]
+AXES = 5  # nine: directions of a box's edges as columns of a matrix, row by row
+HALF = 14  # three: half the edges of a box [m]
 COLUMNS = 17
 
 # Kinds.
@@ -51,7 +51,8 @@ def point(row: Array, share: float) -> tuple[float, float, float]:
 def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
     """First and second derivatives of (x, z) in the cable's plane by the share of its length [m].
 
-    With t the tension: r' = T (1/t + 1/EA), r'' = (-T_x T_z w/t^3, w T_x^2/t^3 + w/EA), by the unstrained length.
+    With t the tension and T the force, by the unstrained length: r' = T (1/t + 1/EA), r'' = (-T_x T_z w/t^3, w
+    T_x^2/t^3 + w/EA).
     """
     if row[KIND] != HANGING:
         return row[SPAN], row[RISE] - row[DROP] * (1.0 - 2.0 * share), 0.0, 2.0 * row[DROP]
@@ -69,7 +70,7 @@ def slopes(row: Array, share: float) -> tuple[float, float, float, float]:
 
 @kernel
 def level_point(row: Array) -> float:
-    """Position of the level tangent of a catenary as a fraction of its length, possibly beyond its ends."""
+    """Position of a catenary's horizontal tangent as a fraction of its length, possibly beyond its ends."""
     if row[KIND] != HANGING:
         return -1.0
     return 1.0 - row[VERTICAL] / (row[WEIGHT] * row[LENGTH])
@@ -79,8 +80,8 @@ def level_point(row: Array) -> float:
 def bulge(row: Array, first: float, last: float, chord2: float) -> float:
     """Largest distance of a piece's points from its chord [m]; the square of the chord is given.
 
-    The lesser of |r''| (s1 - s0)^2/8 with the least tension on the piece, and of what a cable of the piece's length
-    leaves between its ends, which holds for folds too.
+    It is the smaller of two bounds. The first is |r''| (s1 - s0)^2/8 with the least tension on the piece. The second
+    follows from the piece's length and the distance of its ends, and holds for folds too.
     """
     width = last - first
     if row[KIND] != HANGING:
@@ -99,7 +100,7 @@ def bulge(row: Array, first: float, last: float, chord2: float) -> float:
     elif v0 < -slack and v1 > slack:
         bend = math.inf
     by_curvature = 0.125 * part * part * (bend + weight * give)
-    if by_curvature * by_curvature < 1e-4 * chord2:  # shallow: the other bound is not smaller
+    if by_curvature * by_curvature < 1e-4 * chord2:  # shallow piece: the other bound is not smaller
         return by_curvature
     arc = part * (1.0 + math.sqrt(most2) * give)
     by_length = 0.5 * math.sqrt(max(arc * arc - chord2, 0.0))
@@ -111,7 +112,7 @@ STEPS = 12  # Newton on a slope of at most six straight parts
 
 @kernel
 def between_segments(one: Array, other: Array) -> tuple[float, float, float, float]:
-    """Squared distance of segments (x0, y0, z0, x1, y1, z1), a lower bound of it [m^2], and the shares where."""
+    """Squared distance of segments (x0, y0, z0, x1, y1, z1), a lower bound of it [m^2], and the nearest shares."""
     ax, ay, az = one[3] - one[0], one[4] - one[1], one[5] - one[2]
     bx, by, bz = other[3] - other[0], other[4] - other[1], other[5] - other[2]
     rx, ry, rz = one[0] - other[0], one[1] - other[1], one[2] - other[2]
@@ -156,7 +157,7 @@ def outside(coordinate: float, half: float) -> float:
 
 @kernel
 def to_box(segment: Array, box: Array) -> tuple[float, float, float]:
-    """Squared distance of a segment from a box, a lower bound of it [m^2], and the share of the segment where."""
+    """Squared distance of a segment from a box, a lower bound of it [m^2], and the share of the nearest point."""
     px, py, pz = in_box_axes(box, segment[0] - box[PLACE], segment[1] - box[PLACE + 1], segment[2] - box[PLACE + 2])
     dx, dy, dz = in_box_axes(box, segment[3] - segment[0], segment[4] - segment[1], segment[5] - segment[2])
     hx, hy, hz = box[HALF], box[HALF + 1], box[HALF + 2]

@@ -42,7 +42,7 @@ from sagline.kernels.tension.nearest import Distribution
 from sagline.kernels.tension.on_polygon import feasible_interval
 from sagline.kernels.tension.polygon import feasible_polygon
 
-SUPPORT = 1e-9  # relative to the largest component along the proof; a cable with less does not oppose the wrench
+SUPPORT = 1e-9  # a cable with a smaller share of the largest component along the proof does not oppose the wrench
 AT_LIMIT = 1e-9  # relative to a limit: a value closer to the limit than this counts as at the limit
 PROVED, ENOUGH = 0, 1  # columns of the brackets
 
@@ -60,19 +60,19 @@ def decide_poses(
     answers: Answers,
     verdicts: tuple[Array, Array, Array, Flags],
 ) -> None:
-    """Check in chord tensions the poses that the distribution iterations called infeasible.
+    """Check, in chord tensions, the poses that the distribution iterations reported as infeasible.
 
-    A pose that proves feasible gets the tensions found.
+    If a pose is feasible after all, its tensions are filled.
 
     Args:
         model_terms: As in `inverse_poses`.
         limit_terms: As in `inverse_poses`.
         robot_terms: As in `inverse_poses`.
         poses: Rows (N, POSE_COLUMNS).
-        wrenches: External plus inertial, about the center of mass, (1 or N, 6).
+        wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
         which: Indices of the poses, (K,).
         covers: True if the method finds every feasible distribution; if False, a feasible pose gets POSE_NOT_COVERED.
-        memory: `memory_for` as many cables.
+        memory: `memory_for` the number of cables.
         answers: As in `inverse_poses`; overwritten for these poses.
         verdicts: Filled for these poses: lower and upper bound of the smallest sufficient change of the force [N],
             (N, 2); this change along the free motions, (N, n), and Farkas vectors, (N, n), both NaN if not found;
@@ -141,7 +141,7 @@ def decide_poses(
 
 @glue
 def _pose_status(statuses: Codes) -> int:
-    """Status of a pose whose tensions balance, from the statuses of its cables (m,)."""
+    """Status of a pose with balanced tensions, from the statuses of its cables (m,)."""
     gravest = codes.CABLE_SOLVED
     for i in range(statuses.size):
         gravest = max(gravest, statuses[i])
@@ -152,7 +152,7 @@ def _pose_status(statuses: Codes) -> int:
 
 @glue
 def _demand_of(platform: Platform, cables: Cables, balance: Balance, demand: Demand) -> tuple[Demand, float]:
-    """Fill the demand on the cables of a pose; returns it and the lever arm [m] by which moments are divided."""
+    """Fill the wrench demand on the cables of a pose; returns it and the lever arm [m] by which moments are divided."""
     n, m = balance.matrix.shape
     lever = 0.0
     for i in range(m):
@@ -186,7 +186,7 @@ def _demand_of(platform: Platform, cables: Cables, balance: Balance, demand: Dem
 
 @glue
 def _write_proof(demand: Demand, change: TensionChange, lever: float, farkas: Array) -> None:
-    """Fill the direction of the proof; its force part has length 1, or its moment part if the force part is zero."""
+    """Fill the direction of the proof; its force part, or its moment part if the force part is zero, has length 1."""
     n = farkas.size
     for k in range(n):
         farkas[k] = change.direction[k] if k < demand.soft else change.direction[k] / lever
@@ -224,16 +224,16 @@ def polygon_of_pose(
 
     Args:
         model_terms: As in `inverse_poses`.
-        distribution_terms: As in `inverse_poses`; its variable counts.
+        distribution_terms: As in `inverse_poses`; only its variable is used.
         limit_terms: As in `inverse_poses`.
         robot_terms: As in `inverse_poses`, of one robot.
         pose: Row (POSE_COLUMNS,).
-        wrench: External plus inertial, about the center of mass, (6,).
+        wrench: External plus inertial wrench about the center of mass, (6,).
         carried: Chord tensions and sag forces of the cables, (m,) each; NaN selects sag forces of first order.
-        memory: `memory_for` as many cables.
-        polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space
-            (r, m); for r = 2 corners and labels as `feasible_polygon`; for r = 1 corners[0, 0] and corners[1, 0] are
-            the ends of the interval (infinite where it has none); for r = 0 nothing more.
+        memory: `memory_for` the number of cables.
+        polygon: Filled: scale and offset of the variable, (m,) each; minimum norm and limits, (3, m); null space (r,
+            m); for r = 2 corners and labels as `feasible_polygon`; for r = 1 corners[0, 0] and corners[1, 0] are the
+            ends of the interval (infinite if it is unbounded); for r = 0 nothing more.
     """
     distribution = Distribution(*distribution_terms)
     freedom, bodies, robots = robot_terms

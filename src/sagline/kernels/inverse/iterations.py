@@ -45,7 +45,7 @@ def linearize_ends(model: Model, distribution: Distribution, cables: Cables, bal
 
 
 ITERATIONS = 30
-FREE_ITERATIONS = 8  # afterwards the reference is fixed, so that rounding of the sag forces cannot move a tie
+FREE_ITERATIONS = 8  # iterations after which the reference is fixed; rounding then cannot change a tie
 CONVERGED = 1e-10  # [N]; sag forces that change by less, or by 1e-15 of the largest tension, have converged
 
 
@@ -56,8 +56,9 @@ def distribute_and_solve_cables(
 ) -> int:  # fmt: skip
     """Distribute the tensions and solve the cables until their sag forces converge; returns the pose's status.
 
-    cables: those of `set_pose`; tensions, ratios and sag forces are filled; work: arrays for the methods that are
-    not projections, and for frame-end tensions; None leaves them out; statuses: filled: status of each cable, (m,).
+    cables: those of `set_pose`, whose tensions, ratios and sag forces are filled; work: work arrays for methods that
+    are not projections and for frame-end tensions, or None to exclude them from compilation; statuses: filled with the
+    status of each cable, (m,).
     """
     near.held.labels[0] = 0
     if work is not None:
@@ -108,7 +109,7 @@ def distribute_and_solve_cables(
 
 @glue
 def limits_admit_tensions(cables: Cables) -> bool:
-    """True if every cable has a tension within its limits; by (54) of the article, a level cable has none."""
+    """True if every cable has a feasible tension; a horizontal cable has none by the article's bound (54)."""
     for i in range(cables.low.size):
         if not (cables.low[i] <= cables.high[i] and cables.low[i] < math.inf):
             return False

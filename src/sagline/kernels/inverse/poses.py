@@ -1,7 +1,7 @@
-"""Inverse kinematics of a batch of poses: tensions that balance the platform, and the lengths to wind.
+"""Inverse kinematics of a batch of poses: tensions that balance the platform, and the lengths for the winches.
 
-docs/model.md, sections 4 and 5. For the exact cable the sag forces T_z - tau sin phi depend on the tensions: the
-balance is solved again with the sag forces of the last iteration until they converge.
+docs/model.md, sections 4 and 5. For the exact cable, the sag forces T_z - tau sin phi depend on the tensions. The
+balance is therefore solved repeatedly, with the sag forces of the last iteration, until they converge.
 """
 
 from __future__ import annotations
@@ -62,27 +62,27 @@ def inverse_poses(
     first: int,
     last: int,
 ) -> None:
-    """Solve part of a batch, pose by pose; with CLOSEST, the tensions of a feasible pose are the next reference.
+    """Solve part of a batch, pose by pose; with CLOSEST, each feasible pose gives the next reference tensions.
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
         distribution_terms: Tension distribution: `Distribution`.
         limit_terms: Limits of the tensions: `TensionLimits`.
-        robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or N,
-            BODY_COLUMNS); cable_table, (1 or N, m, CABLE_COLUMNS).
+        robot_terms: Rows that select the free motions, translations first, (n, 6); body_table, (1 or N, BODY_COLUMNS);
+            cable_table, (1 or N, m, CABLE_COLUMNS).
         poses: Rows (N, POSE_COLUMNS).
-        wrenches: External plus inertial, about the center of mass, (1 or N, 6).
-        previous: Tensions in the distribution's variable (m,) to stay close to, NaN for the minimum norm; with
-            CLOSEST the last feasible ones on return.
-        memory: `memory_for` as many cables.
-        otherwise: None for methods that project onto a reference, in chord or horizontal tensions: all others are
-            then left out of the machine code. True for any.
-        answers: Filled: span and rise of the free spans, length of all cable off the drum, T_x, T_z, tau, and for
-            robots with pulleys or dead length their rows, (RESULT_ROWS, N, m); status of each cable, (N, m);
-            norms of the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau
-            must supply along the free motions, (N, n); status of each pose, (N,).
-        first: Pose to begin with.
-        last: Pose to end before.
+        wrenches: External plus inertial wrenches about the center of mass, (1 or N, 6).
+        previous: Tensions in the distribution's variable (m,) to stay close to, NaN for the minimum norm; on return,
+            with CLOSEST, those of the last feasible pose.
+        memory: `memory_for` the number of cables.
+        otherwise: None for methods that project onto a reference in chord or horizontal tensions; the code of all other
+            methods is then not compiled. True for any method.
+        answers: Filled: span and rise of the free spans, unstrained length off the drum, T_x, T_z, tau, and, for robots
+            with pulleys or dead lengths, the rows of these, (RESULT_ROWS, N, m); status of each cable, (N, m); norms of
+            the unbalanced force [N] and moment [N m] along the free motions, (N, 2); wrench that J tau must supply
+            along the free motions, (N, n); status of each pose, (N,).
+        first: Index of the first pose.
+        last: Index after the last pose.
     """
     distribution = Distribution(*distribution_terms)
     limits = TensionLimits(*limit_terms)
@@ -153,7 +153,7 @@ def write_solution(solved: bool, model: Model, cables: Cables, balance: Balance,
 
 @glue
 def _write_behind(solved: bool, model: Model, cables: Cables, results: Array, p: int) -> None:
-    """Write the free spans, and add the cable on and behind the pulleys to their lengths."""
+    """Write the free spans, and add the cable on the pulleys and behind them to their lengths."""
     m = cables.tau.size
     for i in range(m):
         if not solved:

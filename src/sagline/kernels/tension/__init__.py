@@ -1,1 +1,1 @@
-"""Tension distribution: one of the tensions that balance the platform."""
+"""Tension distribution: the choice of one set of tensions that balances the platform."""

@@ -1,11 +1,12 @@
 """Feasibility of a wrench with tensions within their limits, decided on the cables' exact curves.
 
-Feasible is what tensions show that balance it. Infeasible is what a direction proves: along y each cable gives at most
-the largest value of its curve, and where these together fall short of the demand, nothing balances it. Where neither
-is at hand, every direction says of each cable how far from its best it may be, which narrows the ranges of tensions;
-where these stand still, the range of the cable whose sag force is least certain is split in two.
+Tensions that balance the wrench prove that it is feasible. A direction y can prove that it is infeasible: along y each
+cable gives at most the largest value of its curve. If the sum of these values is less than the demand, no tensions
+balance the wrench. Without such a proof, each direction limits how far each cable may be below its largest value, which
+narrows the ranges of tensions. If the ranges do not become narrower, the range of the cable with the least certain sag
+force is split in two.
 
-The shortfall lies between the gap of the first proof and what the least change leaves.
+The shortfall lies between the gap of the first proof and the residual of the least change.
 """
 
 from __future__ import annotations
@@ -29,9 +30,9 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.least_change import Demand, TensionChange, least_change, norm_of_part
 
-PLENTY = 1e6  # of the largest force at hand: more than any cable carries that has no limit
+PLENTY = 1e6  # tension, relative to the largest force, that a cable without limit never exceeds
 FEASIBLE = 1e-9  # relative to the largest force: a smaller residual of the balance counts as zero
-CERTAIN = 1e-14  # relative to the terms of the sum: a smaller contradiction of limits may be rounding
+CERTAIN = 1e-14  # relative to the terms of the sum: a smaller gap may be rounding
 NODES = 300  # number of examined ranges after which the search stops without a result
 DEPTH = 40  # largest number of waiting ranges
 STANDSTILL = 0.7  # if narrowing leaves more than this share of the uncertainty, the range is split
@@ -58,9 +59,9 @@ def component_along(columns: Array, direction: Array, i: int) -> float:
 
 @kernel
 def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Array, tops: Array) -> float:
-    """Capacity of the cables along a direction beyond the demand [N]; negative proves infeasibility.
+    """Capacity of the cables along a direction minus the demand [N]; a negative value proves infeasibility.
 
-    It is the upper end of what rounding leaves open. Fills the most each cable gives, (m,).
+    It is an upper bound that includes rounding. tops is filled with the largest contribution of each cable, (m,).
     """
     spare = 0.0
     size = 0.0
@@ -77,9 +78,9 @@ def _spare_capacity(curves: Curves, demand: Demand, range_: Array, direction: Ar
 
 @kernel
 def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Array, spare: float, tops: Array) -> bool:
-    """Take from a range the tensions with which a cable falls short of its best by more than is spare.
+    """Remove from a range the tensions at which a cable is below its largest contribution by more than `spare`.
 
-    Returns whether anything is left of it.
+    Returns False if the range becomes empty.
     """
     if not spare < math.inf:
         return True
@@ -104,9 +105,9 @@ def _narrow_range(curves: Curves, demand: Demand, range_: Array, direction: Arra
 def _narrow_free(
     curves: Curves, demand: Demand, range_: Array, change: TensionChange, tops: Array, memory: Memory
 ) -> bool:
-    """Narrow a range along the directions in which one cable between its limits counts and the others do not.
+    """Narrow a range along directions in which only one of the cables between their limits contributes.
 
-    Returns whether anything is left of it.
+    Returns False if the range becomes empty.
     """
     n, m = demand.matrix.shape
     count = 0
@@ -141,7 +142,7 @@ def _narrow_free(
 
 @glue
 def _least_certain(curves: Curves, range_: Array) -> tuple[int, float]:
-    """Cable with the most uncertain sag force in a range, and uncertainty of all sag forces together [N]."""
+    """Cable with the most uncertain sag force in a range, and sum of the uncertainties of all sag forces [N]."""
     worst = -1
     largest = 0.0
     total = 0.0
@@ -171,10 +172,10 @@ def _split_range(curves: Curves, waiting: Array, top: int, i: int, tau: float) -
 
 @glue
 def _first_range(curves: Curves, size: float, range_: Array) -> None:
-    """Fill the range that the limits allow, never a wider one, except for almost slack cables (LOOSEST).
+    """Fill the range that the limits allow; almost slack cables (LOOSEST) have a larger lower bound.
 
-    Where there is no upper limit, sagging cables are stretched to twice their length at most, and others carry a
-    million times the largest force at hand.
+    Without an upper limit, the upper bound of a sagging cable is the tension that stretches it to twice its length. For
+    other cables it is a million times the largest force.
     """
     cables = curves.cables
     for i in range(cables.low.size):
@@ -194,10 +195,10 @@ def _first_range(curves: Curves, size: float, range_: Array) -> None:
 def _approach_demand(
     curves: Curves, demand: Demand, range_: Array, trial: TensionChange, memory: Memory
 ) -> tuple[float, bool]:
-    """Find the tensions in a range that come closest to the demand.
+    """Compute the tensions in a range whose wrench is closest to the demand.
 
-    Returns the force that is left [N], infinite where moments are out of reach: then the direction is one of moments
-    alone; and whether the moments balance.
+    Returns the residual force [N], and True if the moments balance. The force is infinite if the moments cannot be
+    balanced; the direction then has a moment part only.
     """
     n, m = demand.matrix.shape
     first = demand.soft
@@ -222,14 +223,14 @@ def decide_feasibility(
 ) -> tuple[int, float, float, bool]:
     """Feasibility of a demand with tensions within the cables' limits.
 
-    change: where to begin; filled with the tensions that leave least, what they leave and along what. Returns
-    POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED where the arithmetic broke down; the bracket of
-    the shortfall [N]; whether the direction alone proves infeasibility, over the whole first range.
+    change: start of the search; filled with the tensions of least residual, this residual and its direction. Returns
+    POSE_SOLVED, POSE_INFEASIBLE, POSE_BORDERLINE, or POSE_NOT_CONVERGED after an arithmetic failure; the lower and
+    upper bound of the shortfall [N]; and True if the direction alone proves infeasibility over the whole first range.
     """
     n, m = demand.matrix.shape
-    tops, rest = vector(memory, m)  # the most each cable gives along a direction [N]
+    tops, rest = vector(memory, m)  # largest contribution of each cable along a direction [N]
     waiting, rest = block(rest, DEPTH, RANGE_ROWS * m)
-    ranges = waiting.reshape((DEPTH, RANGE_ROWS, m))  # those that wait, the last one is next
+    ranges = waiting.reshape((DEPTH, RANGE_ROWS, m))  # waiting ranges, of which the last one is examined next
     sag_force, rest = vector(rest, m)
     tau, rest = block(rest, 3, max(m, n))
     trial = TensionChange(tau[0, :m], sag_force, tau[1, :n], tau[2, :n])

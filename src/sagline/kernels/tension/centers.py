@@ -1,4 +1,4 @@
-"""The analytic center of the feasible tensions: the largest product of the distances to all limits."""
+"""The analytic center: the tensions with the largest product of the distances to all limits."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from sagline.kernels.tension.polygon import WorkArrays
 
 THIN = 1e-9  # relative to the largest tension: a thinner set has no center
 NEWTON_STEPS = 200
-CENTERED = 1e-18  # square of the Newton decrement at which the center is found
+CENTERED = 1e-18  # square of the Newton decrement at which the search ends
 
 
 @kernel
 def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) -> int:
-    """Move the point (r,) to the analytic center, from that of the iteration before if there was one."""
+    """Move the point (r,) to the analytic center, starting from the center of the previous iteration, if any."""
     corners, labels, known = work.corners, work.labels, work.known
     if known[0] > 0 and keeps_limits_inside(bounds, null, point) and _analytic_center(bounds, null, work.rest, point):
         return codes.POSE_SOLVED
@@ -51,7 +51,7 @@ def share_at_center(bounds: Array, null: Array, point: Array, work: WorkArrays) 
 
 @kernel
 def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
-    """True if a point keeps all limits by more than the smallest thickness."""
+    """True if a point is farther than the smallest thickness from all limits."""
     slack = THIN * largest_bound(bounds)
     for i in range(null.shape[1]):
         tension = bounds[START, i]
@@ -64,10 +64,10 @@ def keeps_limits_inside(bounds: Array, null: Array, point: Array) -> bool:
 
 @kernel
 def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) -> int:
-    """Fill the point (r,) whose tensions keep farthest from their nearest limits; returns the pose's status."""
+    """Fill the point (r,) whose tensions are farthest from their nearest limits; returns the pose's status."""
     r, m = null.shape
     rows, memory = block(work.rest, r + 1, 2 * m)
-    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # every side one of its own, which depth makes narrower
+    halves, memory = block(memory, STRIP_ROWS, 2 * m)  # one bound per side; the depth, an unknown, makes it narrower
     vectors, memory = block(memory, 2, r + 1)
     cost, found = vectors[0], vectors[1]
     for i in range(m):
@@ -90,12 +90,12 @@ def deepest_point(bounds: Array, null: Array, work: WorkArrays, point: Array) ->
 
 @kernel
 def _analytic_center(bounds: Array, null: Array, memory: Memory, point: Array) -> bool:
-    """Move a point inside the feasible set (r,) to the one of largest product of distances to all limits.
+    """Move a point (r,) inside the feasible set to the point with the largest product of distances to all limits.
 
-    Newton's method with damped steps on the barrier, which is self-concordant; infinite limits do not count. A set
-    too thin to have an inside keeps the point it was given.
+    The method takes damped Newton steps on the self-concordant barrier function and ignores infinite limits. If the set
+    is too thin to have interior points, the point does not change.
 
-    Returns whether the center was found.
+    Returns True if the center was found.
     """
     r, m = null.shape
     vectors, memory = block(memory, 2, r)

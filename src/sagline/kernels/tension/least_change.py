@@ -1,8 +1,8 @@
-"""The least change of the wrench with which tensions within their limits balance it, on the cables' exact curves.
+"""Least change of the wrench that makes it feasible with tensions within their limits, on the cables' exact curves.
 
-Cable i gives the platform the wrench J_i tau - G_i pull_i(tau), a curve. Newton steps replace the curves by their
-tangents; each step is a least-squares problem between limits, with the moments as hard equations, so that what is left
-is force alone, and with a small weight on the change of the tensions, so that it has one answer.
+The wrench of cable i on the platform is J_i tau - G_i s_i(tau), a curve, with s_i its sag force. Newton steps replace
+the curves by their tangents. Each step is a least-squares problem within limits. The moments are hard equations, so
+that the residual is a force only. A small weight on the change of the tensions makes the solution unique.
 """
 
 from __future__ import annotations
@@ -28,55 +28,55 @@ from sagline.kernels.memory import Memory, block, vector
 
 NEWTON_STEPS = 40
 HALVINGS = 12
-STEADINESS = 1e-8  # weight of the squared change of a tension relative to that of the wrench
+STEADINESS = 1e-8  # weight of the squared change of a tension, relative to the weight of the squared wrench
 DECREASE = 1e-4  # share of the predicted decrease that a step must reach
-STIFFEST = 1e3  # largest weight of a bend, which the normal matrix still bears beside that
+STIFFEST = 1e3  # largest weight of a curvature; a larger one would make the normal matrix ill-conditioned
 STANDS = 1e-13  # relative to the largest force: the search ends if the predicted decrease is smaller
-STEADY = 1e-6  # relative to the residual: smaller changes of the tensions do not change its direction
+STEADY = 1e-6  # relative to the residual: smaller changes of the tensions do not change the residual's direction
 
 
 class Demand(NamedTuple):
     """Demand on the cables of one pose; moments are divided by the lever arm, so that every row is in newtons."""
 
-    matrix: Array  # J, what a chord tension gives, (n, m)
-    hanging: Array  # G, what a sag force takes away, (n, m)
-    right: Array  # wrench to be supplied in addition to the sag forces, (n,)
-    soft: int  # number of soft rows, the first ones; the other rows are hard
-    size: float  # the largest force at hand [N], by which tolerances are measured
+    matrix: Array  # J, wrench per chord tension, (n, m)
+    hanging: Array  # G, wrench per sag force, which is subtracted, (n, m)
+    right: Array  # wrench that the cables must supply, without sag forces, (n,)
+    soft: int  # number of soft rows, which come first; the other rows are hard
+    size: float  # largest force [N], the reference of tolerances
 
 
 class TensionChange(NamedTuple):
-    """A state of the search, for m cables and n rows."""
+    """State of the search, for m cables and n rows."""
 
     tau: Array  # chord tensions [N], (m,)
     sag_force: Array  # their sag forces [N], (m,)
     residual: Array  # residual of the demand [N], moments per lever arm, (n,)
-    direction: Array  # y, along which the rest is; moments per lever arm, (n,)
+    direction: Array  # direction y of the residual; moments per lever arm, (n,)
 
 
 class _Tangents(NamedTuple):
     """One Newton step, with h hard and k soft rows and d = m - h unknowns."""
 
     matrix: Array  # J - G dsag_force/dtau, (n, m)
-    reduced: Array  # its hard rows, then their reflections, (h, m)
-    diagonals: Array  # of their factors, (2, h)
-    q: Array  # orthogonal factor, and a row to work in, (m + 1, m)
+    reduced: Array  # hard rows of `matrix`, later their Householder reflections, (h, m)
+    diagonals: Array  # diagonals of their QR factors, (2, h)
+    q: Array  # orthogonal factor, and a work row, (m + 1, m)
     inverse: Array  # transposed pseudo-inverse of the hard rows, (h, m)
-    soft: Array  # the soft rows along the null space of the hard ones, (k, d)
-    normal: Array  # normal matrix of these and the weight of change, then its factor, (d, d)
+    soft: Array  # soft rows along the null space of the hard rows, (k, d)
+    normal: Array  # normal matrix of `soft` and of the weights of change, later its factor, (d, d)
     rows: Array  # derivatives of the tensions by the unknowns, (d, m)
-    bounds: Array  # tensions that are best without limits, and the limits, (3, m)
-    unknowns: Array  # A right side, a target of zeros and the point, (3, d)
+    bounds: Array  # optimal tensions without limits, and the limits, (3, m)
+    unknowns: Array  # right side, a target of zeros, and the point, (3, d)
     held: ActiveSet  # active limits of the last point
-    push: Array  # slopes of the sag forces, then what the limits push with, (m,)
+    push: Array  # slopes of the sag forces, later multipliers of the limits, (m,)
     bend: Array  # weights of the squared changes of the tensions, (m,)
     multipliers: Array  # residual of the last step, and multipliers of its hard rows [N], (n,)
-    trial: tuple[Array, Array, Array]  # tensions, (m,), sag forces, (m,), and residual of a step that is tried, (n,)
+    trial: tuple[Array, Array, Array]  # tensions, (m,), sag forces, (m,), and residual, (n,), of a trial step
 
 
 @glue
 def _new_tangents(memory: Memory, n: int, m: int, hard: int) -> tuple[_Tangents, Memory]:
-    """Work arrays for a step with so many hard rows, and the memory that is left."""
+    """Work arrays for a step with the given number of hard rows, and the remaining memory."""
     d = m - hard
     matrix, memory = block(memory, n, m)
     reduced, memory = block(memory, hard, m)
@@ -121,10 +121,10 @@ def norm_of_part(vector: Array, first: int, last: int) -> float:
 
 @glue
 def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array, step: _Tangents) -> bool:
-    """Fill the tangents at given tensions, and the normal matrix; False where the hard rows depend on each other.
+    """Fill the tangents at given tensions, and the normal matrix; False if the hard rows are linearly dependent.
 
-    The curves' bend counts with the multipliers (n,) of the step before, where it is against going on: without it the
-    steps oscillate across a valley.
+    The curvature of the curves enters with the multipliers (n,) of the previous step, if its sign stabilizes the steps.
+    Without it the steps oscillate across a valley.
     """
     n, m = step.matrix.shape
     soft = demand.soft
@@ -160,7 +160,7 @@ def _set_tangents(curves: Curves, demand: Demand, tau: Array, multipliers: Array
 
 @glue
 def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tangents) -> bool:
-    """Fill the tensions of a full step, and what the limits push with; False where hard rows and limits contradict."""
+    """Fill tensions of a full step and multipliers of the limits; False if hard rows and limits contradict."""
     n, m = step.matrix.shape
     soft = demand.soft
     hard = n - soft
@@ -210,9 +210,10 @@ def _find_step(demand: Demand, ranges: Array, change: TensionChange, step: _Tang
 
 @glue
 def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
-    """Fill the direction along which the step leaves its rest, soft part of length 1; returns the rest's length [N].
+    """Fill the direction of the step's residual, with a soft part of length 1; returns the residual's length [N].
 
-    On the free cables it is perpendicular to the tangents; where a limit holds a cable, it points beyond that limit.
+    It is perpendicular to the tangents of cables between their limits. For a cable at a limit, it points beyond that
+    limit.
     """
     n, m = step.matrix.shape
     hard = n - soft
@@ -237,9 +238,10 @@ def _point_along(soft: int, change: TensionChange, step: _Tangents) -> float:
 
 @glue
 def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionChange, step: _Tangents) -> bool:
-    """Halve a step until it reaches the required decrease; False if nothing is gained or the last step is worse.
+    """Halve a step until it reaches the required decrease; False without a gain, or if the last step is worse.
 
-    What hard rows leave counts by more than their multipliers, so that a step that pays for it elsewhere is none.
+    The residual of the hard rows has a weight above their multipliers, so that a step cannot increase it in exchange
+    for a smaller soft residual.
     """
     n, m = demand.matrix.shape
     soft = demand.soft
@@ -276,11 +278,11 @@ def _line_search(curves: Curves, demand: Demand, rest: float, change: TensionCha
 
 @kernel
 def least_change(curves: Curves, demand: Demand, ranges: Array, change: TensionChange, memory: Memory) -> float:
-    """Change tensions within their ranges until what they leave of the demand is least; returns its length [N].
+    """Change tensions within their ranges until the residual of the demand is least; returns its length [N].
 
-    ranges: least and largest tensions, rows 0 and 1; change: where to begin, and filled. Returns length of what the
-    soft rows leave [N]; infinite where hard rows and ranges contradict, on the tangents; NaN where the hard rows depend
-    on each other.
+    ranges: least and largest tensions, rows 0 and 1; change: start of the search, filled with the result. The length is
+    that of the soft rows' residual [N]. It is infinite if hard rows and ranges contradict each other on the tangents,
+    and NaN if the hard rows are linearly dependent.
     """
     n, m = demand.matrix.shape
     soft = demand.soft

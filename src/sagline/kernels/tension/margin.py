@@ -1,8 +1,8 @@
 """Capacity margin of a pose: distance to the faces of the available wrench set.
 
-The wrenches of all tensions within their limits fill a zonotope. Each of its faces is parallel to n - 1
-columns of the structure matrix; the distance to it along the force part of its normal is the extra force
-that reaches it, whatever its direction.
+The wrenches of all tensions within their limits form a zonotope. Each of its faces is parallel to n - 1 columns of the
+structure matrix. The distance to a face, with a normal whose force part has length 1, is the smallest extra force that
+reaches the face.
 
 Source:
     Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of
@@ -20,8 +20,8 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, counters
 
 MOST_FACES = 1 << 40  # upper bound of the loop; never reached
-ALONG = 1e-13  # of a unit normal and a column: a column in the face itself
-DEPENDENT = 1e-20  # share of a column's square outside the span of others below which it depends on them
+ALONG = 1e-13  # component of a column along a unit normal, below which the column lies in the face
+DEPENDENT = 1e-20  # a column depends on others if less than this share of its square is outside their span
 
 
 @glue
@@ -41,9 +41,9 @@ def next_choice(chosen: Indices, m: int) -> int:
 
 @glue
 def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, triangle: Array) -> int:
-    """Add the chosen columns from a place on to the orthonormal frame (n, n); returns how many it then has.
+    """Add the chosen columns, from a place on, to the orthonormal frame (n, n); returns the number of its rows.
 
-    Fewer than were chosen where a column depends on those before it.
+    The number is smaller than that of the chosen columns if a column depends on those before it.
     """
     n = matrix.shape[0]
     held = first
@@ -62,7 +62,7 @@ def extend_frame(matrix: Array, chosen: Indices, first: int, frame: Array, trian
 
 @glue
 def complete_frame(frame: Array, triangle: Array) -> None:
-    """Fill the last row of a frame (n, n): what is perpendicular to all others."""
+    """Fill the last row of a frame (n, n), which is perpendicular to all others."""
     n = frame.shape[0]
     best = 0
     least = math.inf
@@ -79,7 +79,7 @@ def complete_frame(frame: Array, triangle: Array) -> None:
 
 @formula
 def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tuple[float, float]:
-    """Largest normal . J t, and largest -normal . J t, over all t within their limits; may be infinite."""
+    """Largest values of normal . J t and of -normal . J t over all t within their limits; may be infinite."""
     n, m = matrix.shape
     forward = 0.0
     backward = 0.0
@@ -96,13 +96,13 @@ def zonotope_reach(matrix: Array, low: Array, high: Array, normal: Array) -> tup
 
 @kernel
 def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, translations: int, memory: Memory) -> float:
-    """Largest force [N] in any direction that can be added to the needed wrench; negative where it is not feasible.
+    """Largest force [N] in any direction that can be added to the needed wrench; negative if that is infeasible.
 
     Args:
         matrix: Structure matrix along the free motions, translations first, (n, m).
         needed: Wrench to supply, in the same rows, (n,).
-        low: Least tensions (m,).
-        high: Largest tensions (m,), may be infinite.
+        low: Smallest allowed tensions (m,).
+        high: Largest allowed tensions (m,), may be infinite.
         translations: Number of rows that are forces.
         memory: Work memory.
     """
@@ -114,7 +114,7 @@ def zonotope_margin(matrix: Array, needed: Array, low: Array, high: Array, trans
         chosen[c] = c
     normal = frame[n - 1]
     least = math.inf
-    held = 0  # columns of the choice in the frame
+    held = 0  # number of chosen columns in the frame
     for _ in range(MOST_FACES):
         held = extend_frame(matrix, chosen, held, frame, triangle)
         if held == n - 1:

@@ -1,7 +1,8 @@
-"""Distribution nearest to a reference: minimum norm, closest to the tensions before, quadratic program.
+"""Distribution nearest to a reference: minimum norm, closest to the previous tensions, quadratic program.
 
 docs/model.md, section 5. With an orthonormal null-space basis N, the objective (55) of the article, closest to given
-tensions, is the projection of lambda_ref = N^T (t_ref - t0) onto the feasible set; the minimum norm is that of 0.
+tensions, is the projection of lambda_ref = N^T (t_ref - t0) onto the feasible set. The distribution of minimum norm is
+the projection of 0.
 """
 
 from __future__ import annotations
@@ -24,21 +25,21 @@ class Distribution(NamedTuple):
     parameter: float  # exponent of the p-norm, or code of the optimum of the polygon walk
     variable: int  # code of the variable of the distribution
     weight: Array  # root weights of the cables, (m,)
-    goal: Array  # tensions of a quadratic program to be near to [N], (m,)
+    goal: Array  # target tensions of the quadratic program [N], (m,)
 
 
 class ReferencePoint(NamedTuple):
     """Reference point of a nearest-point method, in coordinates of the null space."""
 
-    previous: Array  # tensions in the distribution's variable to stay close to (m,), NaN for none
+    previous: Array  # reference tensions in the distribution's variable (m,), NaN if there are none
     reference: Array  # lambda_ref, (r,)
-    held: ActiveSet  # the limits that the last projection met
-    point: Array  # the last projection, (r,)
+    held: ActiveSet  # active limits of the last projection
+    point: Array  # result of the last projection, (r,)
 
 
 @glue
 def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[ReferencePoint, Memory]:
-    """Work arrays for r redundant cables, and the memory that is left."""
+    """Work arrays for r redundant cables, and the remaining memory."""
     rows, memory = block(memory, 2, r)
     held, memory = new_active_set(memory, r)
     return ReferencePoint(previous, rows[0], held, rows[1]), memory
@@ -46,7 +47,7 @@ def new_reference_point(memory: Memory, previous: Array, r: int) -> tuple[Refere
 
 @glue
 def set_reference(distribution: Distribution, offset: Array, null: Array, near: ReferencePoint) -> None:
-    """Fill the reference point in the null space for the distributed tensions.
+    """Fill the reference point in the null space for the tension distribution.
 
     offset: of the distribution's variable (m,).
     """
@@ -70,7 +71,7 @@ def set_point(bounds: Array, null: Array, point: Array, tension: Array) -> None:
 
 @formula
 def satisfies_limits(bounds: Array, tension: Array, slack: float) -> bool:
-    """True if every tension keeps its limits up to a tolerance."""
+    """True if every tension is within its limits up to a tolerance."""
     for i in range(tension.size):
         if not bounds[LOW, i] - slack <= tension[i] <= bounds[HIGH, i] + slack:
             return False

@@ -17,7 +17,7 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.nearest import ReferencePoint
 
-TIED = 1e-10  # of the largest tension: sums that differ by less are the same; of the largest weight: none
+TIED = 1e-10  # smallest difference of sums relative to the largest tension, and of weights to the largest weight
 
 
 @formula
@@ -43,7 +43,7 @@ def _is_tied(basis: Basis) -> bool:
 
 @kernel
 def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory) -> int:
-    """Fill the point (r,) of near whose tensions have the least sum; of several the one nearest to the reference."""
+    """Fill the point (r,) of near whose tensions have the least sum; of several, the one nearest to the reference."""
     r, m = null.shape
     cost, memory = vector(memory, r)
     for k in range(r):
@@ -80,7 +80,7 @@ def share_lowest_sum(bounds: Array, null: Array, near: ReferencePoint, basis: Ba
 def share_lowest_maximum(
     bounds: Array, offset: Array, null: Array, near: ReferencePoint, basis: Basis, memory: Memory
 ) -> int:
-    """Fill the point (r,) of near whose largest tension is least; of several the one nearest to the reference.
+    """Fill the point (r,) of near whose largest tension is least; of several, the one nearest to the reference.
 
     The program's last unknown is the largest tension.
     """
@@ -135,7 +135,7 @@ def share_by_norm(
 ) -> int:
     """Fill the point (r,) of near whose tensions have the least p-norm.
 
-    known: whether that point is the answer of the iteration before, (1,), from which the search then starts.
+    known: True if the point is the result of the previous iteration, (1,); the search then starts from it.
     """
     point = near.point
     slack = TOLERANCE * largest_bound(bounds)
@@ -178,9 +178,9 @@ def _p_norm_power(bounds: Array, offset: Array, null: Array, point: Array, p: fl
 def _newton_target(
     bounds: Array, offset: Array, null: Array, point: Array, p: float, slope: Array, curve: Array, target: Array
 ) -> float:
-    """Fill slope, Cholesky factor of the curvature, and the point that Newton's step leads to without limits.
+    """Fill slope, Cholesky factor of the curvature, and the point after a Newton step without limits.
 
-    Returns the largest tension [N], in which both are measured; where it is 0 there is nothing to do.
+    Returns the largest tension [N], the unit of slope and curvature; if it is 0, nothing remains to do.
     """
     r, m = null.shape
     scale = 0.0
@@ -233,11 +233,12 @@ def _change_metric(null: Array, curve: Array, target: Array, turned: Array, goal
 def _lowest_p_norm(
     first: float, p: float, bounds: Array, offset: Array, null: Array, near: ReferencePoint, memory: Memory
 ) -> bool:
-    """Move the feasible point (r,) of near to that of least p-norm.
+    """Move the feasible point (r,) of near to the point of least p-norm; returns True if it was found.
 
-    The exponent doubles from the first as the steps become short until it is p, so that Newton starts near.
+    The exponent starts small and doubles whenever the steps become short, until it is p. Each Newton iteration thus
+    starts near its solution.
 
-    Returns whether it was found.
+    The result is False if the iteration does not converge.
     """
     r, m = null.shape
     point = near.point

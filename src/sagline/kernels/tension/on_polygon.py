@@ -1,8 +1,9 @@
 """Methods on the corners of the feasible polygon or interval: its centroid, and the polygon walk.
 
-From a corner of two cables' parallelogram the walk follows the border of the limits met so far. Where it meets one
-that is missed, the border turns into that limit, which then counts; a full turn with a limit still missed says that
-there is no polygon, a full turn with none missed has passed all its corners.
+The walk starts at a corner of the parallelogram of two cables' limits, and follows the border of the limits included so
+far. At the line of a violated limit, the walk turns into this line, and the limit is included. After a full turn
+without violated limits, the walk has visited all corners. If a limit is still violated after a full turn, the polygon
+is empty.
 
 Source:
     Gouttefarde, Lamaury, Reichert & Bruckmann 2015, "A versatile tension distribution algorithm for n-DOF parallel
@@ -59,18 +60,18 @@ def most_independent(null: Array) -> tuple[int, int]:
 
 @kernel
 def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, labels: Indices) -> int:
-    """Fill corners, counter-clockwise, and labels as `feasible_polygon` does; returns how many.
+    """Fill corners, counter-clockwise, and labels as `feasible_polygon` does; returns their number.
 
-    0 if the polygon is empty, -1 if the walk lost its way. All limits must be finite.
+    The number is 0 if the polygon is empty, and -1 if the walk failed. All limits must be finite.
     """
     m = null.shape[1]
     slack = TOLERANCE * largest_bound(bounds)
     lines, memory = block(memory, 2 * m, 3)
     _limit_lines(bounds, null, lines)
-    met, memory = counters(memory, 2 * m)  # 1 for a limit that counts
+    met, memory = counters(memory, 2 * m)  # 1 for an included limit
     a, b = most_independent(null)
     line = 2 * a
-    # the parallelogram's corner from which line a runs counter-clockwise: inside on its left
+    # the parallelogram's corner from which line a runs counter-clockwise, with the inside on its left
     other = 2 * b
     cross = lines[line, 0] * lines[other, 1] - lines[line, 1] * lines[other, 0]
     if cross > 0.0:
@@ -89,7 +90,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
     for _ in range(16 * m * m):
         corners[count, 0], corners[count, 1], labels[count] = x, y, line
         count += 1
-        way_x = lines[line, 1]  # inside lies to the left of the way
+        way_x = lines[line, 1]  # the inside is to the left of the walk
         way_y = -lines[line, 0]
         nearest = math.inf
         turn = -1
@@ -119,7 +120,7 @@ def walk_polygon(bounds: Array, null: Array, memory: Memory, corners: Array, lab
                 if lines[k, 0] * x + lines[k, 1] * y + lines[k, 2] >= -slack:
                     met[k] = 1
             met[turn] = 1
-            # its border ends here, where the walk continues: it will be the last side to be passed
+            # the border of this limit ends here, where the walk continues; it is the last side of the walk
             first_line = line
             count = 0
     return -1
@@ -133,7 +134,7 @@ WALK_SUM, WALK_NORM, WALK_CENTROID = 0.0, 1.0, 2.0  # the optimum of the polygon
 def distribute_on_polygon(
     method: int, parameter: float, bounds: Array, null: Array, near: ReferencePoint, work: WorkArrays
 ) -> int:
-    """Fill the point (r,) of near by the centroid or the polygon walk; the last edges are tried first."""
+    """Fill the point (r,) of near by the centroid or the polygon walk; edges of the last polygon are tried first."""
     r, m = null.shape
     corners, labels, known = work.corners, work.labels, work.known
     count = known[0]
@@ -166,7 +167,7 @@ def distribute_on_polygon(
 
 @kernel
 def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
-    """Ends of the feasible interval of one redundant cable; the first exceeds the second where it is empty."""
+    """Ends of the feasible interval of one redundant cable; the first end exceeds the second if it is empty."""
     slack = TOLERANCE * largest_bound(bounds)
     first = -math.inf
     last = math.inf
@@ -192,7 +193,7 @@ def feasible_interval(bounds: Array, null: Array) -> tuple[float, float]:
 def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
     """Corners of the feasible polygon, or for r = 1 the two ends of the interval on the first axis; 0 if empty.
 
-    An end at infinity is as far out as the polygon's box, and labeled as such.
+    An end at infinity is replaced by the polygon's box, and has the label of the box.
     """
     if null.shape[0] == 2:
         return feasible_polygon(bounds, null, corners, labels)
@@ -210,7 +211,7 @@ def feasible_corners(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def centroid(corners: Array, count: int) -> tuple[float, float]:
-    """Centroid of a convex polygon; the middle of its corners where it has no area."""
+    """Centroid of a convex polygon; the mean of its corners if its area is zero."""
     x0 = corners[0, 0]
     y0 = corners[0, 1]
     area = 0.0
@@ -241,7 +242,7 @@ def centroid(corners: Array, count: int) -> tuple[float, float]:
 def lowest_corner(
     bounds: Array, null: Array, corners: Array, count: int, goal_x: float, goal_y: float
 ) -> tuple[float, float]:
-    """The point of least sum of tensions: a corner, or of a tied side the point nearest to a goal."""
+    """The point of least sum of tensions: a corner, or, for a side of equal sums, its point nearest to a goal."""
     r, m = null.shape
     gx = 0.0
     gy = 0.0

@@ -1,6 +1,7 @@
-"""Tension distribution methods that are not projections: the switch between them, and those in closed form.
+"""Tension distribution methods that are not projections: the choice of the method, and the closed forms.
 
-The closed forms are near the middle of the limits, without a search; they do not find every distribution.
+The closed forms give tensions near the middle of the limits without a search. They do not find every feasible
+distribution.
 """
 
 from __future__ import annotations
@@ -52,9 +53,9 @@ def share_near_middle(method: int, bounds: Array, null: Array, memory: Memory, t
 
 @glue
 def _hold_violated(bounds: Array, null: Array, slack: float, memory: Memory, tension: Array) -> bool:
-    """Hold the cable that misses its limit most at that limit, and share the rest again, until all keep theirs.
+    """Fix the cable with the largest violation at its limit and distribute the rest again, until no limit is violated.
 
-    Works on the tensions, by orthogonal steps in the null space; a cable once held stays there.
+    The tensions change in place, by orthogonal steps in the null space. A fixed cable remains fixed.
     """
     r, m = null.shape
     held, memory = block(memory, r + 1, r)
@@ -115,9 +116,9 @@ def distribute_by_other_method(
     work: WorkArrays,
     tension: Array,
 ) -> int:
-    """Fill the tensions (m,) in the distribution's variable less its offset; return POSE_SOLVED or a reason.
+    """Fill the tensions (m,) in the distribution's variable less its offset; return POSE_SOLVED or the failure.
 
-    Ties go to the tensions nearest to the reference.
+    Of several solutions, the one nearest to the reference is taken.
     """
     method, parameter = distribution.method, distribution.parameter
     status = codes.POSE_SOLVED

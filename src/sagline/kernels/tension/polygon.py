@@ -1,6 +1,7 @@
 """The polygon of feasible tensions in the null space of two redundant cables; docs/model.md, section 5.
 
-Cable i allows low_i <= t0_i + N_i . lambda <= high_i: a bound. A polygon is kept as its corners, counter-clockwise,
+Cable i allows low_i <= t0_i + N_i . lambda <= high_i, which is a bound. A polygon is stored as its corners,
+counter-clockwise,
 each with the label of the side that leaves it: 2i for the lower limit of cable i, 2i + 1 for its upper limit, and from
 2m on for the sides of the box that replaces infinity.
 """
@@ -27,7 +28,7 @@ def _cut_polygon(
 ) -> int:
     """Keep the part of the polygon where (x, y) . corner >= side; returns the number of corners left.
 
-    Works in place. A half-plane cuts a convex polygon at most twice, where it enters and where it leaves.
+    The corners change in place. The border of a half-plane crosses the border of a convex polygon at most twice.
     """
     leaving = -1  # last corner inside before the first outside
     entering = -1  # first corner inside after the last outside
@@ -65,13 +66,13 @@ def _crossing(corners: Array, inside: int, outside: int, x: float, y: float, sid
 
 @kernel
 def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, entering: int, kept: int) -> int:
-    """Remove the corners outside and make room for the two ends of a new side; returns the place of the first."""
-    if leaving >= entering:  # the corners inside lie between the two: move them to the front
+    """Remove the corners outside and insert space for the two ends of a new side; returns the index of the first."""
+    if leaving >= entering:  # the corners inside lie between the two ends: move them to the front
         for k in range(kept):
             corners[k, 0], corners[k, 1] = corners[entering + k, 0], corners[entering + k, 1]
             labels[k] = labels[entering + k]
         return kept
-    gap = entering - leaving - 1  # the corners outside lie between the two: close or open the gap
+    gap = entering - leaving - 1  # the corners outside lie between the two ends: close or open the gap
     if gap == 1:
         for k in range(count, entering, -1):
             corners[k, 0], corners[k, 1], labels[k] = corners[k - 1, 0], corners[k - 1, 1], labels[k - 1]
@@ -86,7 +87,7 @@ def _shift_corners(corners: Array, labels: Indices, count: int, leaving: int, en
 def widest_pair(null: Array) -> tuple[int, int, float]:
     """Two cables whose rows span a large parallelogram, and its signed area.
 
-    One has the longest row; the other crosses it most.
+    One cable has the longest row; the other one gives the largest area with it.
     """
     m = null.shape[1]
     first = second = 0
@@ -105,7 +106,7 @@ def widest_pair(null: Array) -> tuple[int, int, float]:
 
 @glue
 def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, labels: Indices) -> tuple[int, int]:
-    """Fill the four corners that two crossing bounds have in common; an infinite limit is as far out as a box.
+    """Fill the four corners of the intersection of two bounds; an infinite limit is replaced by a box.
 
     Returns the two bounds.
     """
@@ -132,9 +133,9 @@ def _start_polygon(bounds: Array, null: Array, radius: float, corners: Array, la
 
 @kernel
 def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices) -> int:
-    """Fill the corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon; returns how many, 0 if empty.
+    """Fill the corners (2m + SPARE_CORNERS, 2) and side labels of the feasible polygon; returns the count, 0 if empty.
 
-    bounds: minimum-norm tensions and limits (3, m); null: orthonormal basis, one vector a row, (2, m).
+    bounds: minimum-norm tensions and limits (3, m); null: orthonormal basis, one vector per row, (2, m).
     """
     m = null.shape[1]
     largest = largest_bound(bounds)
@@ -150,7 +151,7 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
         below, above = bounds[LOW, i] - bounds[START, i], bounds[HIGH, i] - bounds[START, i]
         if least > above + slack or most < below - slack or below > above + slack:
             return 0
-        if abs(x) + abs(y) < FLAT or i == a or i == b:  # those two were kept from the start, up to rounding far out
+        if abs(x) + abs(y) < FLAT or i == a or i == b:  # satisfied from the start, except for rounding
             continue
         for upper in range(2):
             if least < below - slack if upper == 0 else most > above + slack:
@@ -164,7 +165,7 @@ def feasible_polygon(bounds: Array, null: Array, corners: Array, labels: Indices
 
 @kernel
 def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, count: int) -> bool:
-    """Fill the corners of a polygon whose sides are known; False where limits have moved so far that they are others.
+    """Fill the corners of a polygon with known sides; False if the limits have changed so far that the sides differ.
 
     The corners are those of the feasible polygon if its sides still follow each other in this order and no limit cuts
     one of them off.
@@ -188,7 +189,7 @@ def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, c
         following = k + 1 if k + 1 < count else 0
         label = labels[k]
         x, y = inward(label) * null[0, label // 2], inward(label) * null[1, label // 2]
-        # inside lies to the left of the way along a side, so the way is the inward normal turned to the right
+        # the inside is to the left of the walk, so the direction of the walk is the inward normal turned to the right
         way = y * (corners[following, 0] - corners[k, 0]) - x * (corners[following, 1] - corners[k, 1])
         if not way > 0.0:
             return False
@@ -203,7 +204,7 @@ def polygon_again(bounds: Array, null: Array, corners: Array, labels: Indices, c
 
 @formula
 def nearest_on_side(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> tuple[float, float]:
-    """The point of the side from a to b that is nearest to a given one."""
+    """The point of the side from a to b that is nearest to a given point."""
     ex = bx - ax
     ey = by - ay
     square = ex * ex + ey * ey
@@ -233,11 +234,11 @@ def nearest_corner_point(corners: Array, count: int, x: float, y: float) -> tupl
 class WorkArrays(NamedTuple):
     """Work arrays whose content is kept between iterations."""
 
-    corners: Array  # of the feasible polygon, (2m + SPARE_CORNERS, 2)
-    labels: Indices  # of its sides, (2m + SPARE_CORNERS,)
-    known: Indices  # number of corners of the last polygon, (1,); 0 for none
-    basis: Basis  # of the linear program of the last iteration
-    rest: Memory  # memory that keeps nothing
+    corners: Array  # corners of the feasible polygon, (2m + SPARE_CORNERS, 2)
+    labels: Indices  # labels of its sides, (2m + SPARE_CORNERS,)
+    known: Indices  # number of corners of the last polygon, (1,); 0 if there is none
+    basis: Basis  # basis of the linear program of the last iteration
+    rest: Memory  # memory whose content is not kept
 
 
 @glue

@@ -1,4 +1,4 @@
-"""Proofs for a box of poses: a tension policy keeps the limits all over it, or a direction separates the demand."""
+"""Proofs for a box of poses: a tension policy within the limits at all poses, or a direction that separates them."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from sagline.kernels.workspaces.pose_box import MOTIONS, CablesInBox, PoseRange,
 from sagline.kernels.workspaces.sag_force_bounds import fall, fall_rate, rise, rise_rate, sag_force_slope
 from sagline.kernels.workspaces.wrench_set import Loads, dot6, reach_of_loads
 
-POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which nothing is proved: the pose is almost singular
-HEADROOM = 1.2  # a box of tensions is tried that much larger than a first estimate
+POOREST_INVERSE = 1e-6  # error of the pseudo-inverse above which no proof is tried, because the pose is almost singular
+HEADROOM = 1.2  # ratio of the tried box of tensions to the first estimate
 ITERATIONS = 3  # iterations of this estimate
 
 
 class Precision(NamedTuple):
-    """Allowances of the proofs; tests switch them off."""
+    """Safety terms of the proofs; tests set them to zero."""
 
     bends: float  # weight of the terms beyond the linear prediction: 1
-    rounding: float  # error of a sum, of the sum of its parts' sizes
+    rounding: float  # rounding error of a sum, relative to the sum of its terms' magnitudes
 
 
 @kernel
@@ -38,9 +38,9 @@ def proves_inside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if the policy tau + J^+ z stays within the limits all over a box; z is the demand of box and loads.
+    """True if the policy tau + J^+ z is within the limits at all poses of a box; z: demand of poses and loads.
 
-    Also fills centered.give with what the set of wrenches alone changes of each tension [N].
+    centered.give is filled with the change of each tension due to the set of wrenches alone [N].
     """
     n, m = place.matrix.shape
     inverse, memory = block(memory, m, n)
@@ -143,10 +143,10 @@ def proves_inside(
     return possible
 
 
-BORNE = 0.3  # share of the gap that a free cable may take of it
-PIECES = 4  # of the tensions below a cable's own, each half as long as the one above
+BORNE = 0.3  # largest share of the gap that a free cable may use
+PIECES = 4  # pieces of the tension range below a cable's tension; each lower end is half the upper end
 
-# rows of what is measured along a direction
+# rows of the cables' contributions along a direction
 VALUE, BENT, SPREAD, HANGING, HANGING_SPREAD, HANGING_BENT = 1, 2, 3, 4, 5, 6
 
 
@@ -161,10 +161,10 @@ def proves_outside(
     precision: Precision,
     memory: Memory,
 ) -> bool:
-    """True if a direction y, turning with the pose, separates the demand from the available wrenches all over a box.
+    """True if a direction y, varying with the pose, separates demand and available wrenches at all poses of a box.
 
-    It is what the centered tensions leave, and how that turns; a small change of it keeps cables that are free from
-    giving more than nothing along it.
+    The direction is the residual of the centered tensions and its derivatives by the pose. A small correction makes the
+    contribution of cables between their limits zero or less along it.
     """
     n, m = place.matrix.shape
     wide, memory = block(memory, 7 + MOTIONS, m)
@@ -255,10 +255,11 @@ def proves_outside(
 
 @kernel
 def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, turning: Array, rows: Array) -> None:
-    """Fill what a newton of each cable and of its sag force count along a direction, and how that goes in a box.
+    """Fill the contributions per newton of tension and of sag force along a direction, and their changes in a box.
 
-    direction: y at the middle, (6,); turning: its slopes with each motion, (MOTIONS, 6); rows: filled: along a column
-    the value at the middle, what is left of it by its slopes, and how far these lead; the same along a sag force.
+    direction: y at the middle, (6,); turning: its slopes with each motion, (MOTIONS, 6); rows: filled, for tensions:
+    value at the middle, largest linear change (SPREAD), and largest deviation from the linear change (BENT); the same
+    for sag forces.
     """
     m = place.way.size
     motions = MOTIONS if box.turn > 0.0 else 3
@@ -326,7 +327,7 @@ def _measure_direction(place: CablesInBox, box: PoseRange, direction: Array, tur
 
 @formula
 def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
-    """Largest t slope + min(t rate, most) for t from 0 to room; rate and most are >= 0."""
+    """Largest t slope + min(t rate, most) for t from 0 to width; rate and most are >= 0."""
     if slope >= 0.0 or width == 0.0:
         return width * slope + min(rate * width, most) if width > 0.0 else 0.0
     if rate + slope <= 0.0:
@@ -337,18 +338,18 @@ def _most_of_run(slope: float, rate: float, most: float, width: float) -> float:
 
 @kernel
 def _most_of_cable(place: CablesInBox, curves: Curves, ranges: Ranges, tau: float, i: int, rows: Array) -> float:
-    """Upper bound over a box of a cable's gain along y at any tension over that at one tension and its sag force."""
+    """Upper bound over a box of the gain of a cable's contribution along y if its tension differs from tau."""
     low, high = ranges.lowest[i], ranges.highest[i]
     bend, spread, hanging = rows[BENT, i], rows[SPREAD, i], rows[HANGING, i]
     weight = abs(hanging)
-    # above the tension: along a column that counts most there
+    # above tau: with the column of the largest contribution
     slope = rows[VALUE, i] + spread + bend
     if slope > 0.0 and high == math.inf:
         return math.inf
     most = fall(curves, i, tau, high) if hanging > 0.0 else rise(curves, i, tau, high)
     rate = fall_rate(curves, i, tau) if hanging > 0.0 else rise_rate(curves, i, tau)
     gain = _most_of_run(slope, weight * rate, weight * most, max(high - tau, 0.0))
-    # below it: along one that counts least, piece by piece
+    # below tau: with the column of the smallest contribution, piece by piece
     slope = -(rows[VALUE, i] - spread + bend)
     top = tau
     largest = 0.0

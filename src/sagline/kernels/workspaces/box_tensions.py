@@ -1,9 +1,10 @@
-"""Tensions for a box of poses: limits that hold all over it, and tensions well inside them at its middle.
+"""Tensions for a box of poses: limits for all its poses, and tensions well inside them at its middle.
 
-Centered tensions make sum over cables of -log(tau - low) - log(high - tau), times a smoothing, plus half the square of
-what is left of the demand, least. Where the demand can be balanced they are near the analytic center; where not, what
-is left points along the direction that separates the demand from all that the cables give, except for the square root
-of the smoothing. Primal-dual Newton steps, each one system of as many unknowns as the platform has free motions.
+Centered tensions minimize a sum of two terms. The first term is the smoothing times the sum over cables of -log(tau -
+low) - log(high - tau). The second term is half the square of the residual of the demand. If the demand is feasible, the
+tensions are near the analytic center. Otherwise the residual points along the direction that separates the demand from
+all wrenches of the cables, with an error of the order of the square root of the smoothing. The method takes primal-dual
+Newton steps. Each step solves a linear system with one unknown per free motion of the platform.
 """
 
 from __future__ import annotations
@@ -23,20 +24,20 @@ from sagline.kernels.workspaces.sag_force_bounds import has_sag, largest_sag_for
 
 STEPS = 40
 REDUCTION = 0.1  # smallest factor of the smoothing per step
-TO_LIMIT = 0.95  # share of the way to a limit that a step may go
-CENTERED = 0.2  # relative error of slack times push of the center; it affects only the chance of success
-FARTHEST = 50.0  # of all forces at hand: where there is no limit, tensions are sought up to so much
+TO_LIMIT = 0.95  # largest step, relative to the distance to a limit
+CENTERED = 0.2  # relative error of slack times barrier force at the center; it does not affect the validity of proofs
+FARTHEST = 50.0  # upper end of the search without a limit, relative to the sum of all forces
 
 
 class Centered(NamedTuple):
     """State of the search, for m cables and n rows."""
 
     low: Array  # limits of the tensions [N], (m,)
-    high: Array  # (m,), finite
+    high: Array  # upper limits of the tensions [N], (m,), finite
     tau: Array  # tensions, strictly inside, (m,)
     below: Array  # barrier forces of the lower limits [N], (m,), > 0
     above: Array  # barrier forces of the upper limits [N], (m,), > 0
-    give: Array  # inverse of how stiffly the limits hold each tension, (m,)
+    give: Array  # inverse of the barrier's stiffness for each tension, (m,)
     right: Array  # demand on the chord tensions [N], (n,)
     left: Array  # its residual, (n,)
     normal: Array  # working space, (n, n)
@@ -68,7 +69,7 @@ def fill_imbalance(matrix: Array, centered: Centered) -> float:
 
 @kernel
 def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> None:
-    """Start from the tensions of the search before, where they fit between the limits, else from the middle."""
+    """Start from the tensions of the previous search if they are between the limits, else from the middle."""
     m = centered.tau.size
     known = not math.isnan(centered.tau[0])
     for i in range(m):
@@ -86,7 +87,7 @@ def _start_centering(matrix: Array, smoothing: float, centered: Centered) -> Non
 
 @kernel
 def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> bool:
-    """Fill the factor of unit times 1 + matrix give matrix^T, (n, n); False where it is not positive definite."""
+    """Fill the factor of unit times 1 + matrix give matrix^T, (n, n); False if it is not positive definite."""
     n, m = matrix.shape
     for k in range(n):
         for j in range(k + 1):
@@ -101,8 +102,8 @@ def factor_normal(matrix: Array, give: Array, unit: float, normal: Array) -> boo
 def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     """Move the tensions to the smoothed center; returns the square of the remaining residual [N^2].
 
-    matrix: structure matrix, all rows in newtons, (n, m); smoothing: [N^2], > 0; centered: limits and right side; the
-    rest is filled.
+    matrix: structure matrix, all rows in newtons, (n, m); smoothing: [N^2], > 0; centered: contains limits and right
+    side; the other fields are filled.
     """
     n, m = matrix.shape
     tau, low, high, below, above = centered.tau, centered.low, centered.high, centered.below, centered.above
@@ -163,26 +164,26 @@ def find_center(matrix: Array, smoothing: float, centered: Centered) -> float:
     return square
 
 
-SMOOTHNESS = 0.01  # of how far the demand goes over a box: so much of it the smoothing leaves
-SLACK = 0.45  # X at a limit of the frame end beyond which it may move faster than the sag force
-LEAST_WIDTH = 0.05  # share of their range that a set of wrenches leaves to the tensions in the search for a center
-ITERATIONS = 2  # of tensions and their sag forces
+SMOOTHNESS = 0.01  # residual due to the smoothing, relative to the change of the demand over a box
+SLACK = 0.45  # largest X at which a frame-end limit moves at most as fast as the sag force
+LEAST_WIDTH = 0.05  # smallest range of the search after subtracting the set of wrenches, relative to the full range
+ITERATIONS = 2  # iterations of tensions and their sag forces
 LEAST_WAY = 1e-4  # relative to a chord: lower bound of the displacement that sets the smoothing
 
 
 class Ranges(NamedTuple):
-    """Limits of the chord tensions that hold all over a box [N]."""
+    """Limits of the chord tensions for all poses of a box [N]."""
 
-    low: Array  # upper bound of the limits, (m,): for inside
-    high: Array  # lower bound of the limits, up to twice the length of a cable; may be infinite
-    lowest: Array  # lower bound of the limits: for outside
-    highest: Array  # upper bound of the limits, or of tensions by the load; may be infinite
+    low: Array  # largest value of the lower limit in the box, (m,), for proofs of feasibility
+    high: Array  # smallest value of the upper limit, at most a stretch to twice the length; may be infinite
+    lowest: Array  # smallest value of the lower limit, for proofs of infeasibility
+    highest: Array  # largest value of the upper limit, or a bound of the tensions from the load; may be infinite
     sag_force: Array  # sag forces at the centered tensions
 
 
 @kernel
 def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges) -> None:
-    """Fill the limits that hold all over a box from those at its middle."""
+    """Fill the limits for all poses of a box from those at its middle."""
     cables = curves.cables
     for i in range(place.way.size):
         low, high = cables.low[i], cables.high[i]
@@ -199,10 +200,11 @@ def set_ranges(quantity: int, place: CablesInBox, curves: Curves, ranges: Ranges
 
 @kernel
 def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> None:
-    """Take the limits of a cable's frame end, as chord limits at the middle, apart by how far they move in a box.
+    """Separate frame-end limits, given as chord limits at the middle, by their change in a box.
 
-    They move as its sag force does where it is not slack. A limit that is, anywhere in the box, is the least of those
-    that are not for what has to keep it, and none at all for the proof that nothing does.
+    Away from slackness, a limit changes at most as fast as the sag force. A limit that may be slack somewhere in the
+    box is replaced: by the least limit without slackness in proofs of feasibility, and by zero in proofs of
+    infeasibility.
     """
     cables = curves.cables
     way = place.way[i]
@@ -218,12 +220,13 @@ def _move_limits(place: CablesInBox, curves: Curves, i: int, ranges: Ranges) -> 
 
 @kernel
 def tighten(freedom: Array, place: CablesInBox, curves: Curves, upward: float, ranges: Ranges) -> None:
-    """Take from the largest tensions what no load on cables that all pull up could cause.
+    """Reduce the largest tensions to the values that the load can cause if all cables pull up.
 
-    Along the vertical they balance weight, load and sag forces, of which each is at most the rest.
+    The vertical parts of all tensions balance weight, load and sag forces. The vertical part of one tension is
+    therefore at most this sum minus the smallest vertical parts of the others.
 
-    freedom: rows that pick the free motions, (n, 6); upward: most vertical force that the cables have to give beside
-    their sag forces [N].
+    freedom: rows that select the free motions, (n, 6); upward: largest vertical force that the cables must supply,
+    without sag forces [N].
     """
     free = 0.0
     for k in range(freedom.shape[0]):
@@ -254,7 +257,7 @@ def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ran
         for a in range(6):
             for i in range(m):
                 slopes[motion, a] += centered.tau[i] * columns[a, i]
-        for i in range(m):  # a sag force's lever goes with rotation
+        for i in range(m):  # the lever of a sag force changes with rotation
             if motion == 3:
                 slopes[motion, 3] += ranges.sag_force[i] * place.lever[2, i]
             elif motion == 4:
@@ -266,7 +269,7 @@ def spread_of_slopes(place: CablesInBox, box: PoseRange, centered: Centered, ran
 
 @formula
 def in_wrench_space(rows: Array, vector: Array, full: Array) -> None:
-    """Fill a direction in wrenches (6,) from one along the free motions (n,)."""
+    """Fill a direction of wrenches (6,) from a direction along the free motions (n,)."""
     for a in range(6):
         full[a] = 0.0
         for k in range(vector.size):
@@ -279,7 +282,7 @@ def _fill_demand(
 ) -> None:
     """Fill the demand on the chord tensions, with the sag forces at the present tensions.
 
-    load: wrench, (6,); centered: tensions; filled; ranges: its sag forces are filled.
+    load: wrench, (6,); centered: contains tensions, its right side is filled; ranges: its sag forces are filled.
     """
     n, m = place.matrix.shape
     sag_forces_at(curves, centered.tau, ranges.sag_force)
@@ -298,7 +301,7 @@ def _fill_demand(
 
 @glue
 def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
-    """Smoothing for a box [N^2]: the square of a share of how far tensions' wrenches go in it."""
+    """Smoothing for a box [N^2], proportional to the squared change of the tensions' wrenches in the box."""
     square = 0.0
     for i in range(tau.size):
         change = tau[i] * max(place.way[i] / geometry[g.CHORD, i], LEAST_WAY)
@@ -308,9 +311,9 @@ def _smoothing_of(place: CablesInBox, geometry: Array, tau: Array) -> float:
 
 @glue
 def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered) -> bool:
-    """Fill the limits between which tensions are sought: those of the box, less what is taken (m,).
+    """Fill the limits of the search for tensions: those of the box, narrowed by `taken` (m,).
 
-    Returns whether there is room between them.
+    Returns False if a lower limit exceeds an upper one.
     """
     possible = True
     for i in range(taken.size):
@@ -327,9 +330,9 @@ def search_limits(ranges: Ranges, taken: Array, size: float, centered: Centered)
 def center_tensions(
     place: CablesInBox, curves: Curves, geometry: Array, body: Array, wrench: Array, centered: Centered, ranges: Ranges
 ) -> tuple[float, float]:
-    """Let tensions between the limits of the search balance a wrench (6,), with their own sag forces.
+    """Compute centered tensions within the limits of the search for a wrench (6,), with their own sag forces.
 
-    Returns the square of what they leave [N^2], and the smoothing.
+    Returns the square of the residual [N^2], and the smoothing.
     """
     iterations = ITERATIONS if curves.model.code == codes.CATENARY else 1
     square, smoothing = 0.0, 0.0

@@ -1,10 +1,11 @@
-"""The facets of the wrenches that cables can exert: normals to all (n - 1)-subsets of the structure matrix's columns.
+"""Facets of the available wrench set: normals to all subsets of n - 1 columns of the structure matrix.
 
-Elimination with complete pivoting makes n columns unit vectors: a basis, whose rows are normals to all of it but one.
-A normal to k of the r = m - n other columns and to all of the basis but k + 1 is then a combination of k + 1 rows, by
-the k x k minors of the other columns there; these grow from those of one column less by Laplace's expansion. So the
-subsets of the other columns are walked depth first, and all normals of a subset come in a loop without branches.
-Whatever rounding does to a normal, it stays a direction along which to measure.
+Elimination with complete pivoting turns n columns, the basis, into unit vectors. Each row is then a normal to all
+columns of the basis except one. r = m - n columns are not in the basis. A normal to k of these and to all columns of
+the basis except k + 1 is a combination of k + 1 rows. Its coefficients are k x k minors of the k columns in these rows.
+Laplace's expansion gives them from the minors of one column less. The subsets of the other columns are visited depth
+first. All normals of a subset are computed in a loop without branches. A normal with rounding errors remains a valid
+direction for measuring the margin.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from sagline.core.arrays import Array, Indices
 from sagline.kernels.jit import formula, glue
 from sagline.kernels.memory import Memory, block, counters
 
-RANK = 1e-9  # of the largest entry, as in `kernels.algebra.householder`: a pivot below it says that rank is lost
-DEPENDENT = 1e-10  # a normal by minors no larger than this is one to columns that depend on each other
+RANK = 1e-9  # relative to the largest entry, as in `kernels.algebra.factors`: rank is lost at a smaller pivot
+DEPENDENT = 1e-10  # minors up to this size mean that the columns are linearly dependent
 LIMIT = 1 << 40  # largest number of steps; never reached
-MOST_FREE = 6  # motions
+MOST_FREE = 6  # largest number of free motions
 
-# Subsets of up to six rows, as bits: those of size k of n rows are ORDER[n, START[n, k] : START[n, k + 1]].
+# Subsets of up to six rows, as bits. Subsets of size k of n rows are ORDER[n, START[n, k] : START[n, k + 1]].
 _SUBSETS = [
     [sum(1 << i for i in chosen) for k in range(n + 1) for chosen in combinations(range(n), k)]
     for n in range(MOST_FREE + 1)
@@ -38,18 +39,18 @@ MEMBERS: Final = np.array([([i for i in range(6) if bits >> i & 1] + [0] * 6)[:6
 class Facets(NamedTuple):
     """State of the walk over the facets."""
 
-    # A row for each column of the basis: along the m columns, in world axes, and the sum of the absolute components,
-    # moments times the lever arm, (n, m + 7)
+    # One row per column of the basis, (n, m + 7): components along the m columns, components in world axes, and the sum
+    # of their absolute values with moments times the lever arm
     table: Array
-    others: Array  # the columns that are not in the basis along its rows, each with a largest entry of 1, (r, n)
-    minors: Array  # of the present subset and its beginnings, by sets of rows, (n, 2^n)
-    basis: Indices  # the column of each row, (n,)
-    chosen: Indices  # the present subset of the others, from place 1 on, (n + 1,)
+    others: Array  # the columns outside the basis along its rows, each with a largest entry of 1, (r, n)
+    minors: Array  # minors of the present subset and its leading parts, by sets of rows, (n, 2^n)
+    basis: Indices  # index of the basis column of each row, (n,)
+    chosen: Indices  # present subset of the other columns, from index 1 on, (n + 1,)
 
 
 @glue
 def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
-    """Work arrays for n free motions and m cables, and the memory that is left."""
+    """Work arrays for n free motions and m cables, and the remaining memory."""
     table, memory = block(memory, n, m + 7)
     others, memory = block(memory, m - n, n)
     minors, memory = block(memory, n, 1 << n)
@@ -60,7 +61,7 @@ def new_facets(memory: Memory, n: int, m: int) -> tuple[Facets, Memory]:
 
 @glue
 def choose_basis(facets: Facets, n: int, m: int, lever: float) -> bool:
-    """Eliminate in place, and fill basis and others; False where rank is lost."""
+    """Eliminate in place, and fill basis and others; False if rank is lost."""
     table, basis = facets.table, facets.basis
     first = 0.0
     for k in range(n):

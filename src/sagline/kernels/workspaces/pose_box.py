@@ -1,8 +1,8 @@
 """The cables over a box of poses: geometry at its middle, and its largest change in the box.
 
-A box holds the positions no farther than half an edge from its middle along each axis, at every orientation that one
-turn by no more than an angle, about any axis, makes of the one at the middle. Where the angle is zero all of them have
-the same orientation.
+A box contains all positions within half an edge of its middle along each axis. At each position it contains all
+orientations that differ from the one at the middle by a rotation, about any axis, of at most a given angle. If the
+angle is zero, all poses have the same orientation.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ class PoseRange(NamedTuple):
 class CablesInBox(NamedTuple):
     """Cables at the middle of a box of poses, and bounds of their changes in the box."""
 
-    rows: Array  # free motions, those that turn per lever arm, so that all components are in newtons, (n, 6)
+    rows: Array  # free motions, with rotations per lever arm, so that all components are in newtons, (n, 6)
     full: Array  # structure matrix, (6, m)
     matrix: Array  # its components along the rows, (n, m)
-    lever: Array  # from center of mass to platform end, world axes [m], (3, m)
-    slopes: Array  # of the structure matrix with each motion of the platform, (MOTIONS, 6 * m)
+    lever: Array  # levers from center of mass to platform end, world axes [m], (3, m)
+    slopes: Array  # derivatives of the structure matrix by each motion of the platform, (MOTIONS, 6 * m)
     way: Array  # largest displacement of a platform end [m], (m,)
     turned: Array  # largest change of a unit vector, (m,)
-    bent: Array  # its largest deviation from the linear prediction, (m,)
+    bent: Array  # largest deviation of a unit vector from the linear prediction, (m,)
     swung: Array  # largest change of a lever [m], (m,)
-    curled: Array  # its largest deviation from the linear prediction [m], (m,)
+    curled: Array  # largest deviation of a lever from the linear prediction [m], (m,)
 
 
 @glue
 def new_cables_in_box(memory: Memory, m: int, n: int) -> tuple[CablesInBox, Memory]:
-    """Work arrays for m cables and n free motions, and the memory that is left."""
+    """Work arrays for m cables and n free motions, and the remaining memory."""
     rows, memory = block(memory, n, 6)
     wide, memory = block(memory, 6 + n + 3 + 5, m)
     slopes, memory = block(memory, MOTIONS, 6 * m)
@@ -59,10 +59,11 @@ def new_cables_in_box(memory: Memory, m: int, n: int) -> tuple[CablesInBox, Memo
 def set_cables_in_box(
     freedom: Array, geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox
 ) -> bool:
-    """Fill a place from the geometry of its cables; False where a platform end may meet its frame end in the box.
+    """Fill a place from the geometry of its cables; False if a platform end may meet its frame end in the box.
 
-    freedom: rows that pick the free motions, (n, 6); geometry: rows of `cable_geometry` at the middle, (GEOMETRY_ROWS,
-    m); rotation: platform -> world at the middle, (3, 3); center: center of mass in the platform frame [m], (3,);
+    freedom: rows that select the free motions, (n, 6); geometry: rows of `cable_geometry` at the middle,
+    (GEOMETRY_ROWS, m); rotation: platform -> world at the middle, (3, 3); center: center of mass in the platform frame
+    [m], (3,);
     place: filled.
     """
     n, m = place.matrix.shape
@@ -108,7 +109,7 @@ def set_cables_in_box(
 
 @kernel
 def _set_slopes(geometry: Array, rotation: Array, center: Array, box: PoseRange, place: CablesInBox) -> None:
-    """Fill the slopes of the structure matrix."""
+    """Fill the derivatives of the structure matrix by the motions."""
     m = place.way.size
     for motion in range(MOTIONS if box.turn > 0.0 else 3):
         slopes = place.slopes[motion].reshape((6, m))
@@ -116,7 +117,7 @@ def _set_slopes(geometry: Array, rotation: Array, center: Array, box: PoseRange,
             x, y, z = place.full[0, i], place.full[1, i], place.full[2, i]
             rx, ry, rz = place.lever[0, i], place.lever[1, i], place.lever[2, i]
             bx = by = bz = 0.0  # displacement of the platform end
-            sx = sy = sz = 0.0  # and the lever
+            sx = sy = sz = 0.0  # displacement of the lever's end
             if motion == 0:
                 bx = 1.0
             elif motion == 1:
@@ -152,7 +153,7 @@ def norm3(x: float, y: float, z: float) -> float:
 
 @formula
 def most_of_linear(box: PoseRange, slopes: Array) -> float:
-    """Largest value in a box of a function with these slopes along the motions, (MOTIONS,), zero at the middle."""
+    """Largest value in a box of a linear function with these slopes (MOTIONS,), which is zero at the middle."""
     most = abs(slopes[0]) * box.half[0] + abs(slopes[1]) * box.half[1] + abs(slopes[2]) * box.half[2]
     if box.turn > 0.0:
         most += box.turn * norm3(slopes[3], slopes[4], slopes[5])

@@ -1,7 +1,7 @@
-"""Proofs that a robot can work at every pose of a box, or at none; docs/model.md, section 13.
+"""Proofs that every pose of a box is wrench-feasible, or that no pose is; docs/model.md, section 13.
 
-Inside: a policy of tensions that balances every wrench at every pose stays within the limits. Outside: one wrench of
-the set, and a direction that turns with the pose, along which the cables together fall short of it.
+Proof of INSIDE: a tension policy that balances every wrench at every pose stays within the limits. Proof of OUTSIDE:
+for one wrench of the set there is a direction, varying with the pose, along which all cables together give too little.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from sagline.kernels.workspaces.wrench_set import Loads, farthest, reach_of_load
 
 OPEN, INSIDE, OUTSIDE = 0, 1, 2  # verdicts
 BOX_COLUMNS = 11  # pose row, half edges, turn
-ATTEMPTS = 3  # of tensions, and what a set of wrenches takes of their limits
-BEYOND = 2.0  # of the smoothing, a cable: a demand that leaves more is out of reach
+ATTEMPTS = 3  # iterations of tensions and of the change of their limits by the set of wrenches
+BEYOND = 2.0  # smoothing per cable: a demand with a larger residual is infeasible
 
 LoadTerms = tuple[Array, Array, Array, Array, Indices]  # Loads
 PrecisionTerms = tuple[float, float]  # Precision
@@ -56,18 +56,18 @@ def prove_boxes(
     memory: tuple[Array, Indices],
     answers: tuple[Codes, Codes],
 ) -> None:
-    """Try to prove for each of N boxes that a robot can work at all poses of the box, or at none.
+    """Try to prove for each of N boxes that all its poses are wrench-feasible, or that none is.
 
     Args:
         model_terms: Cable model: code, k_h, k_p.
         limit_terms: Limits of the tensions: `TensionLimits`.
-        robot_terms: Rows of the structure matrix that count, (n, 6); body_table (1, BODY_COLUMNS); cable_table,
-            (1, m, CABLE_COLUMNS), without pulleys.
+        robot_terms: Rows that select the free motions, (n, 6); body_table (1, BODY_COLUMNS); cable_table, (1, m,
+            CABLE_COLUMNS), without pulleys.
         load_terms: The wrenches to balance: `Loads`.
         boxes: Rows: pose at the middle, half edges [m], largest turn from there [rad], (N, BOX_COLUMNS).
         precision_terms: `Precision`.
-        memory: `proof_memory` as many cables.
-        answers: Filled: OPEN, INSIDE or OUTSIDE, (N,); and statuses to work in, (m,).
+        memory: `proof_memory` for the number of cables.
+        answers: Filled: OPEN, INSIDE or OUTSIDE, (N,); and a work array of statuses, (m,).
     """
     limits = TensionLimits(*limit_terms)
     loads = Loads(*load_terms)

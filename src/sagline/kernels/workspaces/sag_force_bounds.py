@@ -1,8 +1,8 @@
-"""Bounds of the cables' sag forces: between the limits of the chord tensions, and as tension and platform end change.
+"""Bounds of the cables' sag forces within the chord tension limits, and for changes of tension and platform end.
 
 For an inextensible cable, X = wD/(2 tau): sag force = tau X (L/D) + tau sin phi (X coth X - 1), whose slopes are
-bounded in closed form here. Stretch makes those along the position smaller, and lets the sag force fall with the
-tension by wD/(2 EA) more at most; docs/model.md, section 13.
+bounded here in closed form. Stretch decreases the slopes by position. It increases the rate at which the sag force
+falls with the tension by at most wD/(2 EA); docs/model.md, section 13.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from sagline.kernels.cable.sag_forces import LOOSEST, Curves, Section, find_extr
 from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory
 
-# What the formula of `range_between_ends` is good for, on two million random cables.
+# Validity of the formula of `range_between_ends`, tested on two million random cables.
 SLACKEST, STRETCHED = 0.3, 0.15  # largest X and e
-BY_STRETCH, BY_SAG = 0.334, 0.023  # its remainder, of eX and of X^3
-FROM_MOST, BEFORE_MOST = 0.85, 1.8  # of X_M: the sag force turns at 0.89 to 1.72 of it
-BEFORE_LEAST, AFTER_LEAST = 0.25, 1.05  # of |sin phi|/cos^2 phi: and turns again at 0.28 to 1.03 of that
+BY_STRETCH, BY_SAG = 0.334, 0.023  # coefficients of its remainder, for eX and for X^3
+FROM_MOST, BEFORE_MOST = 0.85, 1.8  # relative to X_M: an extremum of the sag force is at 0.89 to 1.72 of it
+BEFORE_LEAST, AFTER_LEAST = 0.25, 1.05  # relative to |sin phi|/cos^2 phi: another extremum is at 0.28 to 1.03 of it
 
 # Rows of the bands (BAND_ROWS, m).
 LOW, HIGH = 0, 1  # chord tensions [N]; the upper one may be infinite
-TAUT = 2  # the largest one that sagging cables are looked at: where there is no limit they are stretched to twice
+TAUT = 2  # upper end for sagging cables [N]; without a limit, the tension that doubles their length
 SAG_FORCE_LOW, SAG_FORCE_HIGH = 3, 4  # sag forces at LOW and TAUT [N]
 LEAST, MOST = 5, 6  # least and largest sag force between them [N]
 BAND_ROWS = 7
@@ -32,10 +32,10 @@ BAND_ROWS = 7
 
 @glue
 def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
-    """Fill the bands of the cables in place; False where one is too slack at any tension.
+    """Fill the bands of the cables in place; False if a cable is too slack at any tension.
 
-    Tensions below which a cable's X = wD/(2 tau) is above LOOSEST are left out: with a least tension of zero the sag
-    force has no largest value.
+    Tensions below which a cable's X = wD/(2 tau) is above LOOSEST are excluded, because the sag force is unbounded for
+    tensions near zero.
     """
     cables = curves.cables
     m = cables.low.size
@@ -50,7 +50,7 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
             bands[LOW, i] = min(max(cables.low[i], cables.half_weight[i] / LOOSEST), bands[TAUT, i])
     if not exact:
         for i in range(m):
-            sag_force = cables.sag_force[i]  # of first order, and the same at every tension
+            sag_force = cables.sag_force[i]  # first-order sag force, which is the same at every tension
             bands[SAG_FORCE_LOW, i] = bands[SAG_FORCE_HIGH, i] = bands[LEAST, i] = bands[MOST, i] = sag_force
         return True
     sag_forces_at(curves, bands[LOW], bands[SAG_FORCE_LOW])
@@ -72,18 +72,18 @@ def fill_bands(curves: Curves, bands: Array, memory: Memory) -> bool:
 
 @formula
 def range_between_ends(cables: Cables, i: int, bands: Array) -> tuple[float, float]:
-    """Least and largest sag force of a cable from those at its ends; NaN where first order does not decide.
+    """Least and largest sag force of a cable from those at its ends; NaN if the first order is not decisive.
 
     With X = wD/(2 tau) and e = tau/EA, sag force/(wD/2) = 1/(1 + e) - X/3 |sin phi|/(1 + e)^2 + X^2/6 cos^2 phi to
-    0.334 eX + 0.023 X^3 for a cable below its frame end, e <= 0.15 and X <= 1. It turns twice at most: there is a
-    largest value near X_M, where e = X/3 |sin phi|, and at larger X a least one; docs/model.md, section 5.
+    0.334 eX + 0.023 X^3 for a cable below its frame end, e <= 0.15 and X <= 1. It has at most two extrema: a maximum
+    near X_M, where e = X/3 |sin phi|, and a minimum at larger X; docs/model.md, section 5.
     """
     half_weight = cables.half_weight[i]
     at_low, at_high = bands[SAG_FORCE_LOW, i], bands[SAG_FORCE_HIGH, i]
     least, most = min(at_low, at_high), max(at_low, at_high)
     s, c2 = -cables.sine[i], cables.cosine[i] * cables.cosine[i]
     x, tautest = half_weight / bands[LOW, i], half_weight / bands[TAUT, i]
-    product = half_weight / cables.stiffness[i]  # e X, whatever the tension
+    product = half_weight / cables.stiffness[i]  # e X, which does not depend on the tension
     if s <= 0.0 or half_weight == 0.0:
         return least, most
     if x > SLACKEST or product > STRETCHED * tautest or cables.machine:
@@ -113,13 +113,13 @@ SMALL = 1e-3  # X below which series are used
 
 @formula
 def _sinh_ratio(x: float) -> float:
-    """An upper bound of sinh(x)/x, its value except for small x."""
+    """Upper bound of sinh(x)/x, equal to it except for small x."""
     return math.sinh(x) / x if x > SMALL else 1.0 + x * x / 3.0
 
 
 @formula
 def _slack_rate(x: float) -> float:
-    """An upper bound of x cosh x - sinh x, its value except for small x."""
+    """Upper bound of x cosh x - sinh x, equal to it except for small x."""
     return x * math.cosh(x) - math.sinh(x) if x > 0.1 else 0.34 * x * x * x
 
 
@@ -131,9 +131,9 @@ def has_sag(curves: Curves, i: int) -> bool:
 
 @kernel
 def sag_force_slope(curves: Curves, i: int, way: float, tension: float) -> float:
-    """Largest slope of a sag force over the platform end's position [N/m], at or above a chord tension.
+    """Largest derivative of a sag force by the platform end's position [N/m], at or above a chord tension.
 
-    way: how far its platform end may be from where the curves are [m]; tension: least chord tension [N].
+    way: largest distance of the platform end from its position in `curves` [m]; tension: least chord tension [N].
     """
     cables = curves.cables
     if curves.model.code != codes.CATENARY:

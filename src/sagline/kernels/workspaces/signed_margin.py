@@ -1,9 +1,9 @@
-"""Signed margin of a pose over a whole set of loads; negative: the excess of the set.
+"""Signed margin of a pose for a set of loads; a negative value is the excess of the set.
 
-docs/model.md, section 13: the least distance of the set to the facets of what the cables can exert, signed. Weight
-makes the sag forces of the cables uncertain while their tensions are: with the sag forces that hurt the margin is a
-lower end, with those that help an upper one, and between them lies that of the end tensions with their own sag forces,
-which is continuous.
+The margin is the signed least distance of the set to the facets of the available wrench set; docs/model.md, section 13.
+The sag forces depend on the tensions, which vary within their limits. The least favorable sag forces give a lower bound
+of the margin, and the most favorable ones an upper bound. The value between them uses the tension limits with their own
+sag forces. It is continuous in the pose.
 
 Source:
     Bouchard, Gosselin & Moore 2010, "On the ability of a cable-driven robot to generate a prescribed set of wrenches";
@@ -50,12 +50,12 @@ from sagline.kernels.workspaces.sag_force_bounds import (
 )
 from sagline.kernels.workspaces.wrench_set import SetTerms, WrenchSetArrays, new_set, place_set, reach_of_set
 
-ALONG = 1e-13  # of the rows that a normal is made of: what a column in the facet itself gives along it by rounding
-PURE = 1e-9  # force part of a normal of length 1, moments times the lever arm, below which it is one of moments alone
+ALONG = 1e-13  # relative to the terms of a normal: rounding error of its product with a column in the facet
+PURE = 1e-9  # a unit normal (moments times lever arm) with a smaller force part counts as a pure moment
 
-# Rows of what counts of the cables (COUNT_ROWS, m).
+# Rows of the cables' weights (COUNT_ROWS, m).
 WIDTH = 0  # half the range of the tensions
-SLOPE = 1  # half the increase of the sag force from end to end
+SLOPE = 1  # half the increase of the sag force from the lower to the upper tension limit
 UNSURE = 2  # half the range of the sag force
 LEVER_X, LEVER_Y = 3, 4
 COLUMN = 5  # of the structure matrix, six rows
@@ -63,21 +63,21 @@ COUNT_ROWS = 11
 
 ENDS, RANGES = 0, 1  # rows of the points
 
-# Facets that are measured together: rows in flat memory, whose places are known when it is compiled, so that loops
-# over facets vectorize.
+# Facets that are measured together: rows in flat memory with positions known at compile time, so that loops over facets
+# vectorize.
 TOGETHER = 64
-OF_A_SUBSET = 20  # of the other columns: so many normals at most, 6 over 3
+OF_A_SUBSET = 20  # largest number of normals per subset, 6 over 3
 NORMAL = 0  # six rows
 ROUNDING = 6 * TOGETHER
-BY_ENDS, BY_TENSIONS, BY_SAG_FORCES = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # wrench of the cables about the points
+BY_ENDS, BY_TENSIONS, BY_SAG_FORCES = 7 * TOGETHER, 8 * TOGETHER, 9 * TOGETHER  # half ranges of the cables' wrenches
 AGAINST, FOR = 10 * TOGETHER, 11 * TOGETHER  # extent of the set in both directions
-UP, DOWN = 12 * TOGETHER, 13 * TOGETHER  # the most that a cable without limit counts to either side
+UP, DOWN = 12 * TOGETHER, 13 * TOGETHER  # largest contributions of cables without limit in both directions
 WORK = 14 * TOGETHER  # two rows
-LENGTH = 16 * TOGETHER  # the inverse of the normal's
+LENGTH = 16 * TOGETHER  # inverse of the normal's length
 MARGINS = 17 * TOGETHER  # three rows: VALUE, BELOW, ABOVE
 FACET_SIZE = 20 * TOGETHER
 AS_GOOD_AS_INFINITE = 1e250
-BEYOND = 1e300  # for the inverse of no length at all: what is multiplied by it is as good as infinite
+BEYOND = 1e300  # inverse of a length of zero; products with it count as infinite
 
 VALUE, BELOW, ABOVE = 0, 1, 2  # rows of the margins (3, N) [N]
 
@@ -88,13 +88,14 @@ Margins = tuple[Array, Array, Indices, Codes]  # margins (3, N), directions (N, 
 class _FacetWeights(NamedTuple):
     """Weights of the facets of one pose."""
 
-    rows: Array  # of the cables, (COUNT_ROWS, m)
-    # wrench of the cables at the middle of their limits, and of their sag forces' ranges, less the demand, (2, 6)
+    rows: Array  # rows of the cables' weights, (COUNT_ROWS, m)
+    # wrench of the cables at the middle of the tension limits minus the demand; sag forces at the middle of their
+    # values at the limits (ENDS) or of their ranges (RANGES), (2, 6)
     points: Array
     high: Array  # upper limits [N], (m,)
     endless: bool  # True if a cable has no upper limit
     arm: float  # lever arm of the norm [m]
-    lever: float  # mean lever arm [m], by which moments are divided while normals are looked for; 1 without any
+    lever: float  # mean lever arm [m] that divides moments in the search for normals; 1 without a lever arm
 
 
 @entry
@@ -115,17 +116,17 @@ def signed_margins(
     Args:
         model_terms: Cable model: code, k_h, k_p.
         limit_terms: Limits of the tensions: `TensionLimits`.
-        robot_terms: Rows of the structure matrix that count, translations first, (n, 6); body_table, (1 or R,
-            BODY_COLUMNS); cable_table, (1 or R, m, CABLE_COLUMNS); the first N/R poses are the first robot's and so on.
+        robot_terms: Rows that select the free motions, translations first, (n, 6); body_table, (1 or R, BODY_COLUMNS);
+            cable_table, (1 or R, m, CABLE_COLUMNS); the first N/R poses belong to the first robot, and so on.
         set_terms: The set of loads.
         arms: Lever arm of the norm, and mean lever arm [m], (1 or R,) each.
         poses: Rows (N, POSE_COLUMNS).
-        memory: `memory_for` as many cables and FACET_SIZE numbers more, and codes of the cables (m,).
-        margins: Filled: value, lower and upper end [N], (3, N); normal of the facet of the value, along which the
-            cables give too little first, in world axes, of length 1 where moments are divided by the lever arm, (N, 6);
-            the cable whose limit moves it fastest, -1 for none, (N,); what the bracket says, (N,).
-        first: Pose to begin with.
-        last: Pose to end before.
+        memory: `memory_for` the number of cables plus FACET_SIZE numbers, and codes of the cables (m,).
+        margins: Filled: value, lower and upper bound [N], (3, N); normal of the facet with the least distance, in world
+            axes, of length 1 with moments divided by the lever arm, (N, 6); the cable whose limit changes the value
+            fastest, -1 for none, (N,); status from the two bounds, (N,).
+        first: Index of the first pose.
+        last: Index after the last pose.
     """
     limits = TensionLimits(*limit_terms)
     freedom, bodies, robots = robot_terms
@@ -175,7 +176,7 @@ def signed_margins(
 
 @glue
 def _fill_facet_table(freedom: Array, full: Array, lever: float, table: Array) -> None:
-    """Fill the table to choose a basis from: a row for each free motion, moments over the mean lever arm."""
+    """Fill the table for the choice of a basis: one row per free motion, moments divided by the mean lever arm."""
     m = full.shape[1]
     rows_along_freedom(freedom, full, table)
     for k in range(freedom.shape[0]):
@@ -231,7 +232,7 @@ def _measure_all_facets(
     margin: Array,
     direction: Array,
 ) -> None:
-    """Fill the margin over all facets (3,), and the normal of the least (6,)."""
+    """Fill the margin over all facets (3,), and the normal of the facet with the least value (6,)."""
     for k in range(3):
         margin[k] = math.inf
     facets.minors[0, 0] = 1.0
@@ -247,7 +248,7 @@ def _measure_all_facets(
             held = 0
         if depth < 0:
             break
-    margin[BELOW] = min(margin[BELOW], margin[VALUE])  # except for rounding they are
+    margin[BELOW] = min(margin[BELOW], margin[VALUE])  # this holds except for rounding
     margin[ABOVE] = max(margin[ABOVE], margin[VALUE])
     for k in range(3):
         if abs(margin[k]) >= AS_GOOD_AS_INFINITE:
@@ -256,7 +257,7 @@ def _measure_all_facets(
 
 @formula
 def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, b: int) -> bool:
-    """Fill the normal that a set of rows, one more than the present subset has columns, makes; False for none."""
+    """Fill the normal from a set of rows, one more than the columns of the present subset; False if there is none."""
     minors = facets.minors[depth]
     x = y = z = u = v = w = 0.0
     sign = 1.0
@@ -289,7 +290,7 @@ def _add_normal(facets: Facets, depth: int, rows: int, m: int, measured: Array, 
 def _measure_facets(
     counts: _FacetWeights, wrenches: WrenchSetArrays, held: int, measured: Array, margin: Array, direction: Array
 ) -> None:
-    """Let both sides of the facets held lower the margin (3,), and its normal (6,)."""
+    """Update the margin (3,) and its normal (6,) with both sides of the stored facets."""
     _sum_cables(counts, held, measured)
     normals, work = measured[: 6 * TOGETHER].reshape((6, TOGETHER)), measured[WORK : WORK + 2 * TOGETHER]
     reach_of_set(wrenches, normals, held, work.reshape((2, TOGETHER)), measured[AGAINST:], measured[FOR:])
@@ -314,7 +315,7 @@ def _measure_facets(
 
 @glue
 def _sum_cables(counts: _FacetWeights, held: int, measured: Array) -> None:
-    """Fill the wrenches of the cables on both sides of the points along the stored normals."""
+    """Fill half the ranges of the cables' wrenches along the stored normals."""
     rows = counts.rows
     for b in range(held):
         measured[BY_ENDS + b] = measured[BY_TENSIONS + b] = measured[BY_SAG_FORCES + b] = 0.0
@@ -361,7 +362,7 @@ def _measure_lengths(counts: _FacetWeights, held: int, measured: Array) -> None:
 
 @glue
 def _measure_sides(points: Array, held: int, measured: Array) -> None:
-    """Fill the margins to the nearer sides of the stored facets."""
+    """Fill the margins from the nearer side of each stored facet."""
     e0, e1, e2 = points[ENDS, 0], points[ENDS, 1], points[ENDS, 2]
     e3, e4, e5 = points[ENDS, 3], points[ENDS, 4], points[ENDS, 5]
     r0, r1, r2 = points[RANGES, 0], points[RANGES, 1], points[RANGES, 2]
@@ -381,7 +382,7 @@ def _measure_sides(points: Array, held: int, measured: Array) -> None:
 
 @glue
 def _write_normal(counts: _FacetWeights, measured: Array, normals: Array, b: int, direction: Array) -> None:
-    """Fill the normal of one of the facets held, to its nearer side and of length 1, (6,)."""
+    """Fill the unit normal (6,) of a stored facet, directed to its nearer side."""
     along = 0.0
     moment = 0.0
     for k in range(6):
@@ -411,7 +412,7 @@ def _limiting_cable(counts: _FacetWeights, direction: Array) -> int:
 
 @glue
 def _margin_status(margin: Array) -> int:
-    """Status of a bracket (3,)."""
+    """Status from the bounds of a margin (3,)."""
     if margin[BELOW] >= 0.0:
         return codes.MARGIN_FEASIBLE
     return codes.MARGIN_INFEASIBLE if margin[ABOVE] < 0.0 else codes.MARGIN_OPEN

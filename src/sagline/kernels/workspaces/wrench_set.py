@@ -17,10 +17,10 @@ from sagline.kernels.memory import Memory, block
 class Loads(NamedTuple):
     """A set of wrenches on the platform, as in `WrenchSet`, whose corners are counted from their mean."""
 
-    center: Array  # (6,)
-    segments: Array  # (S, 6)
-    ellipsoids: Array  # (E, 6, 6)
-    corners: Array  # (C, 6)
+    center: Array  # center, (6,)
+    segments: Array  # segments, (S, 6)
+    ellipsoids: Array  # ellipsoids, (E, 6, 6)
+    corners: Array  # corners of polytopes, (C, 6)
     sizes: Indices  # corners of each polytope, (P,)
 
 
@@ -69,7 +69,7 @@ def reach_of_loads(loads: Loads, against: Array) -> float:
 
 @kernel
 def farthest(loads: Loads, against: Array, wrench: Array) -> None:
-    """Fill the wrench of the set that goes farthest against a direction, (6,)."""
+    """Fill the wrench of the set with the largest component against a direction, (6,)."""
     for a in range(6):
         wrench[a] = loads.center[a]
     for s in range(loads.segments.shape[0]):
@@ -95,7 +95,7 @@ def farthest(loads: Loads, against: Array, wrench: Array) -> None:
         first += loads.sizes[p]
 
 
-# as it comes from Python: center (6,), half (6,), segments (S, 6), ellipsoids (E, 6, 6), corners (C, 6), sizes (P,),
+# as passed from Python: center (6,), half (6,), segments (S, 6), ellipsoids (E, 6, 6), corners (C, 6), sizes (P,),
 # accelerations (2,), inertias (1 or R, 3, 3)
 SetTerms = tuple[Array, Array, Array, Array, Array, Indices, Array, Array]
 
@@ -103,16 +103,16 @@ SetTerms = tuple[Array, Array, Array, Array, Array, Indices, Array, Array]
 class WrenchSetArrays(NamedTuple):
     """A set of loads at one pose, in world axes about the center of mass."""
 
-    own: Array  # segments of the pose: a box, those of linear acceleration within it, and of angular ones, (9, 6)
-    segments: Array  # each adds all between minus and plus itself, (S, 6)
-    ellipsoids: Array  # each A adds A^T s for all s no longer than 1, (E, 6, 6)
-    corners: Array  # of polytopes, those of one after those of the other, (C, 6)
-    sizes: Indices  # how many corners each polytope has, (P,)
+    own: Array  # segments of the pose: box, linear accelerations, angular accelerations, (9, 6)
+    segments: Array  # segments from minus to plus each row, (S, 6)
+    ellipsoids: Array  # each A adds all A^T s with |s| <= 1, (E, 6, 6)
+    corners: Array  # corners of all polytopes, one polytope after the other, (C, 6)
+    sizes: Indices  # number of corners of each polytope, (P,)
 
 
 @glue
 def new_set(terms: SetTerms, memory: Memory) -> tuple[WrenchSetArrays, Memory]:
-    """Work arrays for what differs from pose to pose, and the memory that is left."""
+    """Work arrays for the parts that depend on the pose, and the remaining memory."""
     own, memory = block(memory, 9, 6)
     wrenches = WrenchSetArrays(own, terms[2], terms[3], terms[4], terms[5])
     return wrenches, memory
@@ -141,9 +141,9 @@ def place_set(terms: SetTerms, body: Array, inertia: Array, rotation: Array, wre
 def reach_of_set(
     wrenches: WrenchSetArrays, normals: Array, count: int, work: Array, against: Array, along: Array
 ) -> None:
-    """Fill the largest -y . w and the largest y . w [N] of the first so many normals.
+    """Fill the largest -y . w and the largest y . w [N] for the first `count` normals.
 
-    normals: y, (6, B); work: to work in, (2, B); against: filled, (B,); along: filled, (B,).
+    normals: y, (6, B); work: work array, (2, B); against: filled, (B,); along: filled, (B,).
     """
     for b in range(count):
         against[b] = 0.0
@@ -203,7 +203,7 @@ def _add_polytopes(
 
 @kernel
 def _multiply(wrench: Array, normals: Array, count: int, out: Array) -> bool:
-    """Fill the scalar products of a wrench (6,) and normals (6, B); False, and nothing filled, for no wrench."""
+    """Fill the scalar products of a wrench (6,) and normals (6, B); False without filling if the wrench is zero."""
     some = False
     for k in range(6):
         part = wrench[k]
