@@ -35,7 +35,7 @@ class LoadedPlatform:
 
     @classmethod
     def of(cls, inertia: Array, masses: Array, ends: Array) -> LoadedPlatform:
-        """A platform with point masses at its cable ends; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
+        """Body of a platform with point masses at its cable ends; inertia (4,); masses (m,) [kg]; ends (m, 3) [m]."""
         mass = inertia[0] + masses.sum()
         center = (masses @ ends) / mass
         turns = np.isfinite(inertia[1:])
@@ -85,11 +85,11 @@ def _about(masses: Array, places: Array) -> Array:
 
 
 FEWEST, MOST = 4, 500  # elements per cable
-# relative to l sqrt(rho/EA): the stability limit of the step while the element at the frame has length 0.4 l
+# stability limit of the step while the element at the frame has length 0.4 l, relative to l sqrt(rho/EA)
 SHORTEST: Final = 0.86
-SPARE: Final = 8  # nodes
-TRAVELS: Final = 20.0  # travel times of a stretch wave between the ends: a cable without tension for this long is slack
-STRETCH: Final = 1.1  # relative to the longest required length, because winches may overshoot
+SPARE: Final = 8  # spare nodes per cable
+TRAVELS: Final = 20.0  # a cable is slack after this time without tension, in travel times of a stretch wave
+STRETCH: Final = 1.1  # memory for nodes relative to the longest required length, because winches may overshoot
 
 
 class _ChainRecords(Records):
@@ -233,7 +233,7 @@ def _chain_table(given: InitialConditions, place: Array, nodes: int, losses: Dam
     table[:, c.ELEMENT] = state.free_length / nodes
     table[:, c.DENSITY], table[:, c.STIFFNESS] = material.linear_density, material.axial_stiffness
     table[:, c.LOSS_TIME], table[:, c.AIR_RATE] = losses.loss_time, losses.air_damping / material.linear_density
-    # cable between exit and drum has the strain of the element at the exit
+    # the cable between exit and drum has the strain of the element at the exit
     table[:, c.BEHIND] = state.unstrained_length - state.free_length
     last = np.linalg.norm(place[:, :, -1] - place[:, :, -2], axis=1)
     table[:, c.RUN] = table[:, c.BEHIND] * last / table[:, c.ELEMENT]
@@ -247,7 +247,7 @@ def checked_nodes(nodes: Any) -> int:
 
 
 def check_lumped(given: InitialConditions) -> None:
-    """Refuse cables that cannot be lumped."""
+    """Reject cables that the lumped model does not support."""
     if given.model.code != codes.CATENARY:
         name, step = f"{type(given.model).__name__}()", 'Plan with Catenary(), or give cable_mass="none".'
         raise InvalidValueError("start: model", name, 'Catenary() where cable_mass="lumped"', step)

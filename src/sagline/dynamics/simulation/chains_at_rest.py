@@ -1,4 +1,4 @@
-"""Equilibrium of the platform on lumped-mass cables of given lengths; differs from the exact one by order nodes^-2."""
+"""Equilibrium of the platform on lumped-mass cables of given lengths; its error is of order nodes^-2."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from sagline.robot.pose import Pose
 from sagline.statics.slopes import platform_end_forces
 
 STEPS = 60
-NEAR = 1e-8  # relative error of a length or force; one more Newton step then reaches rounding error
-NEUTRAL = 1e-12  # relative to the largest stiffness: smaller values are rounding
-# relative to a force: longer steps are shortened, so that a chain does not fold when the start is far away
+NEAR = 1e-8  # relative error of a length or force, after which one more Newton step reaches rounding error
+NEUTRAL = 1e-12  # relative to the largest stiffness: smaller stiffnesses count as zero
+# largest step relative to a force; longer steps are shortened, so that a chain with a distant start does not fold
 LONGEST_STEP = 0.2
 
 
 class _ChainsAtRest(NamedTuple):
     """Chains in equilibrium with a platform."""
 
-    pose: Pose  # of the platform
+    pose: Pose  # pose of the platform
     place: Array  # nodes, world axes, from the platform end to the exit [m], shape (m, 3, nodes + 1)
-    # on the platform ends of the cables, including half an element's weight [N], shape (m, 3); the force on the
+    # forces on the platform ends of the cables, including half an element's weight [N], shape (m, 3); the force on the
     # platform is the opposite
     force: Array
 
@@ -63,10 +63,9 @@ class _LumpedCables(NamedTuple):
 
 def chains_at_rest(state: Equilibrium, nodes: int) -> _ChainsAtRest:
     """Chains for the cables of an equilibrium, at rest with the same lengths."""
-    # The force in an element is that of the exact cable at the element's center, so the position of the chain's end
-    # follows from the midpoint rule. Pose and forces therefore differ from the exact ones by the order of nodes^-2; the
-    # wrench is balanced to rounding
-    # source: docs/model.md, section 11
+    # The force in an element is that of the exact cable at the element's center. The position of the chain's end
+    # therefore follows from the midpoint rule, and pose and forces have errors of the order of nodes^-2. The wrench is
+    # balanced to rounding. Source: docs/model.md, section 11
     robot, exits = state.one_robot, state.exit_point
     length, material = state.free_length, state.cables.cable
     chains = _LumpedCables(length / nodes, material.linear_density * robot.gravity, material.axial_stiffness, nodes)
@@ -129,7 +128,8 @@ def _size(levers: Array) -> float:
 
 def _balancing_motion(unbalance: Array, stiffness: Array, freedom: Array, size: float) -> Array:
     """The motion that balances the wrench; zero in directions without stiffness."""
-    # For example, a pendulum rotating about its cable: stiffness and unbalance are both zero, up to rounding
+    # for example, stiffness and unbalance are both zero, except for rounding, for the rotation of a pendulum about its
+    # cable
     units = np.array([1.0, 1.0, 1.0, size, size, size])
     slope = freedom @ (stiffness / np.outer(units, units)) @ freedom.T
     found = np.linalg.lstsq(slope, -freedom @ (unbalance / units), rcond=NEUTRAL)[0]

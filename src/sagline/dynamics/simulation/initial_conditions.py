@@ -26,7 +26,7 @@ from sagline.robot.robot import Robot
 from sagline.robot.routing import differs
 from sagline.statics.balance import inertial_wrench
 
-TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times with one row per time
+TableInTime = ArrayLike | tuple[ArrayLike, ArrayLike]  # one row, or times and one row per time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +69,7 @@ class TimeTable:
         return TimeTable(self.time, self.value[:, columns], self.begin[:, columns], self.end[:, columns])
 
     def joined_columns(self, other: TimeTable) -> TimeTable:
-        """Time table of these numbers, then those of another time table with equal instants."""
+        """Time table of these numbers followed by those of another time table with the same instants."""
         pairs = ((self.value, other.value), (self.begin, other.begin), (self.end, other.end))
         return TimeTable(self.time, *(np.concatenate(pair, axis=1) for pair in pairs))
 
@@ -109,7 +109,7 @@ class TimeTable:
         return TimeTable(times, values, begin, end)
 
     def with_stop(self, time: float, duration: float, columns: Any) -> TimeTable:
-        """Time table in which some rates decrease linearly to zero from a given time, in a duration [s]."""
+        """Time table with some rates decreasing linearly to zero from a given time on, during a duration [s]."""
         table = self.with_instant(time).with_instant(time + duration)
         (start, rate), stop = table.at(time), time + duration
         later = np.flatnonzero(table.time >= time)
@@ -265,7 +265,7 @@ def _check_robot(robot: Robot, model: CableModel) -> None:
 
 
 def check_set_points(robot: Robot, lengths: TimeTable) -> None:
-    """Refuse lengths [m] that are not longer than the dead length."""
+    """Reject lengths [m] that are not longer than the dead length."""
     checked(lengths.value, "unstrained_length", "m")
     least, dead = lengths.value.min(axis=0), dead_cable(robot)
     if (short := least <= dead).any():

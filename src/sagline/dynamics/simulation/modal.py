@@ -21,12 +21,12 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.statics.slopes import frame_end_forces, motions_of_ends
 from sagline.statics.stiffness import Stiffness, modes, stiffness
 
-UP_TO: Final = 1.5  # relative to the highest massless frequency: modes above it respond quasi-statically
-SHARE: Final = 0.1  # step times highest angular frequency [rad]
+UP_TO: Final = 1.5  # in units of the highest massless frequency: higher modes respond quasi-statically
+SHARE: Final = 0.1  # largest step times highest angular frequency [rad]
 LONGEST: Final = 1e-3  # s
 MOST_STEPS: Final = 10**9
 SHORTER: Final = "Simulate a shorter time, or record less often."
-SMALL: Final = 0.02  # relative to its length: largest change of a cable length
+SMALL: Final = 0.02  # largest change of a cable length, relative to the length
 
 
 class _ModalModel(NamedTuple):
@@ -34,9 +34,9 @@ class _ModalModel(NamedTuple):
 
     found: Vibration  # the modes
     drive: Array  # force of u on every mode, (K, m + 6)
-    motion: Array  # platform motion due to u beyond the static response of the modes, (6, m + 6)
+    motion: Array  # static platform motion due to u minus the static response of the modes, (6, m + 6)
     pulled: Array  # frame-end tensions per modal amplitude, (m, K) [N/(m sqrt(kg))]
-    tension: Array  # tensions due to u beyond the static response of the modes, (m, m + 6)
+    tension: Array  # static tensions due to u minus the static response of the modes, (m, m + 6)
 
 
 class _ModalMotion(NamedTuple):
@@ -74,7 +74,7 @@ def modal_model(state: Equilibrium, damping: Damping) -> _ModalModel:
 
 def _forces_at_frame(state: Equilibrium, found: Vibration, rest: Stiffness) -> Array:
     """Changes of the frame-end forces in every mode, world axes, (K, m, 3) [N/(m sqrt(kg))]."""
-    # Along a cable f = f_0 - g with g' = rho omega^2 u; the displacement of its end is the integral of C f
+    # along a cable f = f_0 - g with g' = rho omega^2 u, and the displacement of its end is the integral of C f
     material, length = state.cables.cable, state.free_length
     at_frame, points = frame_end_forces(state), found.cable_shape.shape[2]
     square = (2.0 * np.pi * found.frequency) ** 2
@@ -123,7 +123,7 @@ def modal_response(frequency: Array, ratio: Array, force: Array, step: float) ->
 
 
 def modal_simulation(given: InitialConditions, damping: Damping, step: Any, record: float) -> Simulation:
-    """Small motion of a robot about its initial equilibrium, with step and record in s."""
+    """Small motion of a robot about its initial equilibrium; step and record in s."""
     state = given.state
     _check(given)
     model = modal_model(state, damping)
@@ -142,7 +142,7 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
         "duration", 8.0 * count * (5.0 * len(frequency) + 4.0 * cables + 3.0 * cables * points / every), SHORTER
     )
     time: Array = given.begin + size * np.arange(count + 1, dtype=np.float64)
-    kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # includes the end
+    kept = np.unique(np.append(np.arange(0, count + 1, every), count))  # the last sample is the end
     lengths, wrenches = given.lengths.at(time)[0], given.wrench.at(time)[0]
     change = np.concatenate((lengths - state.unstrained_length, wrenches - state.wrench), axis=1)
     _check_small_changes(np.abs(change[:, : lengths.shape[1]]).max(axis=0), state)
@@ -173,14 +173,14 @@ def modal_simulation(given: InitialConditions, damping: Damping, step: Any, reco
 
 
 def check_modal_arguments(others: list[str]) -> None:
-    """Refuse arguments that modes about one equilibrium do not support."""
+    """Reject arguments that the modal model does not support."""
     if others:
         step = 'Leave it out, or give cable_mass="lumped".'
         raise InvalidValueError(others[0], "given", 'not given for cable_mass="modal"', step)
 
 
 def _check(given: InitialConditions) -> None:
-    """Refuse initial conditions without modes."""
+    """Reject initial conditions without modes."""
     if given.state.contact is not None:
         step = 'Leave winches out of the robot, or give cable_mass="lumped".'
         raise InvalidValueError("start", "a robot with pulleys or dead length", 'none for cable_mass="modal"', step)

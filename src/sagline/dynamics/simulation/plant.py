@@ -24,9 +24,9 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import cable_table
 
-MARGIN: Final = 5.0  # m of cable beyond the required length for which a drum stores the strain
+MARGIN: Final = 5.0  # [m], cable beyond the required length for which a drum stores the strain
 BROKEN: Final = 1e-12  # share of the stiffness and weight of a cable that remains after it is cut
-NOTES: Final = 1000  # number of recorded spontaneous events above which a run pauses to store them
+NOTES: Final = 1000  # number of recorded events without schedule above which a run pauses to store them
 
 
 class Records:
@@ -37,8 +37,8 @@ class Records:
         tensions: Tensions at the frame ends [N], (N, m).
         lengths: Unstrained lengths [m], (N, m).
         energies: Kinetic, potential, supplied and lost energy [J], (N, 4).
-        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS); a run pauses with
-            more than NOTES events.
+        notes: Events, see `sagline.kernels.dynamics.progress`, (NOTES + 2 m, NOTE_COLUMNS); with more than NOTES
+            events, a run pauses to store them.
         points: Points of cables with mass [m], (N, m, points, 3); None without cable mass.
     """
 
@@ -60,7 +60,7 @@ class Records:
 class Plant:
     """State of a robot during a simulation; mutable, with its own memory.
 
-    The platform axes are its principal axes here, with the origin at the center of mass.
+    In this class the platform axes are its principal axes, with the origin at the center of mass.
 
     Attributes:
         robot: The robot at the start.
@@ -108,8 +108,8 @@ class Plant:
         self._work = np.zeros(0)
 
     def remember_winding(self, longest: float) -> None:
-        """Make the drums store the strain of wound-in cable, up to a given length off the drum [m] plus MARGIN."""
-        # Cable further inside is at the winding tension; once paid out, it is wound in again at that tension
+        """Set up drums that store the strain of wound-in cable, up to a given length off the drum [m] plus MARGIN."""
+        # cable deeper on the drum has the winding tension; after it is paid out, it is wound in again at that tension
         self.layers = np.tile(self.data[d.WINDING_STRAIN][:, None], (1, int((longest + MARGIN) / BIN) + 1))
 
     def arguments(
@@ -150,7 +150,7 @@ class Plant:
 
     def cut(self, places: Any) -> None:
         """Break cables during a run, by their current indices; the kernel's arrays keep their size."""
-        # Stiffness and weight are reduced by one factor, so that every cable keeps its shape at nearly zero force
+        # one factor reduces stiffness and weight, so that the cable keeps its shape at nearly zero force
         for column in (tables.STIFFNESS, tables.DENSITY):
             self._table[places, column] *= BROKEN
         self.counters[k.READY] = 0  # compute all forces and energies again
@@ -161,7 +161,7 @@ class Plant:
         self.now[d.RATE, places] = 0.0
 
     def with_mass(self, mass: float, *, at_rest: bool) -> None:
-        """Change the mass [kg] and the inertia in proportion; a mass picked up at rest shares the existing momentum."""
+        """Change the mass [kg] and the inertia in proportion; a mass picked up at rest adds no momentum."""
         factor = mass / self.inertia[0]
         self.inertia = self.inertia * factor
         if at_rest:
@@ -206,6 +206,6 @@ def _principal_axes(robot: Robot, pose: Pose) -> tuple[Array, Array]:
 
 
 def energy_error(step: float, time: float, cable: int) -> InvalidValueError:
-    """Error for a run whose energy drifts, with step and time in s."""
+    """Error for a run with energy drift; step and time in s."""
     value = f"{step:g} s, at which energy grows or fades by itself: at {time:.6g} s most of it is in cable {cable}"
     return InvalidValueError("step", value, "one that keeps the energy", f"Give step={0.2 * step:.3g}.")

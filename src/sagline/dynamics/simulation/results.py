@@ -19,13 +19,13 @@ from sagline.dynamics.vibration.dynamic_stiffness import Damping
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-WHICH: Final = rule(most=9_999)  # number of a cable or winch; no robot has more
+WHICH: Final = rule(most=9_999)  # upper limit of the index of a cable or winch
 TIME, MASS = rule("s"), rule("kg", above=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Break(NumberFields):
-    """Break of a cable; it is removed together with its energy, which is counted in `energy.removed`.
+    """Break of a cable. The cable is removed together with its energy, which is added to `energy.removed`.
 
     Attributes:
         cable: Index of the cable, from 0.
@@ -38,7 +38,7 @@ class Break(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Stall(NumberFields):
-    """Sudden stop of a winch, which remains stopped while the other winches continue.
+    """Sudden stop of a winch. It remains stopped while the other winches continue.
 
     Attributes:
         winch: Index of the winch, from 0.
@@ -51,7 +51,7 @@ class Stall(NumberFields):
 
 @dataclass(frozen=True, slots=True)
 class Brake(NumberFields):
-    """Linear decrease of the length rates of one winch, or of all winches together, to zero, where they remain.
+    """Linear decrease of the length rates of one winch, or of all winches together, to zero for the rest of the time.
 
     With the same duration for all winches, the platform stays on its path direction.
 
@@ -131,7 +131,7 @@ def checked_events(events: Any, robot: Robot, begin: float, end: float) -> tuple
 
 
 def _check_order(events: list[Event], robot: Robot) -> None:
-    """Refuse events of broken cables, and drops of more than the platform's mass."""
+    """Reject events of broken cables, and drops of more than the platform's mass."""
     broken: set[int] = set()
     mass = robot.mass
     for event in events:
@@ -159,15 +159,15 @@ class EnergyBalance(Result):
 
     Attributes:
         kinetic: Kinetic energy of platform, cables and drums.
-        potential: Potential energy of weight, and of strain and height of the cables off the drums; zero at the frame
-            ends and the origin.
+        potential: Potential energy of the platform's weight, and of strain and height of the cables off the drums. The
+            zero heights are the origin for the platform and the frame ends for the cables.
         supplied: Work done on the robot since the start by winches, external forces and wind.
         lost: Energy lost since the start by damping, friction, slip of strain on drums, and creation and merging of
             chain nodes.
         removed: Energy of broken cables and dropped loads since the start, minus the energy added by picked-up loads.
-            Heights count as in `potential`, so it has either sign.
-        error: kinetic + potential - supplied + lost + removed, minus its initial value: the numerical energy error of
-            the integrator.
+            Heights are measured as in `potential`, so the value can have either sign.
+        error: Numerical energy error of the integrator: kinetic + potential - supplied + lost + removed, minus the
+            initial value of this sum.
     """
 
     kinetic: Array
@@ -184,8 +184,8 @@ class Occurrence:
 
     Attributes:
         time: Time of the event [s].
-        kind: "break", "stall", "brake", "drop" or "pick up" for scheduled events; "saturate" or "slack" for spontaneous
-            ones.
+        kind: "break", "stall", "brake", "drop" or "pick up" for scheduled events; "saturate" or "slack" for events
+            without schedule.
         cable: Index of the cable or winch, or None for the platform.
         tension_before: Largest tension of this cable, or of all cables, before the event [N].
         tension_after: Largest tension of any cable after the event, until the next event or the end [N].
@@ -248,7 +248,7 @@ def energy_balance(kinetic: Array, potential: Array, supplied: Array, lost: Arra
 
 
 def displaced_pose(pose: Pose, robot: Robot, motion: Array) -> Pose:
-    """Pose after a motion (..., 6) [m, rad]: the center of mass displaced, the platform rotated about it."""
+    """Pose after a motion (..., 6) [m, rad]: displacement of the center of mass, then rotation about it."""
     center = pose.matrix @ robot.center_of_mass
     turned = Rotation.from_rotvec(motion[..., 3:])
     place = pose.position + center + motion[..., :3] - turned.as_matrix() @ center

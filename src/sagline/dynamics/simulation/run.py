@@ -28,7 +28,7 @@ from sagline.kernels.dynamics import drives as d
 from sagline.kernels.dynamics import progress as k
 from sagline.kernels.dynamics import rigid_body as body
 
-BLOCK: Final = 20_000  # steps per block: about 100 ms, after which an interrupt is handled
+BLOCK: Final = 20_000  # steps per block, about 100 ms; interrupts are handled between blocks
 NAMES: Final = {k.NOTE_SLACK: "slack", k.NOTE_SATURATED: "saturate"}
 Inputs = tuple[TimeTable, TimeTable, TimeTable]
 
@@ -155,7 +155,7 @@ class SimulationRun:
             plant.lock_winches(plant.cables == event.winch)
         elif isinstance(event, Brake):
             chosen = np.ones(len(plant.cables), dtype=np.bool_) if event.winch is None else plant.cables == event.winch
-            columns = np.flatnonzero(np.tile(chosen, wide))  # also keeps the expected tensions of the motors
+            columns = np.flatnonzero(np.tile(chosen, wide))  # this also preserves the expected tensions of the motors
             self._inputs = (lengths.with_stop(time, event.duration, columns), wrenches, winds)
         elif isinstance(event, Drop):
             plant.with_mass(plant.inertia[0] - event.mass, at_rest=False)
@@ -163,7 +163,7 @@ class SimulationRun:
             plant.with_mass(plant.inertia[0] + event.mass, at_rest=True)
 
     def _finish_event(self) -> None:
-        """Store the largest tension after the last event, and the largest of all."""
+        """Store the largest tension after the last event, and the largest tension of the whole run."""
         np.maximum.at(self._largest, self.plant.cables, self.plant.now[d.PEAK])
         if self._marks:
             last = self._marks[-1]
@@ -191,7 +191,7 @@ class SimulationRun:
         return math.ceil((event.time - float(self.plant.audit[d.BEGIN])) / self.step - 1e-9)
 
     def _result(self, count: int) -> Simulation:
-        """Result from the first records."""
+        """Result from the records so far."""
         plant, states, removed = self.plant, self._record.states[:count], self._removed[:count]
         kinetic, potential, supplied, lost = (column.copy() for column in self._record.energies[:count].T)
         steps = np.minimum(self.every * np.arange(count), self.steps)

@@ -54,26 +54,26 @@ def simulate(
     damping: Damping | None = None,
     record: float | None = None,
 ) -> Simulation:
-    """Simulate a robot in time: the platform is a free body on exact cables whose lengths the winches change.
+    """Simulate a robot in time. The platform is a free body on exact cables, and the winches change the cable lengths.
 
-    Without cable mass ("none"), cables are static catenaries at every instant, taut or slack according to their
-    lengths, with the pulleys and dead lengths of the robot.
+    Without cable mass ("none"), cables are static catenaries at every instant, with the pulleys and dead lengths of the
+    robot. Their lengths determine whether they are taut or slack.
 
     The set points are the lengths of the plan at its samples. Between samples they are cubics with the plan's
     `length_rate` as derivatives. More samples follow the exact lengths more closely: give the path at 1 kHz.
 
     Args:
-        start: A plan along a path; the simulation starts at its initial pose and speed, and its wrench acts without the
-            inertial wrench of the path. Or a single equilibrium, at rest.
+        start: A plan along a path, or a single equilibrium at rest. With a plan, the simulation starts at the initial
+            pose and speed of the plan. The wrench of the plan acts without the inertial wrench of the path.
         duration: Duration [s]; lengths are constant after the end of the plan or table. None: duration of the plan or
             of the table of lengths.
-        step: Time step of the integrator [s]; None: 0.2 rad of the highest frequency (massless, cables taut), at most 1
-            ms.
+        step: Time step of the integrator [s]; None: 0.2 rad divided by the highest angular frequency (massless and taut
+            cables), at most 1 ms.
         cable_mass: "none": cables are static catenaries at every instant. "lumped": each cable is a chain of nodes with
-            its mass, at fixed material points; it swings and transmits waves. Nodes are created and merged at the frame
-            while cable is paid out and wound in. A chain keeps the initial exit point of its pulley. "modal": small
-            motion about an equilibrium, with decoupled modes of `vibration`; lengths and wrench may change, and
-            `Damping` may have modal_damping. Not supported: pulleys, events, winches, wind.
+            its mass, at fixed material points; it swings and transmits waves. Nodes are created at the frame while
+            cable is paid out, and merged while it is wound in. A chain keeps the initial exit point of its pulley.
+            "modal": small motion about an equilibrium, with decoupled modes of `vibration`; lengths and wrench may
+            change, and `Damping` may have modal_damping. Not supported: pulleys, events, winches, wind.
         nodes: Elements per cable with mass, at the start, 4 to 500. At rest the pose differs from the exact one by the
             order of nodes^-2.
         integrator: "runge-kutta", of order 4, or "splitting", symplectic, of order 2, whose energy has no drift in long
@@ -81,16 +81,16 @@ def simulate(
         winches: "ideal": lengths equal their set points. SecondOrder(...): lengths lag behind them. "robot": the
             robot's winches with inertia, limits of torque and speed, friction, and position and speed loops with a
             period of 1 ms; from the start they expect the tensions of the plan.
-        winding: State of the cable on the drums. "constant": cable wound at the winches' winding_tension. "remembered":
-            cable that is wound in keeps its tension until it is paid out. Only for winches="robot".
+        winding: Tension of the cable on the drums. "constant": the winches' winding_tension. "remembered": cable keeps
+            the tension at which it was wound in, until it is paid out. Only for winches="robot".
         unstrained_length: Length set points for an equilibrium: times [s] (K,) and lengths [m] (K, m), linear in
             between; or one row (m,), constant from the start.
         events: Events, each applied at the first step at or after its time: `Break`, `Stall`, `Brake`, `Drop`,
             `PickUp`.
         wrench: Wrench on the platform, replaces that of the start: one row (6,) [N, N m], or times and rows (K, 6).
         wind: Velocity of the air [m/s], (3,), or times and rows (K, 3). Half of its force on a cable, computed for a
-            straight cable, acts on the platform; needs the cable diameters. Give the wind force on the platform itself
-            as a wrench.
+            straight cable, acts on the platform; requires the cable diameters. Give the wind force on the platform
+            itself as a wrench.
         damping: Energy losses of the cables; None: no losses.
         record: Interval of the records [s], rounded to whole steps; None: 0.01.
 
@@ -99,8 +99,8 @@ def simulate(
 
     Raises:
         InvalidValueError: If a plan has samples without a solution (the message names the first), the step exceeds the
-            stability limit, the energy grows without input (it names time and cable), an event has a wrong cable index,
-            the robot lacks data of its winches, or an argument has the wrong type.
+            stability limit, the energy grows without input (the message names time and cable), an event has a wrong
+            cable index, the robot lacks data of its winches, or an argument has the wrong type.
 
     Examples:
         A downward gust on the platform, and its work:
@@ -235,7 +235,7 @@ def time_step(
     events: Any,
     waves: float = 0.0,
 ) -> float:
-    """Checked step [s], for the lightest platform after all events; waves: highest frequency of the cables [rad/s]."""
+    """Checked step [s] for the lightest platform after all events; waves: highest frequency of the cables [rad/s]."""
     robot, lengths = given.robot, given.lengths.value
     platform = platform_frequency(robot, given.poses, lengths) * _lightness(robot.mass, events)
     highest = frequency_with_winches(platform, kind, plant.data, lengths, robot.cables.axial_stiffness)
@@ -243,7 +243,7 @@ def time_step(
 
 
 def _lightness(mass: float, events: tuple[Event, ...]) -> float:
-    """Largest factor of the platform frequency due to dropped loads."""
+    """Largest factor by which dropped loads increase the platform frequency."""
     least = now = mass
     for event in events:
         now += event.mass if isinstance(event, PickUp) else -event.mass if isinstance(event, Drop) else 0.0
@@ -252,7 +252,7 @@ def _lightness(mass: float, events: tuple[Event, ...]) -> float:
 
 
 def load_bits(losses: Damping, wrench: TimeTable, with_wind: bool) -> int:
-    """Bits for the kernel: active damping and loads."""
+    """Bits for the kernel, for active damping and loads."""
     damped = losses.loss_time > 0.0 or losses.air_damping > 0.0
     loaded = with_wind or bool(wrench.value.any())
     return k.DAMPED * damped + k.LOADED * loaded + k.BLOWN * with_wind

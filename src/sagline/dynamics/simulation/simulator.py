@@ -43,13 +43,13 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-NEAR: Final = 1e-6  # tolerance of a whole number of steps in a period
-MOST_STEPS: Final = 10**7  # in one period
+NEAR: Final = 1e-6  # tolerance for a whole number of steps in a period
+MOST_STEPS: Final = 10**7  # largest number of steps in one period
 MOST_SEED: Final = 2**128
 
 
 class Reading(NamedTuple):
-    """Sensor values and true values; the arrays are read-only, and the simulator's next step overwrites them.
+    """Sensor values and true values in read-only arrays, which the simulator's next step overwrites.
 
     Attributes:
         counts: Encoder counts, whole numbers as floats, shape (m,); None if data for counts are missing.
@@ -77,8 +77,8 @@ class Reading(NamedTuple):
 class Simulator:
     """Simulated machine for a controller: winches, cables without mass, platform and sensors.
 
-    Its motion equals that of `simulate` bit by bit for equal periods, and up to rounding if the same inputs are
-    tabulated at other times. Do not share it between threads.
+    For equal periods, its motion equals that of `simulate` bit by bit. If the same inputs are tabulated at other times,
+    it differs by rounding. Do not share a simulator between threads.
     """
 
     def __init__(
@@ -196,13 +196,13 @@ class Simulator:
         tension: ArrayLike | None = None,
         wrench: ArrayLike | None = None,
     ) -> Reading:
-        """Simulate one period with linear change of the set points to the given ones.
+        """Simulate one period with a linear change of the set points to the given set points.
 
         Args:
             unstrained_length: Set points at the end of the period [m], shape (m,).
             dt: Period [s], > 0, a whole number of steps.
-            tension: Expected tensions at the drums at the end of the period [N], shape (m,), which the motors hold;
-                None: unchanged. Only for winches="robot".
+            tension: Expected tensions at the drums at the end of the period [N], shape (m,), which the motors
+                counteract; None: unchanged. Only for winches="robot".
             wrench: Wrench on the platform during the whole period [N, N m], shape (6,); None: unchanged.
 
         Returns:
@@ -266,7 +266,7 @@ class Simulator:
         self._plant.lock_winches(self._chosen(winches))
 
     def release(self, *winches: int) -> None:
-        """Release locked drums: their set points change linearly from the locked to the next given values.
+        """Release locked drums. Their set points change linearly from the values at the lock to the next given values.
 
         The integral of a motor's loop starts at zero: at first it only holds the expected tension.
 
@@ -286,10 +286,10 @@ class Simulator:
             self._length_table.value[1, : len(freed)][freed] = stood[freed]
 
     def shift(self, length: float, *winches: int) -> None:
-        """Shift set points suddenly, as when an encoder loses counts; the drive follows according to its gains.
+        """Shift set points suddenly, like an encoder that loses counts. The drives follow according to their gains.
 
         Args:
-            length: Shift of the current set points, from which the next ones are approached [m].
+            length: Shift of the current set points [m]. The next set points are approached from the shifted ones.
             winches: Indices of the winches, from 0; none for all.
 
         Raises:

@@ -17,13 +17,13 @@ from sagline.robot.robot import Robot
 
 LIMIT: Final = {SPLITTING: 2.0, RUNGE_KUTTA: 2.0 * math.sqrt(2.0)}  # limit of step times highest angular frequency
 SHARE: Final = 0.2  # default step times highest angular frequency [rad]
-# relative to the limit 0.4 l sqrt(rho/EA) of cables with mass: a break excites the shortest waves
+# relative to the limit 0.4 l sqrt(rho/EA) of cables with mass; small, because a break excites the shortest waves
 WAVE_SHARE: Final = 0.465
 LONGEST: Final = 1e-3  # s
 
 
 def platform_frequency(robot: Robot, poses: Pose, lengths: Array) -> float:
-    """Highest angular frequency of the platform with all cables taut [rad/s]; sag only reduces it."""
+    """Highest angular frequency of the platform with all cables taut [rad/s]; sag reduces it."""
     # shapes: lengths (K, m) [m]
     rotation, freedom = poses.matrix, robot.freedom
     levers = (robot.platform_anchors - robot.center_of_mass) @ np.swapaxes(rotation, 1, 2)
@@ -66,7 +66,7 @@ def checked_step(
 
 def _limit(integrator: int, highest: float, damping: Damping) -> float:
     """Longest stable step at an angular frequency [s]."""
-    ratio = 0.5 * damping.loss_time * highest  # damping ratio at that frequency
+    ratio = 0.5 * damping.loss_time * highest  # damping ratio at the highest frequency
     slower = math.sqrt(1.0 + ratio * ratio) - ratio
     return LIMIT[integrator] * slower / highest if highest > 0.0 else math.inf
 
@@ -76,7 +76,7 @@ def frequency_with_winches(platform: float, kind: int, data: Array, lengths: Arr
     # shapes: platform [rad/s]; data (DATA_ROWS, m); lengths (K, m) [m]; stiffness (m,) [N]
     if kind == d.SECOND_ORDER:
         return max(platform, float(data[d.BANDWIDTH].max() * max(1.0, 2.0 * data[d.RATIO].max())))
-    if kind == d.DRUMS:  # the springs' largest eigenvalue on both masses is at most the sum of those on each
+    if kind == d.DRUMS:  # the largest eigenvalue with both masses is at most the sum of those with one mass each
         drums = stiffness / (lengths.min(axis=0) * data[d.INERTIA])
         return math.hypot(platform, math.sqrt(float(drums.max())))
     return platform

@@ -17,7 +17,7 @@ from sagline.kernels.jit import machine_code
 from sagline.robot.drum import drum_lever, drums_of, not_given
 from sagline.robot.robot import Robot
 
-AIR: Final = 1.2  # kg/m^3, density of air
+AIR: Final = 1.2  # density of air [kg/m^3]
 ROUND: Final = 1.2  # drag coefficient of a long round cable in cross wind, based on its diameter
 NEEDED: Final = ("drum_radius", "inertia", "position_gain", "speed_gain", "integral_gain")
 
@@ -55,7 +55,7 @@ def winch_kind(winches: Any) -> int:
 
 
 def check_winding(winding: Any, kind: int) -> None:
-    """Refuse remembered winding for winches without drums."""
+    """Reject remembered winding for winches without drums."""
     if choice(winding, "winding", get_args(Winding)) == "remembered" and kind != d.DRUMS:
         step = 'Give winches="robot" too, or leave winding out.'
         raise InvalidValueError("winding", '"remembered"', '"constant" for winches without drums', step)
@@ -87,7 +87,7 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
     if winch is None or missing:
         step = "Give them in the robot file, or with robot.replace(winches=Winch(...))."
         raise InvalidValueError(*not_given(missing), 'known for winches="robot"', step)
-    ratio = np.abs(winch.gear) / drum_lever(robot, length)  # motor rotation [rad] per meter of cable
+    ratio = np.abs(winch.gear) / drum_lever(robot, length)  # motor rotation per length of cable [rad/m]
     data[d.INERTIA] = winch.inertia * ratio**2  # type: ignore[operator]
     data[d.FORCE_LIMIT] = np.inf if winch.torque_limit is None else winch.torque_limit * ratio
     data[d.SPEED_LIMIT] = np.inf if winch.speed_limit is None else winch.speed_limit / ratio
@@ -103,7 +103,7 @@ def _fill_drums(data: Array, robot: Robot, length: Array) -> None:
         raise InvalidValueError(f"winches: speed_gain[{i}]", f"{data[d.SPEED_GAIN, i]:g} N s/m", allowed, step)
 
 
-COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # needed by encoder counts
+COUNTED = ("drum_radius", "groove_pitch", "counts_per_turn", "length_zero")  # required for encoder counts
 
 
 class Encoders:
@@ -144,7 +144,7 @@ class LoadCells:
     """
 
     def __init__(self, robot: Robot, seed: int, tension: Array) -> None:
-        """Make the load cells of a robot; without winches their values are the true tensions."""
+        """Make the load cells of a robot; without winches their readings are the true tensions."""
         # shapes: tension (m,) [N]
         m, winch = robot.cable_count, robot.winches
         cells = np.array([np.ones(m), np.zeros(m), np.zeros(m), np.full(m, np.inf)])

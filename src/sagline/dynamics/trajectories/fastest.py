@@ -28,16 +28,16 @@ _PLACES: Final = 201  # number of positions along a segment at which limits are 
 _ITERATIONS: Final = 8  # largest number of iterations for the sag forces
 _CONVERGED: Final = 1e-7  # relative change of the time in an iteration
 _INSTANTS: Final = 4001  # number of instants of a segment for the final check of the limits
-# relative increase of the time after the first violation of a limit; four times as much after each further one
+# relative increase of the time after the first violation of a limit; it is four times as large after each further one
 _SLOWER: Final = 1e-6
 _TRIES: Final = 12
-_GENTLE: Final = 8  # number of the first tries, in which the time grows by the cube root of the speed excess
+_GENTLE: Final = 8  # number of first tries, in which the time grows by the cube root of the excess speed
 _ROUNDING: Final = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class _TimedSegment:
-    """A segment with its new motion: curve parameter over time, slightly slower than the optimum found."""
+    """A segment with its new motion: curve parameter over time, slightly slower than the computed optimum."""
 
     curve: Curve
     motion: SpeedProfile | JerkProfile
@@ -64,19 +64,20 @@ def fastest(
     angular_jerk: float | None = None,
     progress: Progress | None = None,
 ) -> Path:
-    """The path's curve in the shortest time within the tension limits, each segment from rest to rest.
+    """Fastest motion along the path's curve within the tension limits, with each segment from rest to rest.
 
-    The limits hold exactly, with sagging cables: at each sample, and at 4,000 instants of each segment, `inverse` finds
-    tensions at the given margin from the limits. Without a jerk bound the acceleration is discontinuous, which no winch
-    can follow. With a jerk bound, each segment has 100 pieces of constant jerk (of the curve parameter); its time is
-    within about 0.1 % of the optimum.
+    The limits hold exactly, with sagging cables. At each sample and at 4,000 instants of each segment, `inverse` finds
+    tensions that keep the given margin from the limits. Without a jerk bound the acceleration is discontinuous, and no
+    winch can follow it. With a jerk bound, each segment has 100 pieces in which the jerk of the curve parameter is
+    constant. Its time is within about 0.1 % of the optimum.
 
     Speed limits of the robot's winches apply to the platform motion. With a jerk bound they also include the elastic
     length changes, for the tension distribution of `Closest`.
 
     Args:
         robot: The robot. Its tension_min and tension_max apply to the tension named in tension_limits_of.
-        path: Path whose curve is followed, independent of its times; the new path rests where this path rests.
+        path: Path whose curve is followed. Its times have no effect. The new path is at rest at the same poses as this
+            path.
         margin: Distance from both limits [N], >= 0.
         jerk: Largest jerk of the platform's origin [m/s^3], > 0; None for no bound.
         angular_jerk: Largest second derivative of the angular velocity [rad/s^3], > 0; None for no bound.
@@ -122,7 +123,7 @@ def fastest(
         plan = inverse(inner, new)
         slower = 1.0 if plan.feasible.all() else 1.0 + _SLOWER * 4.0**again
         if bounded and _has_speed_limits(robot):
-            ratio = _speed_excess(plan)  # elastic terms decrease with the cube of the time, others in proportion
+            ratio = _speed_excess(plan)  # elastic terms are proportional to time^-3, the other terms to time^-1
             slower = max(slower, np.cbrt(ratio) if again < _GENTLE else ratio)
         if slower == 1.0:
             return new
@@ -176,7 +177,7 @@ def _checked(robot: Robot, timed: _TimedSegment, limits: tuple[float, float]) ->
         slower = max(1.0, *(np.cbrt(size / limit) for size, limit in zip(sizes, limits, strict=True)))
         if plan.feasible.all() and slower <= 1.0 + _ROUNDING:
             return timed
-        if not plan.feasible.all():  # the limits hold at rest, and a slower motion needs smaller changes
+        if not plan.feasible.all():  # the limits hold at rest, and a slower motion changes the tensions less
             slower = max(slower, 1.0 + _SLOWER * 4.0**again)
         timed = replace(timed, slower=timed.slower * slower)
     raise _infeasible_error("in motion", plan)
@@ -200,7 +201,7 @@ def _has_speed_limits(robot: Robot) -> bool:
 
 
 def _winch_speed_bounds(robot: Robot, curve: Curve, place: Array, rest: Plan) -> Bounds:
-    """Bounds on the squared speed from the speed limits of winches, by the rates of the chords."""
+    """Bounds on the squared speed from the speed limits of winches and the rates of the chords."""
     if not _has_speed_limits(robot):
         return lambda parameter: HalfPlanes(np.zeros((parameter.size, 0, 2)), np.zeros((parameter.size, 0)))
     fastest_cable = _fastest_rates(robot, rest.unstrained_length)

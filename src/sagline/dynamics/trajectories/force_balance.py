@@ -18,18 +18,18 @@ from sagline.statics.balance import inertial_wrench, structure_matrix
 
 _NOTHING: Final = 1e-11  # relative to the largest component of a direction: smaller values count as zero
 _BLOCK: Final = 40_000  # matrices per block
-_WIDER: Final = (1.0, 0.03)  # N: extensions of the limits for poses on their border
+_WIDER: Final = (1.0, 0.03)  # [N], extensions of the limits that are tried for poses on their border
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HalfPlanes:
-    """Half planes at K positions: rates @ (acceleration, squared speed) <= bound, one per row."""
+    """Half planes at K positions, one per row: rates @ (acceleration, squared speed) <= bound."""
 
     rates: Array  # shape (K, R, 2)
     bound: Array  # shape (K, R); infinite for a row without effect
 
     def joined(self, other: HalfPlanes) -> HalfPlanes:
-        """Half planes of both."""
+        """All half planes of two sets."""
         return HalfPlanes(np.hstack((self.rates, other.rates)), np.hstack((self.bound, other.bound)))
 
 
@@ -38,7 +38,7 @@ class ForceBalance:
     """Force balance of the platform at K positions of a curve, with sag forces at nearby tensions.
 
     J tau = needed - u w_u - x w_x, with u the acceleration and x the squared speed of the curve parameter. The sag
-    forces are those at the last tensions found: exact there, and nearly constant nearby.
+    forces are those at the last computed tensions. They are exact there and nearly constant nearby.
     """
 
     robot: Robot  # the robot, with the tension limits
@@ -68,7 +68,7 @@ class ForceBalance:
         normals = np.concatenate(list(_normals(matrix)))
         gains = normals @ matrix
         size = np.maximum(np.abs(gains).max(axis=-1, keepdims=True), _NOTHING)
-        gains[np.abs(gains) <= _NOTHING * size] = 0.0  # columns in the plane; a limit may be infinite
+        gains[np.abs(gains) <= _NOTHING * size] = 0.0  # columns in the plane have no effect
         wrenches = np.stack((by_rate, by_speed))
         return replace(self, jet=jet, wrenches=wrenches, normals=normals / size, gains=gains / size)
 
@@ -93,8 +93,8 @@ class ForceBalance:
 
     def near_motion(self, motion: Array) -> ForceBalance:
         """Force balance with the sag forces at motions (K, 2), on the border of the limits or a little outside."""
-        # On the border the tensions are nearly unique, and rounding may leave none; slightly wider limits are therefore
-        # used, the narrowest with a solution
+        # on the border the tensions are nearly unique, and rounding may make the pose infeasible; the limits are
+        # therefore widened slightly, by the smallest extension with a solution
         found, wrench = self, self.wrench(motion)
         for by in _WIDER:
             low, high = np.maximum(self.robot.tension_min - by, 0.0), self.robot.tension_max + by
@@ -103,7 +103,7 @@ class ForceBalance:
         return found
 
     def half_planes(self) -> HalfPlanes:
-        """Polygons of feasible motions: along every normal, the needed wrench is within the cables' range."""
+        """Polygons of feasible motions, in which the needed wrench is within the cables' range along every normal."""
         with np.errstate(invalid="ignore"):  # zero component times an infinite limit
             ends = [np.where(self.gains == 0.0, 0.0, self.gains * limit[:, None]) for limit in (self.low, self.high)]
         most = np.maximum(*ends).sum(axis=-1)
@@ -113,8 +113,8 @@ class ForceBalance:
 
 def _normals(matrix: Array) -> Iterator[Array]:
     """Both normals of all planes spanned by n - 1 columns of matrices (K, n, m), shape (K, 2 S, n), in blocks."""
-    # They include all facets of the zonotope of the columns with bounded coefficients. For dependent columns any normal
-    # is taken; its bound is valid too
+    # they include the normals to all facets of the zonotope of the columns with bounded coefficients; for dependent
+    # columns any normal is taken, whose bound is valid too
     n, m = matrix.shape[1:]
     sets = np.array(list(combinations(range(m), n - 1)), dtype=np.intp).reshape(-1, n - 1)
     step = max(1, _BLOCK // len(sets))
@@ -168,9 +168,10 @@ class SpeedProfile:
 
 def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | None:
     """Rest-to-rest profile with the largest speed within the bounds at each position; place (K,)."""
-    # Backward pass: squared speeds from which the end can be reached. Forward pass: the largest acceleration that stays
-    # within them. A bound at both ends of a step also holds within it, except for the curvature of the bounds.
-    # source: Pham & Pham, A new approach to time-optimal path parameterization based on reachability analysis, 2018
+    # The backward pass computes squared speeds from which the end can be reached. The forward pass takes the largest
+    # acceleration that stays within them. A bound at both ends of a step also holds within the step, except for the
+    # curvature of the bounds. Source: Pham & Pham, A new approach to time-optimal path parameterization based on
+    # reachability analysis, 2018
     steps, last = np.diff(place), len(place) - 1
     reach = np.zeros((len(place), 2))
     for i in range(last - 1, -1, -1):
@@ -190,7 +191,7 @@ def fastest_speed_profile(place: Array, planes: HalfPlanes) -> SpeedProfile | No
 
 
 def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array, Array]:
-    """Bounds on (acceleration, squared speed) at position i: at i, at the next position, and for reachability."""
+    """Bounds on (acceleration, squared speed) at position i: those at i, at the next position, and for reachability."""
     sheared = planes.rates[i + 1].copy()
     sheared[:, 0] += 2.0 * step * sheared[:, 1]  # the squared speed grows by 2 step times the acceleration
     ahead = np.array([[2.0 * step, 1.0], [-2.0 * step, -1.0], [0.0, -1.0]])
@@ -201,11 +202,11 @@ def _rows(planes: HalfPlanes, i: int, step: float, reach: Array) -> tuple[Array,
 
 
 def _range(rates: Array, bound: Array) -> tuple[float, float]:
-    """Smallest and largest second variable for which a first one exists; the smallest is larger if there is none."""
+    """Smallest and largest second variable with a feasible first variable; if none exists, the smallest is larger."""
     flat = np.abs(rates[:, 0]) <= _FLAT * np.abs(rates[:, 0]).max()
     up, down = ~flat & (rates[:, 0] > 0.0), ~flat & (rates[:, 0] < 0.0)
     slope, level = rates[:, 1] / np.where(flat, 1.0, rates[:, 0]), bound / np.where(flat, 1.0, rates[:, 0])
-    # upper bounds of the first minus its lower bounds must be positive
+    # each upper bound of the first variable must exceed each lower bound
     rate = np.concatenate(((slope[up][:, None] - slope[down]).ravel(), rates[flat, 1]))
     gap = np.concatenate(((level[up][:, None] - level[down]).ravel(), bound[flat]))
     size = np.abs(rate).max(initial=0.0) * _FLAT

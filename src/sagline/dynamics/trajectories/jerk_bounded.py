@@ -14,7 +14,7 @@ from sagline.dynamics.trajectories.segments import Curve
 from sagline.kinematics.inverse import inverse
 from sagline.robot.robot import Robot
 
-Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # further conditions at given parameters
+Bounds: TypeAlias = Callable[[Array], HalfPlanes]  # additional half planes at given parameters
 
 PIECES: Final = 100  # number of pieces of constant jerk
 _ITERATIONS: Final = 40
@@ -61,9 +61,9 @@ def fastest_jerk_profile(
     curve: Curve, robot: Robot, speeds: Bounds, limits: tuple[float, float], least: float
 ) -> JerkProfile | None:
     """Fastest rest-to-rest profile found within tension limits and jerk bounds."""
-    # Linear in the jerk and in the square of the time, except for the position at each share of the time, the
-    # square of its speed and the time's third power: those are computed again in iterations, each a linear program
-    # units: limits [m/s^3]; least [s]
+    # The problem is linear in the jerk and in the squared time, except for three quantities: the position at each share
+    # of the time, its squared speed, and the third power of the time. Iterations update these quantities, and each
+    # iteration solves a linear program. Units: limits [m/s^3]; least [s]
     from scipy.optimize import linprog  # this import takes longer than the rest of dynamics
 
     course = _first(curve, limits, least)
@@ -123,9 +123,8 @@ def _within(planes: HalfPlanes, state: Array, speed: Array) -> tuple[Array, Arra
 
 def _jerk_rows(rates: Array, state: Array, course: JerkProfile, limit: float) -> tuple[Array, Array]:
     """Rows that limit the jerk R1 s''' + 3 R2 s' s'' + R3 s'^3 in some directions at all knots."""
-    # Directions: along and across the curve, and along the current jerk, so that the magnitude of the final jerk is
-    # within the limit
-    # shapes: rates (3, P + 1, 3)
+    # the directions are along and across the curve and along the current jerk, so that the magnitude of the final jerk
+    # is within the limit; shapes: rates (3, P + 1, 3)
     _, speed, rate = (values[:, None] for values in state @ course.jerk)
     first, second, third = rates
     rest = 3.0 * second * speed * rate + third * speed**3  # current value; it changes little between iterations
@@ -151,7 +150,7 @@ def _unit(vectors: Array) -> Array:
 
 
 def _without_redundant(planes: HalfPlanes) -> HalfPlanes:
-    """Half planes that contain the origin, without those that bound the polygon in none of the sampled directions."""
+    """Half planes that contain the origin, without those that do not bound the polygon in any sampled direction."""
     normed = planes.rates / np.maximum(planes.bound, _NOTHING)[..., None]  # 0 for an infinite bound
     scale = np.maximum(np.abs(normed).max(axis=1, keepdims=True), _NOTHING)
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _SIDES)

@@ -1,4 +1,4 @@
-"""Rest-to-rest segments of a path: the curve of each, and the parameter along it over time."""
+"""Rest-to-rest segments of a path: curve of each segment, and curve parameter over time."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Curve(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _LineCurve:
-    """Straight line with a rotation about a fixed axis; its parameter is the covered share of both."""
+    """Straight line with a rotation about a fixed axis; its parameter is the covered share of length and angle."""
 
     ends: Segments  # a single segment
 
@@ -115,7 +115,7 @@ class SplineCurve:
         """Poses and their derivatives at parameters of shape (N,)."""
         place = [self.position(parameter, order) for order in range(4)]
         q = [self.quaternion(parameter, order) for order in range(4)]
-        # with w = 2 vec(q' q*)/(q . q) for any length of q: numerator, denominator and their derivatives
+        # w = 2 vec(q' q*)/(q . q) for any length of q: numerator, denominator and their derivatives
         top = [2.0 * _vector(q[1], q[0]), 2.0 * _vector(q[2], q[0])]
         top.append(2.0 * _vector(q[3], q[0]) + 2.0 * _vector(q[2], q[1]))
         below = [np.sum(q[0] * q[k], axis=1)[:, None] * (1.0 if k == 0 else 2.0) for k in range(3)]
@@ -181,11 +181,12 @@ def _pieces(left: Array, right: Array) -> Array:
     return np.concatenate((left, rest))
 
 
-# relative to the path's largest speed or acceleration: accuracy of rest for splines through samples
+# tolerance for rest in splines through samples, relative to the path's largest speed or acceleration
 RESTING: Final = 1e-3
-# relative to its largest speed: stricter limit between the ends, where the platform might only reverse
+# stricter tolerance between the ends, relative to the path's largest speed, because the platform might only reverse
+# there
 _STANDING: Final = 1e-9
-_ON_A_LINE: Final = 1e-7  # relative to the length: largest distance of samples from a line
+_ON_A_LINE: Final = 1e-7  # largest distance of samples from a line, relative to its length
 TINY: Final = 1e-300
 _SAME_TIME: Final = 1e-9  # relative to the path's duration
 
@@ -207,8 +208,8 @@ class RestToRestSegment:
 
     def rates(self, time: Array) -> Array:
         """Parameter of the curve and its first three derivatives at given times since the start, shape (4, N)."""
-        # Before the start and after the end, the platform is at rest. At a discontinuity, a derivative has its later
-        # value.
+        # Before the start and after the end, the platform is at rest. At a discontinuity, a derivative has its value
+        # after it.
         assert self.progress is not None
         held = np.clip(time, 0.0, self.duration)
         values = np.stack([self.progress(held, order) for order in range(4)])
@@ -218,8 +219,8 @@ class RestToRestSegment:
 
 def segments_of(path: Path) -> tuple[RestToRestSegment, ...]:
     """Rest-to-rest segments of a path, in order."""
-    # Between rests the parameter is a polynomial between samples, with all derivatives known from the path: of 7th
-    # degree, or of 5th degree without jerk. Paths of `quintic_path` and `septic_path` are represented exactly.
+    # Between two samples of a segment the parameter is a polynomial that matches all known derivatives of the path. Its
+    # degree is 7, or 5 for a path without jerk. Paths of `quintic_path` and `septic_path` are represented exactly.
     _check_ends(path)
     rests = path.rests if path.rests is not None else _standing(path)
     return tuple(_segment(path, float(first), float(last)) for first, last in pairwise(rests))
@@ -254,7 +255,7 @@ def _standing(path: Path) -> Array:
 
 
 def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
-    """Segment between two rests; rests between samples are reached by extending the adjacent polynomials."""
+    """Segment between two rests; the adjacent polynomials are extended to rests between samples."""
     near = _SAME_TIME * max(path.duration, abs(begin))
     first, last = np.searchsorted(path.time, (begin - near, end + near))
     part = slice(int(first), int(last))
@@ -269,8 +270,8 @@ def _segment(path: Path, begin: float, end: float) -> RestToRestSegment:
     rates = [path.twist[part], path.twist_rate[part], *([] if path.jerk is None else [path.jerk[part]])]
     curve, values = _parametrized(time, path.pose[part], rates)
     standing, over = abs(time[0]) <= near, abs(time[-1] - (end - begin)) <= near
-    # A sample at a rest may belong only to the next segment; quintic paths are exact with 3 of 4 derivatives, septic
-    # ones to h^7.
+    # a sample at a rest may belong only to the next segment; quintic paths are exact with 3 of 4 derivatives, septic
+    # paths have an error of order h^7
     at_end = 3 if path.jerk is not None or part.stop == len(path) else 2
     progress = piecewise(time, values, at_end if over else len(values))
     if not (standing and over):
@@ -304,7 +305,7 @@ def _parametrized(time: Array, pose: Pose, rates: list[Array]) -> tuple[Curve, A
 
 
 def sample_time(path: Path) -> float:
-    """Usual time between samples [s]; a sample rate close to a whole number is rounded to it."""
+    """Typical time between samples [s]; a sample rate close to a whole number is rounded to it."""
     if len(path) < 2:
         raise InvalidValueError("path", "of one sample", "two or more, from rest to rest", "Give a longer path.")
     rate = 1.0 / float(np.median(np.diff(path.time)))

@@ -20,16 +20,16 @@ from sagline.dynamics.trajectories.segments import RestToRestSegment, joined_pat
 from sagline.motion.path import Path, checked_time
 from sagline.robot.pose import Pose
 
-MOST_IMPULSES: Final = 10_000  # three impulses for each of eight frequencies give 6,561
-_SAME: Final = 1e-12  # relative to a shaper's duration: closer impulses are merged
-_ROUNDING: Final = 1e-9  # relative to the sum of the amplitudes
+MOST_IMPULSES: Final = 10_000  # largest number of impulses; three impulses for each of eight frequencies give 6,561
+_SAME: Final = 1e-12  # smallest distance of impulses, relative to a shaper's duration; closer impulses are merged
+_ROUNDING: Final = 1e-9  # tolerance of the sum of the amplitudes
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shaper(Result):
     """Impulses for convolution with a motion; the result is a sum of scaled and delayed copies of the motion.
 
-    The product of two shapers is their convolution: it cancels the vibrations that either of them cancels.
+    The product of two shapers is their convolution. It cancels the vibrations that each of them cancels.
 
     Attributes:
         time: Times of the impulses [s], shape (K,), ascending, the first >= 0.
@@ -73,7 +73,7 @@ class Shaper(Result):
         return float(self.time[-1])
 
     def __mul__(self, other: Shaper) -> Shaper:
-        """Convolution of both shapers; the order is irrelevant.
+        """Convolution of the two shapers, in any order.
 
         Args:
             other: A shaper.
@@ -128,7 +128,7 @@ def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa:
         damping_ratio: Damping ratio of the vibration, >= 0, < 1, one for all or one per frequency.
 
     Returns:
-        Shaper that extends a motion by half a period.
+        Shaper that extends a motion by half a period of the vibration.
 
     Raises:
         InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
@@ -146,14 +146,14 @@ def ZV(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa:
 
 
 def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa: N802
-    """Zero vibration and derivative: like `ZV`, but with little vibration also for a small frequency error.
+    """Zero vibration and derivative: like `ZV`, but with little vibration even for small frequency errors.
 
     Args:
         frequency: Natural frequency [Hz], > 0; for several, shape (F,), the product of their shapers.
         damping_ratio: Damping ratio of the vibration, >= 0, < 1, one for all or one per frequency.
 
     Returns:
-        Shaper of three impulses that extends a motion by a period.
+        Shaper of three impulses that extends a motion by a period of the vibration.
 
     Raises:
         InvalidValueError: If a frequency is not positive, or a damping ratio out of its range.
@@ -171,7 +171,7 @@ def ZVD(frequency: ArrayLike, damping_ratio: ArrayLike = 0.0) -> Shaper:  # noqa
 
 
 def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N802
-    """Extra insensitive: residual equal to the tolerance at the frequency, zero slightly above and below it.
+    """Extra insensitive: the residual vibration is the tolerance at the frequency and zero slightly above and below it.
 
     Args:
         frequency: Natural frequency [Hz], > 0, of a vibration with very low damping; for several, shape (F,), the
@@ -179,7 +179,7 @@ def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N8
         tolerance: Allowed share of residual vibration, >= 0, < 1, one for all or one per frequency.
 
     Returns:
-        Shaper of three impulses that extends a motion by a period.
+        Shaper of three impulses that extends a motion by a period of the vibration.
 
     Raises:
         InvalidValueError: If a frequency is not positive, or a tolerance out of its range.
@@ -197,7 +197,7 @@ def EI(frequency: ArrayLike, tolerance: ArrayLike = 0.05) -> Shaper:  # noqa: N8
 
 
 def _several(frequency: ArrayLike, option: ArrayLike, name: str, make: Callable[[float, float], Shaper]) -> Shaper:
-    """The product of the shapers of each frequency, each with its option, a number >= 0 and < 1."""
+    """The product of one shaper per frequency, each with its option, a number >= 0 and < 1."""
     frequencies, options = checked(frequency, "frequency", "Hz", above=0.0), checked(option, name, "", low=0.0)
     if (options >= 1.0).any():
         raise InvalidValueError(name, f"{options.max():g}", ">= 0, < 1", "Give a share, 0.05 for 5 %.")
@@ -245,25 +245,25 @@ def _damping_ratio(value: float) -> float:
     return ratio
 
 
-_BYTES: Final = 300.0  # memory per sample and impulse, during shaping
+_BYTES: Final = 300.0  # bytes of memory per sample and impulse during shaping
 
 
 def shaped(path: Path, shaper: Shaper) -> Path:
-    """Shaped path: it follows the same curve with a delay and does not excite the shaper's frequencies.
+    """Shaped path, which follows the same curve with a delay and does not excite the shaper's frequencies.
 
-    The curve parameter over time is convolved with the shaper's impulses, for each rest-to-rest segment separately;
-    each segment starts at the delayed end of the previous one. Along a straight line with a rotation about a fixed
+    The curve parameter over time is convolved with the shaper's impulses, separately for each rest-to-rest segment.
+    Each segment starts at the delayed end of the previous segment. Along a straight line with a rotation about a fixed
     axis, this convolves the acceleration itself, and a linear vibration cancels exactly. Along a curve the platform
     stays on the curve, and most of the vibration cancels.
 
     Paths of `quintic_path` and `septic_path` are represented exactly, up to rounding. For other paths, splines of 5th
-    or 7th degree connect the samples; along a curve, the pose error is of the sixth order in the distance between
-    samples.
+    or 7th degree connect the samples; along a curve, the pose error is proportional to the sixth power of the distance
+    between samples.
 
     Args:
-        path: A path from rest to rest; if its rests are not known (see `Path.rests`), the samples without velocity and
+        path: A path from rest to rest. If its rests are not given (see `Path.rests`), samples with zero velocity and
             acceleration count as rests.
-        shaper: Shaper of the convolution: `ZV`, `ZVD`, `EI` of a frequency, or their product.
+        shaper: Shaper of the convolution: `ZV`, `ZVD` or `EI` of a frequency, or a product of these.
 
     Returns:
         Path at the same sample rate; each of its segments is longer by the shaper's duration.

@@ -40,7 +40,7 @@ def _lobatto() -> Lobatto:
 
 
 def _slopes(nodes: Array, last: Array) -> Array:
-    """Derivatives at the nodes of the Lagrange polynomials; last: Legendre polynomial of that degree at the nodes."""
+    """Derivatives at the nodes of the Lagrange polynomials; last: Legendre polynomial of highest degree there."""
     apart = nodes[:, None] - nodes
     np.fill_diagonal(apart, 1.0)
     slopes = last[:, None] / last / apart
@@ -53,7 +53,7 @@ def _integrals(weights: Array, values: Array) -> Array:
     """Integrals of the Lagrange polynomials from -1 to the nodes; values: Legendre polynomials, one degree more."""
     p = weights.size - 1
     scale = np.arange(p + 1) + 0.5
-    scale[p] = 0.5 * p  # the quadrature rule overestimates its square
+    scale[p] = 0.5 * p  # the quadrature rule overestimates the square of the last polynomial
     shares = scale[:, None] * (values[:, : p + 1] * weights[:, None]).T  # Legendre coefficients, one node per column
     odd = 2.0 * np.arange(1, p + 1) + 1.0
     sums = np.column_stack((values[:, 0] + values[:, 1], (values[:, 2:] - values[:, :p]) / odd))
@@ -71,7 +71,7 @@ class CableComponents(NamedTuple):
         cable: Cable index of each mode, shape (T,).
         participation: Participation P of an acceleration of the platform end, world axes, shape (T, 3) [sqrt(kg)].
         still: M_0, mass of every cable for quasi-static motion of its platform end, world axes, shape (m, 3, 3) [kg].
-        plane: The modes in the cables' planes, cable by cable.
+        plane: The modes in the cables' planes, grouped by cable.
         normal: The modes normal to the planes.
         mesh: Nodes of the modes.
     """
@@ -105,8 +105,8 @@ class StringMesh(NamedTuple):
 
     Attributes:
         taut: Indices of the cables, t of them.
-        table: Their rows of the table of strings, shape (t, STRING_COLUMNS).
-        axes: Horizontal in the plane, normal to it, and upward, shape (t, 3, 3).
+        table: Rows of these cables in the table of strings, shape (t, STRING_COLUMNS).
+        axes: Axes of the cables: horizontal in the plane, normal to the plane, and upward, shape (t, 3, 3).
         omega: Highest angular frequency that the nodes resolve [rad/s].
         points: Material point [m], mass [kg] and integrals of C at the nodes, shape (t, nodes, 6).
     """
@@ -124,7 +124,7 @@ class StringMesh(NamedTuple):
 
 
 class PlaneModes(NamedTuple):
-    """Modes of the taut cables in one plane, k of each.
+    """Modes of the taut cables in one plane, k modes per cable.
 
     The u unknowns of a cable are displacements multiplied by the roots of their masses.
     """
@@ -136,7 +136,7 @@ class PlaneModes(NamedTuple):
 
 
 def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents:
-    """Modes of the cables of one state, accurate up to a frequency; higher ones complete the basis."""
+    """Modes of the cables of one state, accurate up to a frequency; higher modes complete the basis."""
     # units: up_to [Hz]
     omega = 2.0 * np.pi * up_to
     taut = np.flatnonzero(strings.taut[row])
@@ -165,7 +165,7 @@ def component_modes(strings: Strings, row: int, up_to: float) -> CableComponents
 
 
 def _motions(matrix: Array, rest: Array, free: Flags, first: int) -> PlaneModes:
-    """Fixed-end modes in one plane, for the unknowns that move in any cable."""
+    """Fixed-end modes in one plane; unknowns fixed in all cables are excluded."""
     last = matrix.shape[1] - (2 if rest.shape[2] == 2 else 1)
     square, own = np.linalg.eigh(matrix[:, first:last, first:last])
     shape = np.zeros((*matrix.shape[:2], last - first))

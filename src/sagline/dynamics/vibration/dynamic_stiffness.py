@@ -49,23 +49,23 @@ class Damping(NumberFields):
             raise InvalidValueError("modal_damping", f"{self.modal_damping:g}", "< 1", step)
 
 
-EXACT = 0.45 * np.pi  # phase of a transverse wave in an element [rad]
+EXACT = 0.45 * np.pi  # largest phase of a transverse wave in an element [rad]
 Complex = NDArray[np.complex128]
-_BYTES = 400.0  # per cable and frequency
+_BYTES = 400.0  # largest number of elements per cable and frequency
 
 
 def dynamic_stiffness(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> Complex:
     """Dynamic stiffness of every cable at its platform end, for vibration about an equilibrium.
 
-    Exact for vibrations about the elastic catenary, in and out of its plane, from taut string to deep sag; the frame
-    end is fixed, or elastic due to cable on pulley and dead length. At frequency zero it equals the cable stiffness of
-    `stiffness`.
+    Exact for vibrations about the elastic catenary, in and out of its plane, from taut strings to deep sag. The frame
+    end is fixed, or elastic because of the cable on the pulley and the dead length. At frequency zero it equals the
+    cable stiffness of `stiffness`.
 
     Args:
         state: An equilibrium, a single one.
         frequency: Frequencies [Hz], >= 0, shape (F,) or a single one.
-        damping: Energy losses of the vibration; None: no losses. Its modal_damping acts as a loss factor of all
-            stiffness, twice as large, so that every mode has this damping ratio at its own frequency.
+        damping: Energy losses of the vibration; None: no losses. Its modal_damping acts as a loss factor of the whole
+            stiffness, equal to twice its value. Every mode then has this damping ratio at its own frequency.
 
     Returns:
         Complex array of shape (F, m, 3, 3), or (m, 3, 3) [N/m], world axes; NaN for folded or slack cables,
@@ -109,7 +109,7 @@ def single_state(state: Equilibrium) -> Equilibrium:
 
 
 def check_solved(state: Equilibrium) -> None:
-    """Refuse a state without lengths."""
+    """Reject a state without lengths."""
     if np.isnan(state.unstrained_length).any():
         raise InvalidValueError(
             "state", "one without lengths", "a state that was solved", "See the status of the plan."
@@ -117,7 +117,7 @@ def check_solved(state: Equilibrium) -> None:
 
 
 def check_model(state: Equilibrium) -> None:
-    """Refuse cable models without vibrations: forces of shallow models have no energy, straight cables no stretch."""
+    """Reject cable models without vibrations: shallow cables have no potential energy, straight cables no stretch."""
     model = state.cables.model
     if model.code not in (codes.CATENARY, codes.ELASTIC):
         step = "Solve the pose with Catenary(), the default."
@@ -143,7 +143,7 @@ def moving_stiffness(strings: Strings, frequency: Array, damping: Damping | None
 
 
 def check_counts(counts: NDArray[np.int64], frequency: Array) -> None:
-    """Refuse a frequency at which a cable needs too many elements, or cannot be computed."""
+    """Reject a frequency at which a cable requires too many elements or has no solution."""
     # shapes: counts (1, F, m, 2); frequency (F,) [Hz]
     high = np.flatnonzero((counts == collocation.TOO_MANY).any(axis=(0, 2, 3)))
     if high.size:

@@ -10,7 +10,7 @@ import numpy as np
 from sagline.core.arrays import Array, Flags
 from sagline.robot.equilibrium import Equilibrium
 
-_SMOOTH = 0.1  # limit of u = w L/(N_A + N_B): below it, twelve points integrate to rounding error
+_SMOOTH = 0.1  # largest u = w L/(N_A + N_B) for which twelve integration points reach rounding error
 _POINTS, _SHARES = (0.5 * np.array(values) for values in np.polynomial.legendre.leggauss(12))
 _ALONG, _ACROSS, _UP = 0, 1, 2  # axes of a cable
 
@@ -34,7 +34,7 @@ class _CatenaryState(NamedTuple):
     b: Array  # vertical force at the platform end [N]
     size_a: Array  # tension at the frame end [N]
     size_b: Array  # tension at the platform end [N]
-    weight: Array  # per length [N/m]
+    weight: Array  # weight per length [N/m]
     length: Array  # unstrained length [m]
 
     @property
@@ -48,7 +48,7 @@ class _CatenaryState(NamedTuple):
 
     @property
     def smooth(self) -> Flags:
-        """True where the force is nearly constant along the cable."""
+        """True for cables with a nearly constant force along their length."""
         return self.weight * self.length <= _SMOOTH * (self.size_a + self.size_b)
 
 
@@ -127,7 +127,7 @@ def _by_force(hung: _CatenaryState) -> Array:
 
 
 def _turned(hung: _CatenaryState) -> Array:
-    """Integral of h/N^3, (sine_b - sine_a)/(h w), in a form without cancellation."""
+    """Integral of h/N^3, equal to (sine_b - sine_a)/(h w), in a form without cancellation."""
     cosine = (hung.h**2 + hung.a * hung.b) / hung.product
     near = hung.length / hung.product * hung.h * (1.0 / hung.size_a + 1.0 / hung.size_b) / (1.0 + cosine)
     far = (hung.b / hung.size_b - hung.a / hung.size_a) / (hung.h * hung.weight)
@@ -142,7 +142,7 @@ def _by_weight(hung: _CatenaryState) -> Array:
     across = 2.0 * np.arctanh(hung.weight * hung.length / (hung.size_a + hung.size_b)) / hung.weight
     whole = _plane_of(across - h * turned, across, h * lifted, h * turned)  # part of the flexibility without EA
     force = np.stack((h, np.zeros_like(h), hung.b), axis=-1)
-    # this part is homogeneous in force and weight, of degree -1
+    # this part is homogeneous of degree -1 in force and weight
     steep = -(whole + np.einsum("...abc,...c->...ab", _by_force(hung), force)) / hung.weight[..., None, None]
     size, h, v, below = _points(hung)
     drop = -v / size**3
@@ -168,7 +168,7 @@ def _outer(hung: _CatenaryState) -> Array:
 
 
 def _points(hung: _CatenaryState) -> tuple[Array, Array, Array, Array]:
-    """Tension, horizontal and vertical force at integration points, and the length below them, (..., P)."""
+    """Tension, horizontal and vertical force at integration points, and the length from the platform end, (..., P)."""
     below = (0.5 - _POINTS) * hung.length[..., None]
     v = hung.b[..., None] - hung.weight[..., None] * below
     h = np.broadcast_to(hung.h[..., None], v.shape)

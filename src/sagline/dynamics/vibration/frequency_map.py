@@ -33,7 +33,7 @@ from sagline.statics.stiffness import compliance_of
 from sagline.tension.method import TensionMethod
 from sagline.tension.methods import Closest
 
-BLOCK: Final = 16  # poses per block: a twentieth of a second, after which an interrupt is handled
+BLOCK: Final = 16  # poses per block, about 0.05 s; interrupts are handled between blocks
 _CLOSEST: Final = Closest()
 _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 
@@ -42,7 +42,7 @@ _ONE_PERCENT: Final = Damping(modal_damping=0.01)
 class FrequencyMap(Result, Saved):
     """Result of `frequency_map` at N poses.
 
-    Values are NaN unless the status is SOLVED or FOLDED; frequencies also if no mode is below up_to.
+    Values are NaN unless the status is SOLVED or FOLDED. Frequencies are also NaN if no mode is below up_to.
 
     Attributes:
         robot: The robot.
@@ -82,14 +82,15 @@ def frequency_map(
 ) -> FrequencyMap:
     """Lowest frequency and largest receptance of a robot at many poses, with cable mass.
 
-    Each pose is evaluated as in `vibration`: all modes below up_to; the exact count confirms their number.
+    Each pose is evaluated as in `vibration`: all modes below up_to are computed, and the exact count confirms their
+    number.
 
     Args:
         robot: The robot.
         poses: A batch of N.
         up_to: Upper limit of the mode frequencies [Hz], > 0.
         tension: Tension distribution method, as in `inverse`.
-        damping: Energy losses, for the largest response; a modal damping of 1 % by default; None: no losses.
+        damping: Energy losses for the largest response, by default a modal damping of 1 %; None: no losses.
         progress: Called after every few poses: number done, total number.
 
     Returns:

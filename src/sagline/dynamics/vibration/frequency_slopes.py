@@ -29,14 +29,15 @@ from sagline.statics.stiffness import modes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencySlopes(Result):
-    """Result of `frequency_slopes`: derivatives of K frequencies, with the platform moving to its new equilibrium.
+    """Result of `frequency_slopes`: derivatives of K frequencies, including the platform's motion to a new equilibrium.
 
-    All other data are constant: the lengths off the drums, the wrench. If the lengths follow a pose by a tension
-    distribution method, add length_sensitivity times the length changes.
+    All other data, such as the lengths off the drums and the wrench, are constant. If a tension distribution method
+    determines the lengths for a pose, add length_sensitivity times the length changes.
 
-    Equal frequencies have no separate derivatives. With an increasing parameter they split; the derivatives are then
-    the values in their rows, ascending. With a decreasing parameter they are the same except for the sign. The mean
-    of equal frequencies has the mean of the values as derivative.
+    Equal frequencies do not have separate derivatives, because they split when a parameter changes. The rows of equal
+    frequencies contain the derivatives for an increasing parameter, in ascending order. For a decreasing parameter the
+    derivatives are the same values with the opposite sign. The derivative of the mean of equal frequencies is the mean
+    of the values.
 
     Attributes:
         state: The state.
@@ -49,8 +50,8 @@ class FrequencySlopes(Result):
         stiffness_sensitivity: Derivative with respect to the axial stiffness of each cable, shape (K, m) [Hz/N].
         mass_sensitivity: Derivative with respect to the mass, including its weight, at constant inertia, shape (K,)
             [Hz/kg].
-        inertia_sensitivity: Derivative with respect to the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]:
-            multiply its elements by those of a symmetric change and sum.
+        inertia_sensitivity: Derivative with respect to the inertia, platform frame, shape (K, 3, 3) [Hz/(kg m^2)]. For
+            a symmetric change of the inertia, multiply the elements of both matrices and sum.
         pose_sensitivity: Derivative with respect to (displacement of the center of mass, rotation vector), world axes,
             at fixed lengths, with the wrench that holds the platform there, shape (K, 6) [Hz/m, Hz/rad].
         wrench_sensitivity: Derivative with respect to the wrench about the center of mass, world axes, shape (K, 6)
@@ -75,18 +76,18 @@ def frequency_slopes(state: Equilibrium | Vibration, together: float = 1e-6) -> 
 
     Args:
         state: A single equilibrium, for the massless frequencies of `modes`; or a vibration, for frequencies with cable
-            mass. Cables are exact or weightless and start at their anchors.
+            mass. Cables are exact or weightless, without pulleys and dead lengths.
         together: Relative difference up to which adjacent frequencies count as equal.
 
     Returns:
         FrequencySlopes; NaN where a frequency is NaN.
 
     Raises:
-        InvalidValueError: If the state is neither (of a plan: plan.state), is a batch, has no lengths, or has shallow
-            cables, pulleys or dead lengths; if the vibration was not solved.
+        InvalidValueError: If the state is neither an equilibrium nor a vibration (for a plan, pass plan.state), is a
+            batch, has no lengths, or has shallow cables, pulleys or dead lengths; if the vibration was not solved.
 
     Examples:
-        The cable to stiffen for a higher first frequency, massless, and the effect of a heavier platform:
+        The cable whose stiffness increases the first massless frequency most, and the effect of a heavier platform:
 
         >>> import numpy as np
         >>> import sagline as sl
@@ -177,7 +178,7 @@ def _result(
 
 
 def _parting(form: Array, frequency: Array) -> Array:
-    """Derivatives of the frequencies of a group from those of their square, (..., g, g) to (g, ...)."""
+    """Derivatives of a group's frequencies from those of the squared frequency, (..., g, g) to (g, ...)."""
     known: Flags = np.asarray(np.isfinite(form).all(axis=(-1, -2)))
     squares = np.linalg.eigvalsh(np.where(known[..., None, None], form, 0.0))
     squares = np.where(known[..., None], squares, np.nan)

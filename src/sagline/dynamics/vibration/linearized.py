@@ -39,7 +39,7 @@ _WRENCH_UNITS = ("N",) * 3 + ("N m",) * 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Linearized(Result):
-    """Result of `linearized`: dx/dt = A x + B u, y = C x + D u, in deviations from a state; massless cables.
+    """Result of `linearized`: dx/dt = A x + B u, y = C x + D u for deviations from a state, with massless cables.
 
     Motions are (displacement of the center of mass, rotation vector), wrenches act on the platform about its center of
     mass; both in world axes. n is the number of free motions, m the number of cables.
@@ -76,7 +76,7 @@ class Linearized(Result):
         return locked(np.linalg.eigvals(self.A).astype(complex))
 
     def state_space(self) -> StateSpace:
-        """The system as a SciPy object, for simulation, responses and controller design.
+        """The system as a SciPy object for simulation, responses and controller design.
 
         Returns:
             A `scipy.signal.StateSpace`.
@@ -89,8 +89,8 @@ class Linearized(Result):
 def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Inputs = "lengths") -> Linearized:
     """Linear model of the robot about a state, from winches and wrench to pose, tensions and lengths.
 
-    The cables have no mass here: the model is not valid above the first string frequency (see `vibration`). The static
-    gains are the compliance and the sensitivities of `stiffness`, the poles are `modes`.
+    The cables have no mass in this model, so that it is not valid above the first string frequency (see `vibration`).
+    The static gains are the compliance and the sensitivities of `stiffness`, the poles are `modes`.
 
     Args:
         state: A single equilibrium, from `inverse` or `forward`. An unstable one has growing poles.
@@ -101,9 +101,9 @@ def linearized(state: Equilibrium, damping: Damping | None = None, inputs: Input
         The system.
 
     Raises:
-        InvalidValueError: If the state is not an Equilibrium (of a plan: plan.state), is a batch, or has no lengths;
-            for `air_damping`, which acts on cables with mass; for `loss_time` with "lengths" as inputs, because
-            tensions then depend on winch speeds.
+        InvalidValueError: If the state is not an Equilibrium (for a plan, pass plan.state), is a batch, or has no
+            lengths; for `air_damping`, which acts on cables with mass; for `loss_time` with "lengths" as inputs,
+            because tensions then depend on winch speeds.
 
     Examples:
         Final displacement of the platform after 1 mm of cable 0 is wound in:
@@ -211,8 +211,8 @@ def _solved_slopes(state: Equilibrium) -> CableSlopes:
 
 def _stretch_loss(state: Equilibrium, slopes: CableSlopes, loss_time: float) -> tuple[Array, Array, Array, Array]:
     """Stretch loss to first order: K(omega) = K + i omega eta K S K, with S the stretch part."""
-    # Wrenches against platform velocity (6, 6) and length rates (6, m); frame-end tensions due to platform velocity (m,
-    # 6) and to the rate of the cable's own length (m,)
+    # matrices: damping wrench per platform velocity (6, 6) and per length rates (6, m); frame-end tension per platform
+    # velocity (m, 6) and per rate of the cable's own length (m,)
     m = state.one_robot.cable_count
     if not loss_time:
         return np.zeros((6, 6)), np.zeros((6, m)), np.zeros((m, 6)), np.zeros(m)

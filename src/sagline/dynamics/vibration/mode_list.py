@@ -26,10 +26,9 @@ def end_displacements(state: Equilibrium, shape: Array) -> Array:
 
 def stretch_losses(state: Equilibrium, platform: Modes, loss_time: float) -> Array:
     """Damping ratio of each massless mode due to the loss in the cables' stretch, to first order."""
-    # Half the loss factor omega eta, times the share of the mode's elastic energy that is in the stretch of the cables,
-    # free and behind their exits; the rest is in sag and swivel
-    # shapes: loss_time [s]; returns (n,)
-    # source: docs/model.md, section 11
+    # The ratio is half the loss factor omega eta, times the share of the mode's elastic energy in the stretch of the
+    # cables, before and behind their exit points. The rest of the energy is in sag and in the swivel motion. Shapes:
+    # loss_time [s]; returns (n,) source: docs/model.md, section 11
     omega = 2.0 * np.pi * platform.frequency
     if loss_time == 0.0:
         return np.zeros_like(omega)
@@ -59,7 +58,7 @@ def quasi_static_displacements(state: Equilibrium, ends: Array, count: int) -> A
 
 
 def _behind(strings: Strings) -> Array:
-    """Flexibility direction of the routing of each cable [sqrt(m/N)], world axes, (m, 3)."""
+    """Direction of flexibility at the exit point of each cable, due to its routing [sqrt(m/N)], world axes, (m, 3)."""
     table, axes = strings.table[0], strings.axes[0]
     return np.asarray(table[:, columns.BEHIND_X, None] * axes[:, 0] + table[:, columns.BEHIND_Z, None] * axes[:, 2])
 
@@ -90,7 +89,7 @@ class ListedMode(NamedTuple):
     kind: str  # "with cable mass" or "massless"
     frequency: float  # [Hz]
     platform_share: float  # platform share of the kinetic energy
-    cable: int | None  # cable with the largest share; None if no cable has a share
+    cable: int | None  # cable with the largest share of the energy; None if no cable has a share
     cable_share: float  # share of this cable
     loss: float  # damping ratio
 
@@ -133,8 +132,8 @@ def listed_modes(vibration: Vibration) -> list[ListedMode]:
 
 def mode_correlation(vibration: Vibration) -> Array:
     """Share of each massless mode's motion in each mode with cable mass, shape (n, K)."""
-    # A share is the squared mass-weighted product of the platform motions of both modes. Over all modes, including
-    # those above `up_to`, the shares of a massless mode sum to less than 1; the difference is in the cables
+    # A share is the squared mass-weighted product of the platform motions of both modes. The shares of a massless mode,
+    # summed over all modes including those above `up_to`, are less than 1 because of the motion of the cables
     massless = modes(vibration.state).shape
     mass = np.linalg.pinv(massless @ massless.T)
     return np.asarray((massless.T @ mass @ vibration.shape) ** 2)

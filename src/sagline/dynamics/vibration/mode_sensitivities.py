@@ -85,7 +85,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
     moved = np.cross(unit[:, None, 3:], slopes.levers)  # rotation of the levers
     forces = np.einsum("mij,kmj->kmi", slopes.blocks, unit[:, None, :3] + moved)
     form = -np.einsum("mabc,kmc->kab", swings.by_force, forces)
-    onto = np.cross(turns.T[:, None, None], moved)  # of mode b, by motion k, of cable m
+    onto = np.cross(turns.T[:, None, None], moved)  # indices: mode b, motion k, cable m
     pulled = np.einsum("mai,bkmi->kab", swings.end_force, onto)
     form += pulled + np.swapaxes(pulled, -1, -2)
     form += (
@@ -100,7 +100,7 @@ def _by_pose(rest: StateSlopes, swings: ModeGroup) -> Array:
 
 
 def _lever_form(turns: Array, levers: Array, force: Array) -> Array:
-    """Geometric stiffness of forces on levers for rotations: symmetric part of r T^T - r.T."""
+    """Geometric stiffness of forces T on levers r for rotations: symmetric part of r T^T - r.T."""
     # shapes: turns (3, g); levers (..., 3); force (..., 3); returns (..., g, g)
     along, pulled = levers @ turns, force @ turns
     mixed = along[..., :, None] * pulled[..., None, :]
@@ -114,7 +114,7 @@ def _cross_matrices() -> Array:
     return np.swapaxes(np.cross(np.eye(3)[:, None], np.eye(3)), -1, -2)
 
 
-PHASE = 0.45 * np.pi  # phase of a transverse wave in an element [rad]
+PHASE = 0.45 * np.pi  # largest phase of a transverse wave in an element [rad]
 HALVINGS = 40  # largest number of bisections of a cable: elements at a fold would become ever shorter
 CLOSE = 1e-5  # relative frequency difference for the numerical derivative of the equations
 _UP = np.array([0.0, 0.0, 1.0])
@@ -133,9 +133,9 @@ class StringData(NamedTuple):
 class _Waves(NamedTuple):
     """Displacement and force along a cable for each component of the force on its frame end."""
 
-    force: Array  # in the cable at rest, shape (P, 3) [N]
+    force: Array  # force in the cable at rest, shape (P, 3) [N]
     below: Array  # length from the point to the platform end, shape (P,) [m]
-    share: Array  # length belonging to the point, shape (P,) [m]
+    share: Array  # length of cable that the point represents, shape (P,) [m]
     moved: Array  # displacement, one column per force component, shape (P, 3, 3)
     pulled: Array  # change of the force, shape (P, 3, 3)
     end: Array  # displacement and force at the platform end, shape (2, 3, 3)
@@ -157,7 +157,7 @@ def string_data(rest: StateSlopes) -> tuple[StringData, ...]:
 def mode_group(rest: StateSlopes, cables: tuple[StringData, ...], frequency: Array) -> ModeGroup:
     """Modes of adjacent frequencies [Hz] that count as equal."""
     omega, group = 2.0 * np.pi * float(frequency.mean()), len(frequency)
-    omega *= 1.0 + _correction(rest, cables, omega, group)  # reduces the error by the factor CLOSE
+    omega *= 1.0 + _correction(rest, cables, omega, group)  # reduces the error to CLOSE times its value
     waves = [_waves(cable, omega) for cable in cables]
     matrix, scale = _equations(rest, waves, omega)
     vectors = scale[:, None] * np.linalg.svd(matrix)[2][-group:].T
@@ -228,7 +228,7 @@ def _waves(cable: StringData, omega: float) -> _Waves:
 
 
 def _flexible(force: Array, stiffness: float) -> Array:
-    """Matrix C where the cable has a force, (..., 3, 3)."""
+    """Matrix C at points with a given force in the cable, (..., 3, 3)."""
     size = np.linalg.norm(force, axis=-1)[..., None, None]
     tangent = force[..., :, None] * force[..., None, :] / size**2
     found: Array = np.eye(3) / stiffness + (np.eye(3) - tangent) / size
@@ -236,7 +236,7 @@ def _flexible(force: Array, stiffness: float) -> Array:
 
 
 def _edges(cable: StringData, omega: float) -> Array:
-    """Borders of elements that are short relative to N/w and to a transverse wave."""
+    """Borders of elements, which are short relative to N/w and to a transverse wave."""
     edges = np.array([0.0, cable.length])
     for _ in range(HALVINGS):
         size = np.diff(edges)
@@ -281,7 +281,7 @@ def _turned(force: Array, pulled: Array) -> Array:
     size = np.linalg.norm(force, axis=-1)[:, None, None]
     along = np.einsum("pi,pig->pg", force, pulled)
     both = np.einsum("pia,pib->pab", pulled, pulled)
-    mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # along of mode a, component of mode b
+    mixed = along[:, :, None, None] * np.swapaxes(pulled, 1, 2)[:, None]  # force of mode a, component of mode b
     straight = 3.0 * along[:, :, None] * along[:, None, :] / size**2 - both
     turned = straight[..., None] * force[:, None, None, :] - mixed - np.swapaxes(mixed, 1, 2)
     found: Array = turned / size[..., None] ** 3

@@ -13,14 +13,14 @@ from sagline.dynamics.vibration.component_modes import CableComponents, PlaneMod
 from sagline.dynamics.vibration.dynamic_stiffness import Complex, Damping, moving_stiffness
 from sagline.dynamics.vibration.robot_modes import StateModes, VibrationModel
 
-LOWEST: Final = 1.0  # Hz: modes up to this frequency are always included
+LOWEST: Final = 1.0  # [Hz], modes up to this frequency are always included
 TAKEN: Final = 1.6  # relative to the highest frequency: modes up to this limit are included
-# relative to the highest frequency: losses couple the modes below this limit; higher modes are damped separately
+# relative to the highest frequency: losses couple the modes up to this limit, and damp each higher mode separately
 COUPLED: Final = 1.5
 BLOCK: Final = 128  # frequencies per block
 
 
-# components of one state; loss matrices of their stretch, if any
+# components of one state, and loss matrices of their stretch, if any
 FixedEndModes: TypeAlias = tuple[CableComponents, Array | None]
 
 
@@ -65,7 +65,7 @@ class Receptance(NamedTuple):
             return np.asarray(freedom.T @ np.linalg.inv(freedom @ whole @ freedom.T) @ freedom)
 
     def _moving(self, components: CableComponents, lost: Array | None, omega: Array) -> tuple[Complex, Complex]:
-        """Dynamic part of the cables' stiffness, with and without their mass, (F, m, 3, 3) each."""
+        """Dynamic part of the cables' stiffness, first with their mass, then without it, (F, m, 3, 3) each."""
         mesh, model = components.mesh, self.model
         density = mesh.density[:, None, None]
         square = omega**2 - 1j * omega * self.damping.air_damping / density[:, 0]  # (t, F)
@@ -100,11 +100,11 @@ def _driven_stiffness(motions: PlaneModes, square: Complex, loss: complex) -> Co
 def _driven_stiffness_with_loss(
     motions: PlaneModes, square: Complex, loss: complex, lost: Array, scaled: Complex
 ) -> tuple[Complex, Complex]:
-    """Same stiffness with stretch loss, by modes and end (t, d + k, d + k), and the static loss alone."""
+    """The same stiffness with stretch loss; lost: loss matrix (t, d + k, d + k); and the static loss alone."""
     d, factor = motions.drive.shape[2], scaled[None, :, None, None]
     by_end = -square[..., None, None] * motions.drive[:, None] + factor * lost[:, None, d:, :d]
     alone = loss * motions.square[:, None] - square[..., None]
-    near = int((motions.square < COUPLED**2 * np.abs(square).max()).sum(axis=1).max())  # of each cable, ascending
+    near = int((motions.square < COUPLED**2 * np.abs(square).max()).sum(axis=1).max())  # ascending for each cable
     own = factor * lost[:, None, d : d + near, d : d + near]
     index = np.arange(near)
     own[..., index, index] += alone[..., :near]
@@ -114,17 +114,17 @@ def _driven_stiffness_with_loss(
     return -np.swapaxes(by_end, -1, -2) @ moved, factor * lost[:, None, :d, :d]
 
 
-ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacement per force (F, 3, 3) at frequencies (F,)
+ForceReceptance: TypeAlias = Callable[[Array], Complex]  # displacements per force (F, 3, 3) at frequencies (F,)
 
-# relative to the largest response at a mode: the search covers the modes with at least this response
+# the search covers the modes with at least this response, relative to the largest response at a mode
 LIKELY: Final = 0.4
 REFINEMENTS: Final = 2  # number of refinements of the search
 CLOSER: Final = 5  # frequencies between two adjacent ones
-WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in half peak widths
+WIDTHS: Final = np.linspace(-3.0, 3.0, 7)  # search points about a mode, in units of half the peak width
 
 
 def modal_receptance(found: StateModes, rest: Array, ratio: float) -> ForceReceptance:
-    """Receptance from the modes of a robot with a common loss factor of all stiffness, which does not couple modes."""
+    """Receptance from the modes of a robot; a common loss factor of the whole stiffness does not couple modes."""
     # shapes: rest (3, 3)
     natural = (2.0 * np.pi * found.frequency) ** 2
     products = (found.platform[:3, None] * found.platform[None, :3]).reshape(9, -1)

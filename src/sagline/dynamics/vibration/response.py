@@ -22,25 +22,26 @@ from sagline.statics.slopes import cable_slopes
 from sagline.statics.stiffness import modes, stiffness
 
 CHECKS: Final = 8  # frequencies at which the response is compared with the exact one
-_BYTES: Final = 20_000.0  # per frequency
+_BYTES: Final = 20_000.0  # bytes per frequency
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencyResponse(Result):
     """Result of `frequency_response` at F frequencies.
 
-    Motions are (displacement of the center of mass [m], rotation vector [rad]), wrenches (force [N], moment [N m])
-    about it, world axes. Both are complex amplitudes with the time factor exp(i omega t).
+    Motions are (displacement of the center of mass [m], rotation vector [rad]), and wrenches are (force [N], moment [N
+    m]) about this center, in world axes. Both are complex amplitudes with the time factor exp(i omega t).
 
     Attributes:
         state: The state, a single one.
         damping: Energy losses.
         frequency: Frequencies [Hz], shape (F,).
-        compliance: Motion per wrench with cable mass, shape (F, 6, 6) [m/N, rad/N, ...]; zero for motions outside the
-            robot's motion pattern.
+        compliance: Motion per wrench with cable mass, shape (F, 6, 6) [m/N, rad/N, ...]; zero for motions that the
+            robot's motion pattern excludes.
         massless_compliance: Motion per wrench with massless cables, of the same shape.
         checked_frequency: Frequencies at which the compliance was compared with the exact one [Hz], shape (C,).
-        deviation: Relative difference from the exact compliance at these frequencies, in its norm, shape (C,).
+        deviation: Norm of the difference from the exact compliance at these frequencies, relative to the norm of the
+            exact one, shape (C,).
     """
 
     state: Equilibrium
@@ -53,7 +54,7 @@ class FrequencyResponse(Result):
 
 
 def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Damping | None = None) -> FrequencyResponse:
-    """Motion of the platform for an oscillating wrench, with cable mass and, for comparison, with massless cables.
+    """Motion of the platform for an oscillating wrench, with cable mass, and with massless cables for comparison.
 
     The response is computed from the fixed-end modes of every cable. At some of the frequencies it is compared with the
     response for the exact stiffness of the cables, and the deviation is reported.
@@ -62,7 +63,7 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
         state: An equilibrium, a single one.
         frequency: Frequencies [Hz], >= 0, shape (F,).
         damping: Energy losses; None: no losses, with infinite response at the natural frequencies. Its modal_damping
-            acts as a loss factor of all stiffness, twice as large, as in `dynamic_stiffness`.
+            acts as a loss factor of the whole stiffness, equal to twice its value, as in `dynamic_stiffness`.
 
     Returns:
         FrequencyResponse.
@@ -109,8 +110,8 @@ def frequency_response(state: Equilibrium, frequency: ArrayLike, damping: Dampin
 
 MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
 UNITS = {(False, False): "m/N", (False, True): "1/N", (True, False): "1/N", (True, True): "rad/(N m)"}
-SAMPLES = 900  # number of frequencies, logarithmically spaced
-NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # spacing about a peak, denser close to it
+SAMPLES = 900  # number of logarithmically spaced frequencies
+NEAR = np.sinh(np.linspace(-8.0, 8.0, 33)) / np.sinh(8.0)  # relative frequencies about a peak, denser close to it
 BESIDE = 0.03  # range of these frequencies, relative to a peak's frequency
 BELOW = 6.0  # ratio of the lowest mode frequency to the start of the curves
 
@@ -127,8 +128,8 @@ class ResponseCurves(NamedTuple):
 
 def response_curves(vibration: Vibration, force: str = "x", motion: str | None = None) -> ResponseCurves:
     """Platform motion per force at its center of mass over frequency, up to the limit of known modes."""
-    # Both curves are from `frequency_response`; air damping acts only on vibrating cables, so the massless curve has
-    # none
+    # Both curves are from `frequency_response`; air damping acts only on cables with mass, so the massless curve does
+    # not include it
     state = instance(vibration, Vibration, "vibration").state
     if vibration.status is not VibrationStatus.SOLVED or not vibration.frequency.size:
         reason = vibration.status.name if vibration.status is not VibrationStatus.SOLVED else "no mode below up_to"

@@ -21,7 +21,7 @@ from sagline.statics.stiffness import UNSTABLE, mass_matrix, natural_frequency
 from sagline.statics.strings import COUNTING, Strings, strings_of, undamped
 
 KEPT = 1.05  # relative to the requested frequency: fixed-end modes up to this limit are unknowns
-LEVELS = 4  # number of pairs of moments matched for the higher modes
+LEVELS = 4  # number of moment pairs that are matched for the higher modes
 _TINY = 1e-300
 
 
@@ -49,7 +49,7 @@ class _ReducedModel(NamedTuple):
     driven: Array  # matrix from the first unknowns to the excitation of the cable modes, shape (k, n)
     kept: Flags  # components that are unknowns themselves, the first of the k, shape (T,)
     beyond: Array  # remaining components from the last of the k unknowns, shape (T - kept, b)
-    components: CableComponents  # of the cables
+    components: CableComponents  # fixed-end modes of the cables
 
     def amplitudes(self, vectors: Array) -> Array:
         """Amplitudes of the components in addition to quasi-static motion; vectors (n + k, K); returns (T, K)."""
@@ -78,10 +78,10 @@ def vibration_model(state: Equilibrium) -> VibrationModel:
 
 def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedModel:
     """Eigenproblem of one state for its modes below a frequency [Hz]."""
-    # Unknowns are the cables' modes up to slightly above this frequency. The response of the higher modes to slow
-    # platform motions is represented by a few joint motions that match the first moments (Krylov). Amplitudes are
-    # relative to the frame; the mass matrix is the platform mass with the remaining quasi-static mass of the cables,
-    # and 1 for each mode.
+    # The unknowns are the cables' modes up to slightly above this frequency. A few joint motions represent the response
+    # of the higher modes to slow platform motions; they match the first moments (Krylov). Amplitudes are relative to
+    # the frame. The mass matrix is the platform mass plus the remaining quasi-static mass of the cables, and 1 for each
+    # mode.
     components = component_modes(model.strings, row, KEPT * up_to)
     freedom, ends = model.freedom, model.ends[row]
     drives = (components.participation[:, None] @ ends[components.cable])[:, 0] @ freedom.T
@@ -105,7 +105,7 @@ def reduced_model(model: VibrationModel, row: int, up_to: float) -> _ReducedMode
 
 
 def _slow_motions(square: Array, drives: Array) -> tuple[Array, Array]:
-    """Motions that represent many: orthonormal columns of amplitudes, and the stiffness between them."""
+    """A few motions that represent many modes: orthonormal columns of amplitudes, and the stiffness between them."""
     chain = [drives / square[:, None]]
     for _ in range(LEVELS - 1):
         chain.append(chain[-1] / square[:, None])
@@ -156,8 +156,8 @@ def _negatives(matrix: Array) -> int:
 
 
 MOST_MODES: Final = 2_000
-SLOW: Final = 1e-2  # relative to up_to: lower frequencies may belong to motions without stiffness
-BORDER: Final = 1e-6  # relative frequency accuracy of the count for a mode
+SLOW: Final = 1e-2  # smallest frequency relative to up_to; a lower one may belong to a motion without stiffness
+BORDER: Final = 1e-6  # relative accuracy of a mode's frequency in the count
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +193,7 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
     if not border[0] <= count <= border[1]:
         text = f"vibration up to {up_to:g} Hz: {border[0]} modes were found where the exact count has {count}"
         raise SaglineError(f"{text}. Ask for another up_to, and report the robot and its pose.")
-    # cable mass has no static effect: the number of modes at exactly 0 Hz is unchanged
+    # cable mass has no static effect, so that the number of modes at exactly 0 Hz does not change
     if count and frequency[0] < SLOW * up_to:
         frequency[: np.count_nonzero(massless_modes(model, row)[0] == 0.0)] = 0.0
     vectors = vectors[:, :count]
@@ -202,7 +202,7 @@ def state_modes(model: VibrationModel, row: int, up_to: float) -> StateModes:
 
 
 def check_mode_count(count: int, frequency: float, item: str) -> None:
-    """Refuse a frequency [Hz] with too many modes below it."""
+    """Reject a frequency [Hz] with too many modes below it."""
     if count > MOST_MODES:
         value = f"{frequency:g} Hz, below which the robot has {count:,} modes"
         raise InvalidValueError(item, value, f"a frequency with up to {MOST_MODES:,} modes below it", "Lower it.")
@@ -218,7 +218,7 @@ def cable_shares(model: VibrationModel, row: int, found: StateModes) -> Array:
 
 
 def damping_ratios(density: Array, found: StateModes, shares: Array, damping: Damping) -> Array:
-    """Damping ratio of each mode, to first order: power loss relative to that of critical damping."""
+    """Damping ratio of each mode, to first order: lost power relative to that with critical damping."""
     # shapes: density (m,) [kg/m]; returns (K,)
     omega = 2.0 * np.pi * found.frequency
     lost = np.zeros(omega.size)

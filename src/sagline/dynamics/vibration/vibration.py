@@ -30,7 +30,7 @@ from sagline.statics.stiffness import Modes
 
 
 class VibrationStatus(IntEnum):
-    """Status of a vibration: type of equilibrium and of its cables."""
+    """Status of a vibration: type of the equilibrium, and type of its cables."""
 
     SOLVED = 0
     UNSTABLE = 1
@@ -52,7 +52,7 @@ _TEXTS = {
 }
 
 
-_NEAR: Final = 3.0  # factor: two excitations count if their ratio is smaller
+_NEAR: Final = 3.0  # two excitations are reported if their ratio is smaller than this factor
 _INSTANTS: Final = 2000  # number of instants of a segment for its inertial wrench
 
 
@@ -98,7 +98,7 @@ class Vibration(Result):
         state: The state, a single one.
         up_to: Frequency below which all modes are found [Hz].
         damping: Energy losses of the modes.
-        status: `VibrationStatus`: type of equilibrium, and existence of linear vibrations.
+        status: `VibrationStatus`: type of the equilibrium, and existence of linear vibrations.
         frequency: Natural frequencies with cable mass [Hz], ascending, shape (K,).
         shape: Motion of the platform (displacement of the center of mass, rotation vector, world axes), one mode per
             column, shape (6, K) [m/sqrt(kg), rad/(sqrt(kg) m)].
@@ -110,7 +110,7 @@ class Vibration(Result):
         massless_frequency: Natural frequencies of the platform with massless cables [Hz], as in `modes`, shape (n,).
         count: Number of modes below up_to by the exact count, which is independent of the modes; equals K if none is
             missing.
-        negative_directions: Unstable motions of the platform, one per column, shape (6, d); no columns at a stable
+        negative_directions: Unstable motions of the platform, one per column, shape (6, d); without columns at a stable
             equilibrium.
         slack_cables: Indices of the cables without linear vibrations.
     """
@@ -156,8 +156,8 @@ POINTS: Final = 41  # number of points of a cable's shape
 def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = None) -> Vibration:
     """All modes of a robot with cable mass below a frequency.
 
-    A cable is a string: in addition to the platform modes, each cable vibrates about its catenary, in and out of its
-    plane. The number of modes is compared with an independent exact count, so that none is missing.
+    In addition to the platform modes, each cable vibrates like a string about its catenary, in its plane and out of it.
+    The number of modes is compared with an independent exact count, so that none is missing.
 
     Args:
         state: A single equilibrium, from `inverse` or `forward`.
@@ -165,8 +165,8 @@ def vibration(state: Equilibrium, *, up_to: float, damping: Damping | None = Non
         damping: Energy losses of the vibration, for `loss`; None: no losses.
 
     Returns:
-        Vibration. Its status reports an unstable equilibrium, and folded or slack cables; these cables have no linear
-        vibrations and are not included in the modes.
+        Vibration. Its status reports an unstable equilibrium, and folded or slack cables. Such cables do not have
+        linear vibrations, and the modes do not include them.
 
     Raises:
         InvalidValueError: If the state is not a single Equilibrium with exact or elastic cables; if up_to is not
@@ -226,12 +226,12 @@ def to_shape(modes: Modes | Vibration, path: Path) -> Array:
 
     The excitation of a mode is measured by |phi . M d| |phi| |A(w)|/w, with phi its shape, d the direction of the
     motion, and A the Fourier transform of the acceleration along it. The measure combines the force on the mode at its
-    own frequency with the resulting platform motion. It is plausible but not proved: it finds the frequencies to shape,
-    not the residual vibration.
+    own frequency with the resulting platform motion. It is plausible but not proved. It determines the frequencies for
+    a shaper, not the residual vibration.
 
     Args:
-        modes: Modes of the robot at a single state, preferably at the end of the path: `modes(plan.state[-1])`, without
-            cable mass, or `vibration(plan.state[-1])`, with it.
+        modes: Modes of the robot at a single state, preferably at the end of the path: `modes(plan.state[-1])` without
+            cable mass, or `vibration(plan.state[-1])` with cable mass.
         path: A path from rest to rest; for each mode, the segment with the largest excitation counts.
 
     Returns:

@@ -17,7 +17,7 @@ from sagline.kernels.jit import formula, glue, kernel
 from sagline.kernels.memory import Memory, block, vector
 from sagline.kernels.tension.nearest import ReferencePoint
 
-TIED = 1e-10  # smallest difference of sums relative to the largest tension, and of weights to the largest weight
+TIED = 1e-10  # relative: smaller differences of sums count as ties, and smaller weights as zero
 
 
 @formula
