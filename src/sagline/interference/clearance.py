@@ -47,7 +47,7 @@ class ClearanceRows:
     """Distances at batches of poses, with all pose-independent data prepared once.
 
     Attributes:
-        pairs: Names and indices of the pairs, and the omitted pairs.
+        pairs: Names and indices of the measured pairs, and the omitted pairs.
     """
 
     def __init__(
@@ -114,7 +114,7 @@ class ClearanceRows:
         parts = rows_of_parts(cables.reshape(*lengths.shape, -1), lengths, self.pairs.parts, self._from_anchor)
         box = self._platform if isinstance(self._platform, Box) else Box(np.ones(3))
         rows = np.concatenate((parts, box_rows(box, state.pose).reshape(-1, 1, shapes.COLUMNS)), axis=1)
-        return locked(np.ascontiguousarray(rows))  # a batch's are not, and the kernel would be compiled again
+        return locked(np.ascontiguousarray(rows))  # a read-only array would cause a second compilation
 
 
 def _box_row(one: Box | Mesh) -> Array:
@@ -123,7 +123,7 @@ def _box_row(one: Box | Mesh) -> Array:
 
 
 def _platform_of(robot: Robots) -> Box | None:
-    """Platform as a box of its size around its anchors; None without a size; an error if robots differ."""
+    """Platform as a box of its size around its anchors; None without a size; error if the robots of a batch differ."""
     one = first_of(robot)
     for other in () if isinstance(robot, Robot) else robot[1:]:
         if not all(_alike(getattr(one, name), getattr(other, name)) for name in ("platform_size", "platform_anchors")):
@@ -142,8 +142,8 @@ def _alike(one: Array | None, other: Array | None) -> bool:
 NO_TENSIONS = "no tensions are known, so the cables have no shape: take a feasible pose"
 NOTHING = "nothing is measured"
 _SHOWN = 8  # number of printed pairs per pose, and of lines about omitted pairs
-_TOO_LARGE = 100.0  # times the size of the robot: a mesh in millimeters
-_NUMBERS = 9  # values per pair and pose: distance, bound and two points
+_TOO_LARGE = 100.0  # a mesh larger than this, relative to the robot, must be in millimeters
+_NUMBERS = 9  # number of values per pair and pose: distance, bound and two points
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -180,7 +180,7 @@ class Clearances(Result):
 
     @property
     def between(self) -> Any:
-        """Nearest pair: two names, or N times two for N poses; a sentence if there is none."""
+        """Nearest pair: two names, or N times two names for N poses; a sentence if there is none."""
         return self._between(self.pair_distance) if self._single else tuple(map(self._between, self.pair_distance))
 
     def __str__(self) -> str:
@@ -234,8 +234,8 @@ def clearance(
     """Least distances between cables with their sag, the platform and obstacles.
 
     Cables have the shape of their model, such as a catenary, and begin at the exit point of their pulley. The distances
-    are those of the nearest points, with an accuracy of about 1e-12 m (with meshes 1e-7 m). It is proved that no other
-    points are closer by more than the precision.
+    have an accuracy of about 1e-12 m (with meshes 1e-7 m). A proof shows that no other points are closer than these
+    distances by more than the precision.
 
     Args:
         state: An equilibrium, single or N of them; for a plan, plan.state.
@@ -245,9 +245,9 @@ def clearance(
             cables if known, else 0.
         platform: Shape of the platform in its own frame; None for a box of the robot's platform_size around its
             anchors, if that is known.
-        from_anchor: Length of cable next to an anchor that is not measured [m], > 0: at an anchor shared by two cables,
-            at the platform, and at the frame against obstacles around it. None omits pairs that share an anchor, and
-            cables with the platform, completely; `left_out` lists them.
+        from_anchor: Length of cable next to an anchor that the measurement ignores [m], > 0. It applies to two cables
+            with a common anchor, to cables and the platform, and to obstacles near frame anchors. None omits pairs with
+            a common anchor, and pairs of a cable and the platform, completely; `left_out` lists the omitted pairs.
 
     Returns:
         Clearances.

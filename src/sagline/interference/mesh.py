@@ -22,7 +22,7 @@ _AT_ONCE: Final = 1 << 19  # triangles times points
 
 
 def _as_faces(value: ArrayLike) -> Indices:
-    """Faces as given: a converter that gives type checkers the type of the argument."""
+    """Faces without a change: a converter that only declares the type of the argument."""
     return value  # type: ignore[return-value]
 
 
@@ -106,7 +106,8 @@ class Mesh(Result):
     def encloses(self, points: ArrayLike) -> Flags:
         """True for points in the solid.
 
-        Computed from the winding number of the surface, which is correct on edges and in the shadows of corners too.
+        The result follows from the winding number of the surface, which is reliable for points near edges and corners
+        too.
 
         Args:
             points: Points in the frame of the mesh [m], shape (..., 3).

@@ -1,8 +1,8 @@
-"""Least distances from meshes, through python-fcl: cables by branch and bound on the chords of their pieces.
+"""Least distances from meshes with python-fcl. Cables use branch and bound on the chords of their pieces.
 
-fcl computes the distance between triangles, or a segment and triangles, to the last digits; a cable piece is within its
-bulge of its chord. Boxes are treated as twelve triangles, balls as segments of zero length, because fcl's own boxes and
-capsules are accurate to 1e-7 only.
+fcl computes the distance of triangles from triangles or from a segment with full precision. The bulge of a cable piece
+is an upper bound of its distance from its chord. Boxes are twelve triangles and balls are segments of zero length,
+because fcl's own boxes and capsules are accurate only to 1e-7.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from sagline.robot.pose import Pose
 
 Form = Box | Capsule | Sphere | Mesh
 MISSING: Final = 'Meshes need python-fcl, which is not installed. Run: pip install "sagline[workspace]"'
-ROUNDING: Final = 1e-12  # share of the present sizes: margin of a lower bound for rounding
+ROUNDING: Final = 1e-12  # margin of a lower bound for rounding, relative to the coordinates
 _PIECES: Final = 4000  # largest number of cable pieces that are examined for one distance
-_SEARCHES: Final = 60  # iterations for the nearest point of a cable, to the last digits
-_SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))  # of a box's corners, and its triangles
+_SEARCHES: Final = 60  # iterations for the nearest point of a cable, to full precision
+_SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))  # signs of a box's corners, and indices of its triangles
 _FACES: Final = np.reshape([int(n) for n in "013032467475045051237276026064157173"], (12, 3))
 
 
@@ -73,7 +73,7 @@ class Meshed:
         self._known: dict[tuple[int, bytes], bool] = {}
 
     def measure(self, pose: Pose, moving: Array, least: Array | None, out: tuple[Array, Array, Array]) -> None:
-        """Distances of all pairs at every pose into `out`; pairs farther than `least` (N,) [m] need not be measured."""
+        """Distances of all pairs at every pose into `out`; pairs farther than `least` (N,) [m] may be skipped."""
         turns, places = pose.matrix.reshape(-1, 3, 3), np.atleast_2d(pose.position)
         value, low, nearest = out
         for n in range(len(moving)):
@@ -111,7 +111,7 @@ class Meshed:
         return self._fcl.CollisionObject(solid.geometry, self._fcl.Transform(*at.get(number, solid.place)))
 
     def _apart(self, one: Any, other: Any) -> tuple[float, Array, Array]:
-        """Distance of two bodies [m], 0 for contact, and their nearest points, that of a mesh first."""
+        """Distance of two bodies [m], 0 for contact, and their nearest points, with the point of a mesh first."""
         request, result = self._fcl.DistanceRequest(True), self._fcl.DistanceResult()
         distance = max(float(self._fcl.distance(one, other, request, result)), 0.0)
         return distance, *result.nearest_points
@@ -211,7 +211,7 @@ def _along(start: Array, end: Array) -> tuple[tuple[Array, Array], float]:
 
 
 def _proved(low: float, value: float, place: Array) -> float:
-    """Lower bound less the rounding errors, >= 0."""
+    """Lower bound minus rounding errors, >= 0."""
     return max(min(low, value) - ROUNDING * (1.0 + value + float(np.abs(place).max())), 0.0)
 
 
@@ -220,7 +220,7 @@ def _polished(
     nearest: tuple[float, float, Array, Array],
     row: Array,
 ) -> tuple[float, float, Array, Array]:
-    """Nearest point of a cable around a near one, by golden sections and parabolas (Brent)."""
+    """Nearest point of a cable close to a given point, by golden sections and parabolas (Brent)."""
     from scipy.optimize import minimize_scalar
 
     reach = 0.02 * float(row[shapes.LAST] - row[shapes.FIRST])

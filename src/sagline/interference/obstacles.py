@@ -18,11 +18,11 @@ from sagline.robot.reach import bounds
 from sagline.robot.robot import Robot
 
 _LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-ROUNDING: Final = 1e-14  # of products of unit vectors
+ROUNDING: Final = 1e-14  # tolerance for products of unit vectors
 
 
 def _rotation(value: ArrayLike, item: str) -> Array:
-    """Checked rotation matrix as given, or the nearest one where it differs by more than rounding."""
+    """Checked rotation matrix without a change, or the nearest rotation matrix if it differs by more than rounding."""
     matrix = exactly(value, item, "", (3, 3))
     nearest = Pose(np.zeros(3), matrix).matrix
     return matrix if np.abs(matrix.T @ matrix - np.eye(3)).max() < ROUNDING else nearest
@@ -33,13 +33,13 @@ class Box(Result):
     """A solid box.
 
     Attributes:
-        size: Its edges [m], shape (3,), > 0.
-        center: Its middle in the world [m], shape (3,); as a platform, in the platform frame.
+        size: Lengths of the edges [m], shape (3,), > 0.
+        center: Middle in the world [m], shape (3,); for a platform, in the platform frame.
         orientation: Rotation from its edges to the world, shape (3, 3).
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If an edge is not positive, or orientation is no rotation.
+        InvalidValueError: If an edge is not positive, or orientation is not a rotation.
 
     Examples:
         >>> import sagline as sl
@@ -56,7 +56,7 @@ class Box(Result):
 
     @property
     def bounds(self) -> Array:
-        """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
+        """Lowest and highest corner of the body's extent along the axes [m], shape (2, 3)."""
         reach = 0.5 * np.abs(self.orientation) @ self.size
         return np.stack((self.center - reach, self.center + reach))
 
@@ -66,13 +66,13 @@ class Capsule(Result):
     """A solid rod with round ends: a pole, a pipe, a lamp.
 
     Attributes:
-        start: One end of its middle line in the world [m], shape (3,).
-        end: The other [m], shape (3,).
-        radius: [m], >= 0.
+        start: One end of the center line in the world [m], shape (3,).
+        end: Other end of the center line in the world [m], shape (3,).
+        radius: Radius [m], >= 0.
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If the radius is negative, or an end is no point.
+        InvalidValueError: If the radius is negative, or an end is not a point.
 
     Examples:
         >>> import sagline as sl
@@ -89,7 +89,7 @@ class Capsule(Result):
 
     @property
     def bounds(self) -> Array:
-        """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
+        """Lowest and highest corner of the body's extent along the axes [m], shape (2, 3)."""
         low, high = np.minimum(self.start, self.end), np.maximum(self.start, self.end)
         return np.stack((low - self.radius, high + self.radius))
 
@@ -99,12 +99,12 @@ class Sphere(Result):
     """A solid ball.
 
     Attributes:
-        center: Its middle in the world [m], shape (3,).
-        radius: [m], >= 0.
+        center: Center in the world [m], shape (3,).
+        radius: Radius [m], >= 0.
         name: Name in messages and results.
 
     Raises:
-        InvalidValueError: If the radius is negative, or the center is no point.
+        InvalidValueError: If the radius is negative, or the center is not a point.
 
     Examples:
         >>> import sagline as sl
@@ -120,22 +120,24 @@ class Sphere(Result):
 
     @property
     def bounds(self) -> Array:
-        """Lowest and highest corner of what it fills along the axes [m], shape (2, 3)."""
+        """Lowest and highest corner of the body's extent along the axes [m], shape (2, 3)."""
         return np.stack((self.center - self.radius, self.center + self.radius))
 
 
 def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:
     """The twelve edges of a robot's frame as beams with round ends.
 
-    The frame is as it is drawn: the robot's frame_size below its highest anchors, or what its anchors span down to the
-    floor. Frame anchors are on it or near it: measure cables from some way on, `from_anchor` of `clearance`.
+    The frame is the frame of the drawings: a box with the robot's frame_size below its highest anchors, or the box of
+    its
+    anchors down to the floor. Frame anchors are on the frame or near it. Therefore, exclude the first part of each
+    cable with `from_anchor` of `clearance`.
 
     Args:
         robot: The robot.
         radius: Half the beams' thickness [m], >= 0.
 
     Returns:
-        Twelve capsules, named by where they are.
+        Twelve capsules, whose names describe their places.
 
     Raises:
         InvalidValueError: If radius is negative.

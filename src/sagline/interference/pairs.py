@@ -1,4 +1,4 @@
-"""Bodies as rows of numbers for the kernels, as in kernels.interference.shapes, and the pairs that are measured."""
+"""Bodies as rows of numbers for the kernels, as in kernels.interference.shapes, and the pairs to measure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagline.robot.pose import Pose
 
 
 class _CablePart(NamedTuple):
-    """A whole cable, or a cable without an end at the frame, at the platform, or both."""
+    """A whole cable, or a cable without its end at the frame, at the platform, or at both."""
 
     cable: int
     off_frame: bool = False
@@ -27,7 +27,7 @@ class _CablePart(NamedTuple):
 
 
 def cable_rows(state: Equilibrium, radius: Array) -> Array:
-    """Rows of cables from the exit point on, radius (m,) or (N, m) [m]; NaN where there is no tension."""
+    """Rows of cables from the exit point on, radius (m,) or (N, m) [m]; NaN without tension."""
     cables, ends = state.cables, _platform_ends(state)
     exits = state.exit_point
     out = np.zeros((*cables.shape, shapes.COLUMNS))
@@ -62,7 +62,7 @@ def _platform_ends(state: Equilibrium) -> Array:
 
 
 def rows_of_parts(cables: Array, lengths: Array, parts: tuple[_CablePart, ...], left_out: float) -> Array:
-    """Rows (N, len(parts), COLUMNS) of parts of cables, without an unstrained length `left_out` [m] of an end."""
+    """Rows (N, len(parts), COLUMNS) of parts of cables; `left_out` is the omitted unstrained length at an end [m]."""
     out = cables[:, [part.cable for part in parts]]
     for k, part in enumerate(parts):
         share = np.minimum(left_out / lengths[:, part.cable], 0.5 if part.off_frame and part.off_platform else 1.0)
@@ -87,7 +87,7 @@ def rod_row(rod: Capsule | Sphere) -> Array:
 
 
 def box_rows(box: Box, pose: Pose | None = None) -> Array:
-    """Row of a box at rest, (COLUMNS,), or of one that moves with N poses, (N, COLUMNS)."""
+    """Row of a box at rest, (COLUMNS,), or rows of a box that moves with N poses, (N, COLUMNS)."""
     shape = () if pose is None else pose.shape
     out = np.zeros((*shape, shapes.COLUMNS))
     turn = box.orientation if pose is None else pose.matrix @ box.orientation
@@ -101,7 +101,7 @@ def box_rows(box: Box, pose: Pose | None = None) -> Array:
 Obstacle = Box | Capsule | Sphere | Mesh
 
 PLATFORM: Final = "platform"
-_SAME = 1e-9  # of the robot's extent: anchors nearer to each other than this are one
+_SAME = 1e-9  # anchors closer than this, relative to the robot's extent, count as one anchor
 _NO_LENGTH = "cables and platform: give from_anchor, how much of a cable next to its anchor may be near"
 
 
@@ -109,10 +109,10 @@ class Pairs(NamedTuple):
     """Pairs of bodies. Their numbers count parts of cables, then the platform (with or without form), then obstacles.
 
     Attributes:
-        parts: Parts of cables that take part.
+        parts: Parts of cables that occur in pairs.
         by_kernel: Numbers of the pairs that kernels measure, shape (P, 2).
         with_mesh: Numbers of the pairs of which at least one is a mesh, shape (Q, 2).
-        names: Of all pairs, in this order.
+        names: Names of all pairs, in this order.
         left_out: Pairs that are not measured, with the reason.
     """
 
@@ -123,16 +123,16 @@ class Pairs(NamedTuple):
     left_out: tuple[str, ...]
 
 
-Body = _CablePart | int  # part of a cable, -1 for the platform, or the number of an obstacle
+Body = _CablePart | int  # part of a cable, -1 for the platform, or number of an obstacle
 
 
 def pairs_of(
     robot: Robots, obstacles: tuple[Obstacle, ...], platform: Box | Mesh | None, *, from_anchor: bool
 ) -> Pairs:
-    """All pairs of a robot and its obstacles; pairs that share an anchor are left out unless `from_anchor`."""
+    """All pairs of a robot and its obstacles; pairs with a common anchor are omitted unless `from_anchor`."""
     at_frame, at_platform = (_together(anchors) for anchors in anchors_of(robot))
     cables = range(len(at_frame))
-    found: list[tuple[Body, Body]] = []  # a cable's part, -1 the platform, or the number of an obstacle
+    found: list[tuple[Body, Body]] = []  # part of a cable, -1 for the platform, or number of an obstacle
     left_out: list[str] = []
     for i, j in combinations(cables, 2):
         shared = bool(at_frame[i, j]), bool(at_platform[i, j])
@@ -161,7 +161,7 @@ def pairs_of(
 
     def in_order(pair: tuple[Body, Body]) -> tuple[Body, Body]:
         boxes = [isinstance(form(one), Box) for one in pair]
-        return pair[::-1] if boxes == [True, False] else pair  # kernels take a box behind what is none
+        return pair[::-1] if boxes == [True, False] else pair  # in kernels, a box is the second body of a pair
 
     other = [pair for pair in found if any(isinstance(form(one), Mesh) for one in pair)]
     plain = [in_order(pair) for pair in found if pair not in other]
@@ -171,7 +171,7 @@ def pairs_of(
 
 
 def _together(anchors: Array) -> NDArray[np.bool_]:
-    """Mask of cables that share an anchor in any of several robots, shape (m, m)."""
+    """Mask of pairs of cables with a common anchor in any robot of a batch, shape (m, m)."""
     apart = np.linalg.norm(anchors[..., :, None, :] - anchors[..., None, :, :], axis=-1)
     same: NDArray[np.bool_] = (apart <= _SAME * max(1.0, float(np.abs(anchors).max()))).reshape(-1, *apart.shape[-2:])
     return np.asarray(same.any(axis=0))

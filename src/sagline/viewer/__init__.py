@@ -1,1 +1,1 @@
-"""Viewer: a robot in the browser whose sagging cables follow the dragged platform."""
+"""Viewer: a robot in the browser, whose sagging cables follow the platform while it is dragged."""

@@ -16,16 +16,17 @@ BY_HAND: Final = "chosen by hand"
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ByHand(QuadraticProgram):
-    """Feasible tensions closest to tensions chosen by hand; at the pose of the choice, exactly the chosen ones.
+    """Feasible tensions closest to tensions chosen by hand; at the pose of the choice, they are the chosen tensions.
 
-    Tensions in force balance differ from those of the minimum norm by a point of the null space. The sag forces shift
-    the minimum norm a little, the point stays. At other poses the tensions stay as close as balance and limits allow.
+    Tensions in force balance are the minimum-norm tensions plus a point of the null space. The sag forces shift the
+    minimum-norm tensions slightly, but not this point. At other poses the tensions are as close to the chosen ones as
+    balance and limits allow.
     """
 
 
-WIDTH, BORDER = 340, 26  # px
-HEIGHTS: Final = (0, 74, 190)  # px, by the number of redundant cables
-BEYOND: Final = 0.5  # extension of an unbounded drawing, as a share of the size of its finite part
+WIDTH, BORDER = 340, 26  # height of the drawing of an interval [px]
+HEIGHTS: Final = (0, 74, 190)  # height of the drawing by the number of redundant cables [px]
+BEYOND: Final = 0.5  # extension of the drawing of an unbounded polygon, relative to the size of its finite part
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,12 +34,13 @@ class DotField:
     """Drawing of the feasible tensions."""
 
     polygon: TensionPolygon
-    # of the drawing, in coordinates of the null space [N], shape (h, r), r 1 or 2; an unbounded polygon is clipped
+    # corners of the drawing in coordinates of the null space [N], shape (h, r), r = 1 or 2; an unbounded polygon is
+    # clipped
     corners: Array
     # limit of each side, from corner k to corner k + 1 (at corner k for an interval)
     sides: tuple[Side | None, ...]
     low: Array  # lowest coordinates of the drawing [N], shape (r,)
-    high: Array  # highest [N], shape (r,)
+    high: Array  # highest coordinates of the drawing [N], shape (r,)
 
     @classmethod
     def of(cls, polygon: TensionPolygon, dot: Array, before: DotField | None = None) -> DotField:
@@ -84,7 +86,7 @@ class DotField:
             return np.clip(at, self.corners.min(axis=0), self.corners.max(axis=0))
         starts, ends = self.corners, np.roll(self.corners, -1, axis=0)
         along, away = ends - starts, at - starts
-        if np.all(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] >= 0.0):  # corners go around counter-clockwise
+        if np.all(along[:, 0] * away[:, 1] - along[:, 1] * away[:, 0] >= 0.0):  # corners are in counter-clockwise order
             return at
         length = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
         share = np.clip((along * away).sum(axis=1) / length, 0.0, 1.0)
@@ -102,7 +104,7 @@ def _extent(polygon: TensionPolygon, dot: Array) -> tuple[Array, Array]:
         return polygon.vertices.min(axis=0), polygon.vertices.max(axis=0)
     known = np.array([side is not None for side in polygon.sides])
     if polygon.vertices.shape[1] == 2:
-        known &= np.roll(known, 1)  # a corner between two limits
+        known &= np.roll(known, 1)  # a corner of two limits, not of the box
     points = np.vstack(
         (polygon.vertices[known], dot[None] if np.isfinite(dot).all() else polygon.vertices[:0], np.zeros_like(dot))
     )

@@ -43,7 +43,7 @@ class Camera(NamedTuple):
         return np.asarray(self.axes @ np.array([across, down, 1.0]))
 
     def project(self, points: Array) -> tuple[Array, Array]:
-        """Places of points (..., 3) in the picture [px], shape (..., 2), and depths [m], negative behind the camera."""
+        """Picture positions of points (..., 3) [px], shape (..., 2), and depths [m], negative behind the camera."""
         across, down, deep = np.moveaxis((points - self.place) @ self.axes, -1, 0)
         ahead = np.where(deep == 0.0, np.nan, deep)
         flat = np.stack((across / ahead, down / ahead), axis=-1) / self.reach
@@ -57,7 +57,7 @@ def camera_of(server: viser.ViserServer, client: int) -> Camera | None:
 
 
 def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
-    """Distance along a ray to a surface, in lengths of its direction; None if it misses.
+    """Distance along a ray to a surface, in lengths of its direction; None without an intersection.
 
     Source:
         Moeller & Trumbore, J. Graphics Tools 2, 1997.
@@ -76,7 +76,7 @@ def ray_distance(solid: Solid, start: Array, direction: Array) -> float | None:
 
 
 def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: float) -> int | None:
-    """Line within a distance [px] of a point of the picture, the front one of several; None if there is none."""
+    """Line within a distance [px] of a point of the picture, the front line if several are; None without a line."""
     places, deep = camera.project(lines)
     pixel = np.asarray(at) * camera.pixels
     start, run = places[:, :-1] - pixel, np.diff(places, axis=1)
@@ -89,12 +89,12 @@ def nearest_line(camera: Camera, at: tuple[float, float], lines: Array, within: 
     if not nearest.min() <= within:
         return None
     depth = np.take_along_axis(deep, away.argmin(axis=1)[:, None], axis=1)[:, 0]
-    as_near = nearest <= nearest.min() + 1.0  # px: includes cables that cross there
+    as_near = nearest <= nearest.min() + 1.0  # [px], includes cables that cross there
     return int(np.argmin(np.where(as_near, depth, np.inf)))
 
 
 def screen_point(value: Any) -> tuple[float, float] | None:
-    """Point of a picture in a message, (0, 0) at the upper left, (1, 1) at the lower right; None for invalid data."""
+    """Point of a picture in a message, from (0, 0) at the upper left to (1, 1) at the lower right; None if invalid."""
     try:
         x, y = (float(each) for each in value)
     except (TypeError, ValueError, OverflowError):
@@ -103,10 +103,10 @@ def screen_point(value: Any) -> tuple[float, float] | None:
 
 
 TOWARD: Final = np.array([0.42, -0.86, 0.36]) / np.linalg.norm([0.42, -0.86, 0.36])  # from the box to the camera
-FIELD = 0.7  # rad, vertical field of view: narrower than viser's, for less distortion
+FIELD = 0.7  # vertical field of view [rad], narrower than viser's for less distortion
 BORDER = 1.06  # factor on the size of the box, for a margin
 _USUAL = 1.3  # ratio of width to height until a client has sent its own
-_MOVED = 1e-3  # share of the box: a camera farther from its set position was moved by the user
+_MOVED = 1e-3  # share of the box: a camera farther than this from its set position was moved by the user
 _UP: Final = np.array([0.0, 0.0, 1.0])
 
 
@@ -144,19 +144,19 @@ def _centered(place: Array, distance: Array) -> float:
 
 
 class Framing:
-    """Keeps a box in the picture of every client that has not moved its camera."""
+    """Automatic framing of a box in the picture of every client that has not moved its camera."""
 
     def __init__(self, server: viser.ViserServer, low: Array, high: Array) -> None:
-        """Aim the cameras of present and future clients of a server."""
+        """Start framing for present and future clients of a server."""
         self._server = server
         self._low, self._high = low, high
         size = float(np.linalg.norm(high - low))
         self._near = _MOVED * size
-        self.farthest = 100.0 * size + float(np.abs([low, high]).max())  # m: limit of camera positions
+        self.farthest = 100.0 * size + float(np.abs([low, high]).max())  # limit of camera positions [m]
         self._places: dict[int, list[Array]] = {}  # set positions of each client's camera
         self._wanted: dict[int, Array] = {}  # position and target for clients that have not connected yet
-        self._directed: set[int] = set()  # clients whose camera follows a link, without framing
-        self._lock = threading.Lock()  # messages of cameras arrive in a pool of threads
+        self._directed: set[int] = set()  # clients with the camera of a link, without framing
+        self._lock = threading.Lock()  # messages of cameras arrive in several threads
         camera = server.initial_camera
         self._first, camera.look_at = fitted(low, high, _USUAL)
         camera.position = self._first
@@ -166,7 +166,7 @@ class Framing:
         server.on_client_disconnect(self._disconnect)
 
     def look(self, client: int, camera: Array) -> None:
-        """Set position and target of the camera of a client, as if the user had moved it."""
+        """Set position and target of the camera of a client; it then counts as moved by the user."""
         with self._lock:
             self._wanted[client] = camera
             known = self._server.get_clients().get(client)
@@ -174,7 +174,7 @@ class Framing:
             self._follow(known.camera)
 
     def moved(self, client: int) -> Array | None:
-        """Position and target of the camera of a client [m], shape (6,), if it was moved; else None."""
+        """Position and target of the camera of a client [m], shape (6,), if the user has moved it, else None."""
         known = self._server.get_clients().get(client)
         if known is None:
             return None
@@ -198,7 +198,7 @@ class Framing:
             self._directed.discard(client.client_id)
 
     def _follow(self, camera: viser.CameraHandle) -> None:
-        """Frame the box again when the picture has other proportions, unless the user has moved the camera."""
+        """Frame the box again if the proportions of the picture change, unless the user has moved the camera."""
         try:
             shape = np.array([camera.image_width, camera.image_height, camera.fov], dtype=np.float64)
             place = np.array(camera.position, dtype=np.float64).reshape(3)
@@ -213,7 +213,7 @@ class Framing:
         places = self._places.setdefault(camera.client.client_id, [])
         wanted = self._wanted.pop(camera.client.client_id, None)
         if wanted is not None:
-            places.append(self._first)  # the camera counts as moved by the user from now on
+            places.append(self._first)  # from now on the camera counts as moved by the user
             self._directed.add(camera.client.client_id)
             with camera.client.atomic():
                 camera.position, camera.look_at = wanted[:3], wanted[3:]

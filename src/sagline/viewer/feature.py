@@ -1,4 +1,4 @@
-"""Interface of the features of the viewer: the view that they follow, and background tasks."""
+"""Interface of the features of the viewer: the state of the page that they display, and background tasks."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from sagline.viewer.tension_scale import TensionScale
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """State of the page: configuration of the robot, and settings."""
+    """State of the page: configuration of the robot, and settings of the controls."""
 
     snapshot: Configuration
     settings: Settings
     scale: TensionScale  # colors of tensions
-    ghost: bool  # true if straight cables are drawn beside the real ones
-    wrench: Array | None = None  # external wrench on a platform that is dragged, shape (6,)
-    played: Played | None = None  # run, simulation or log, if it is shown; None for a pose of the user
-    playing: bool = False  # true if the clock runs
+    ghost: bool  # True if straight cables are drawn beside the sagging ones
+    wrench: Array | None = None  # external wrench on the platform while it is dragged, shape (6,)
+    played: Played | None = None  # played motion (run, simulation or log) if it is shown; None for a pose of the user
+    playing: bool = False  # True if the clock runs
 
     @property
     def state(self) -> Equilibrium | None:
-        """The shown equilibrium; None in motion, and if the pose is not feasible."""
+        """The shown equilibrium; None during a motion, and if the pose is not feasible."""
         snapshot = self.snapshot
         if not isinstance(snapshot, Snapshot) or snapshot.plan is None or not snapshot.feasible:
             return None
@@ -40,9 +40,9 @@ class View:
 
 
 class Feature:
-    """A feature of the page: its controls, its drawing, its text and its reactions; this one does nothing.
+    """Base of a feature of the page: its controls, drawing, text and reactions. The base does nothing.
 
-    It is created once, with the `Page`. All its methods are called by the serving thread.
+    A feature is created once, with the `Page`. The serving thread calls all its methods.
     """
 
     @property
@@ -52,34 +52,34 @@ class Feature:
 
     @property
     def waiting(self) -> bool:
-        """True if a result is still to come."""
+        """True while a result is being computed."""
         return False
 
     def depends(self, view: View) -> Hashable:
-        """Key of all inputs of `follow`, which is called only if the key changes; by default at every view."""
+        """Key of all inputs of `follow`, which is called only if the key changes; the default is a new key per view."""
         return view
 
     def follow(self, view: View) -> None:
-        """Draw and write for a new view."""
+        """Update drawing and text for a new view."""
 
     def tick(self) -> None:
-        """Do periodic work; called after every update, and at least every half second."""
+        """Do periodic work; it is called after every update, and at least every half second."""
 
     def put_on(self, played: Played | None) -> None:
-        """React to a change of the played motion, or to its end."""
+        """React to a new played motion, or to its removal."""
 
 
 T = TypeVar("T")
 
-PATIENCE: Final = 2.0  # s: the elapsed time of a longer calculation is shown
-NICENESS: Final = 10  # a drag has priority on a busy processor: it is then drawn up to twice as often
+PATIENCE: Final = 2.0  # [s], the elapsed time of a longer calculation is shown
+NICENESS: Final = 10  # increase of the niceness: on a busy processor, a drag is then drawn up to twice as often
 
 
 class BackgroundTask:
     """One calculation at a time in a separate thread; a new one replaces the previous one."""
 
     def __init__(self, later: Callable[[Callable[[], None]], None]) -> None:
-        """Prepare; `later` has the serving thread call a function, from any thread."""
+        """Store `later`, with which any thread makes the serving thread call a function."""
         self._later = later
         self._number = 0  # number of the last calculation
         self._began: float | None = None
@@ -97,7 +97,7 @@ class BackgroundTask:
         return elapsed if elapsed > PATIENCE else 0.0
 
     def start(self, task: Callable[[], T], done: Callable[[T], None], failed: Callable[[str], None]) -> None:
-        """Run a task, and in the serving thread `done` with its result or `failed` with its message."""
+        """Run a task; the serving thread then calls `done` with the result, or `failed` with the error message."""
         self._number += 1
         number = self._number
 

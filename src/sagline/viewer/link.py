@@ -1,4 +1,4 @@
-"""Text of a link, and the values of the controls in it."""
+"""Text of a link that contains the values of the controls."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.viewer.server import NAME
 
-LONGEST: Final = 4000  # characters of a link
-LONGEST_TEXT: Final = 60  # characters of a value, and of a quotation in a message
-FARTHEST: Final = 1e12  # limit of a number without own limits
+LONGEST: Final = 4000  # largest number of characters in a link
+LONGEST_TEXT: Final = 60  # largest number of characters in a value, and in a quotation in a message
+FARTHEST: Final = 1e12  # limit of numbers without limits of their own
 STEP: Final = "Copy the link again."
-_SAFE: Final = ",:.+"  # characters without escape after the number sign
+_SAFE: Final = ",:.+"  # characters that do not require an escape in a fragment
 _NUMBERS: Final = (viser.GuiSliderHandle, viser.GuiNumberHandle)
 _VECTORS: Final = (viser.GuiVector2Handle, viser.GuiVector3Handle)
 _KINDS: Final = (*_NUMBERS, *_VECTORS, viser.GuiDropdownHandle, viser.GuiCheckboxHandle, viser.GuiTextHandle)
@@ -54,7 +54,7 @@ def name_of(robot: Robot) -> str:
 
 
 def check_robot(text: str, robot: Robot) -> None:
-    """Refuse a link of another robot."""
+    """Reject a link of another robot."""
     name, own = text.rpartition(":")[0], name_of(robot)
     if text != own:
         other = "another robot of this name" if name == robot.name else repr((name or text)[:LONGEST_TEXT])
@@ -78,20 +78,20 @@ def numbers_of(text: str, item: str, unit: str, count: int, largest: float) -> A
 
 
 def shortest(number: float) -> str:
-    """A number with as many digits as distinguish it."""
+    """A number with the fewest digits that identify it."""
     return repr(number).removesuffix(".0")
 
 
 def short(label: str) -> str:
-    """Name of a control in a link: that of "Platform + load [kg]" is platform-load."""
+    """Name of a control in a link; for example, the name of "Platform + load [kg]" is platform-load."""
     return "-".join(re.findall(r"[a-z0-9]+", re.sub(r"\[.*?\]", "", label.lower())))
 
 
 class LinkedControls:
-    """All controls of a page, also those that are added later."""
+    """All controls of a page, including controls that are added later."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Store the present values as defaults; a link contains only values that differ from them."""
+        """Store the present values as defaults; links contain only values that differ from the defaults."""
         self._gui = gui
         self._defaults = {name: handle.value for name, handle in self._handles().items()}
 
@@ -102,16 +102,16 @@ class LinkedControls:
             if isinstance(handle, _KINDS) and handle.label != NAME and short(handle.label):
                 name = short(handle.label)
                 others = sum(short(other.label) == name for other in handles.values())
-                handles[f"{name}-{others + 1}" if others else name] = handle  # force, force-2 and so on
+                handles[f"{name}-{others + 1}" if others else name] = handle  # repeated names: force, force-2 and so on
         return handles
 
     def changes(self) -> dict[str, str]:
-        """Texts of the values that differ from the default ones, by the names of the controls."""
+        """Texts of the values that differ from the defaults, by the names of the controls."""
         known, defaults = self._handles().items(), self._defaults
         return {name: _text(each) for name, each in known if name not in defaults or defaults[name] != each.value}
 
     def read(self, texts: dict[str, str]) -> Callable[[], None]:
-        """Function that sets the controls to the values of a link, and all others to the default ones."""
+        """Function that sets the controls to the values of a link, and all others to their defaults."""
         handles = self._handles()
         unknown = next((name for name in texts if name not in handles), None)
         if unknown is not None:

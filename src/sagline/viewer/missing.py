@@ -26,7 +26,7 @@ from sagline.workspaces.region import Region, region_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
 ATTEMPTS: Final = 4
-MORE: Final = 1.0 + 1e-9  # factor on the wrench, to be slightly inside of the boundary despite rounding errors
+MORE: Final = 1.0 + 1e-9  # factor on the wrench; the pose is then slightly inside the boundary
 NEAR: Final = 1e-4  # relative distance to a limit below which a tension counts as at the limit
 _EXPLAINED: Final = (PoseStatus.INFEASIBLE, PoseStatus.BORDERLINE)
 
@@ -35,7 +35,7 @@ class _AtLimit(NamedTuple):
     """A cable at a limit."""
 
     cable: int  # index of the cable
-    lower: bool  # true if it is the lower limit, else the upper
+    lower: bool  # True for the lower limit, False for the upper limit
 
     @property
     def name(self) -> str:
@@ -45,25 +45,25 @@ class _AtLimit(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MissingWrench:
-    """Smallest wrench with which a pose is feasible; a force without moment if it suffices."""
+    """Smallest wrench with which a pose is feasible; a force without moment if a force suffices."""
 
-    wrench: Array  # about the center of mass, world axes [N, N m], shape (6,)
-    state: Equilibrium  # with this wrench, the blocking cables at their limits
+    wrench: Array  # missing wrench about the center of mass, world axes [N, N m], shape (6,)
+    state: Equilibrium  # plan with this wrench, in which the blocking cables are at their limits
     limits: tuple[_AtLimit, ...]  # the cables at limits
 
     @property
     def force(self) -> Array:
-        """Its force [N], shape (3,)."""
+        """Force of the wrench [N], shape (3,)."""
         return self.wrench[:3]
 
     @property
     def moment(self) -> Array:
-        """Its moment [N m], shape (3,); zero if a force alone suffices."""
+        """Moment of the wrench [N m], shape (3,); zero if a force alone suffices."""
         return self.wrench[3:]
 
 
 def missing_of(snapshot: Snapshot) -> MissingWrench | None:
-    """Missing wrench of an infeasible pose; None for other reasons, or where none was found."""
+    """Missing wrench of an infeasible pose; None for other failures, or if no wrench was found."""
     plan = snapshot.plan
     if plan is None or snapshot.status not in _EXPLAINED:
         return None
@@ -90,17 +90,17 @@ def _step(plan: Plan) -> Array:
     matrix, freedom = structure_matrix(robot, plan.state.pose), robot.freedom
     needed = np.zeros(6) if plan.needed is None else np.nan_to_num(plan.needed)
     turning = np.abs(freedom[:, 3:]).max(axis=1) > 0.5
-    lever = float(np.abs(matrix[turning]).max(initial=0.0)) or 1.0  # m: a moment counts as the force at this arm
+    lever = float(np.abs(matrix[turning]).max(initial=0.0)) or 1.0  # [m], a moment counts as the force at this arm
     unit = np.where(turning, 1.0 / lever, 1.0)
     low = robot.tension_min
-    high = np.maximum(robot.tension_max, low * (1.0 + 1e-9) + 1e-9)  # the solver needs low < high
+    high = np.maximum(robot.tension_max, low * (1.0 + 1e-9) + 1e-9)  # the solver requires low < high
     found = lsq_linear(unit[:, None] * matrix, unit * (freedom @ needed), (low, high), tol=1e-12)
     rest: Array = freedom.T @ (freedom @ needed - matrix @ found.x)
     return rest
 
 
 def _limits(plan: Plan, held: Plan) -> tuple[_AtLimit, ...]:
-    """Cables at limits: the blocking ones of the plan where a force suffices, else those with the smallest wrench."""
+    """Cables at limits: the plan's blocking cables if a force suffices, else cables at limits in `held`."""
     robot, tension = plan.state.one_robot, held.state.limited_tension
     to_lower, to_upper = tension - robot.tension_min, robot.tension_max - tension
     which = plan.blocking
@@ -110,24 +110,24 @@ def _limits(plan: Plan, held: Plan) -> tuple[_AtLimit, ...]:
 
 
 NODES: Final = 15  # nodes of the first grid along each axis
-AROUND: Final = 2  # points of a finer grid to each side
+AROUND: Final = 2  # points of a finer grid on each side of its center
 STARTS: Final = 4
 ITERATIONS: Final = 40
-FINEST: Final = 1e-6  # of the region's size
+FINEST: Final = 1e-6  # finest grid, relative to the region's size
 BLOCK: Final = 250  # positions per call: a few milliseconds, then other threads can run
-INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # from the border inward, as a share of the region's size
+INWARD: Final = (1e-5, 1e-4, 1e-3, 1e-2)  # steps inward from the boundary, as shares of the region's size
 
 
 class NearestFeasible(NamedTuple):
     """The nearest feasible pose."""
 
     pose: Pose
-    distance: float  # [m]
-    turned: bool  # true if the orientation differs too
+    distance: float  # distance from the given pose [m]
+    turned: bool  # True if the orientation differs too
 
 
 def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> NearestFeasible | None:
-    """Nearest feasible pose within the robot's region, at the orientation of a pose or level; None for none."""
+    """Nearest feasible pose within the robot's region, at the orientation of a pose or level; None if none exists."""
     for turned in (False, True):
         start = Pose(pose.position, np.eye(3)) if turned else pose
         if turned and np.allclose(start.matrix, pose.matrix):
@@ -135,7 +135,7 @@ def nearest_feasible(robot: Robot, pose: Pose, model: CableModel, wrench: Array 
         try:
             search = _Search(robot, start, model, wrench)
             found = search.nearest(pose.position)
-        except SaglineError:  # a motion pattern without this rotation
+        except SaglineError:  # the motion pattern excludes this rotation
             continue
         if found is not None:
             there = Pose.from_quaternion(found, start.quaternion)
@@ -171,7 +171,7 @@ class _Search:
         return self._inside(start, best)
 
     def _refined(self, start: Array, best: Array, step: Array) -> Array:
-        """The nearest feasible position near one, by finer and finer grids around it."""
+        """The nearest feasible position, starting from a feasible one, on finer and finer grids."""
         ways = np.linspace(-1.0, 1.0, 2 * AROUND + 1)
         offsets = np.stack(np.meshgrid(*[ways] * len(step), indexing="ij"), axis=-1).reshape(-1, len(step))
         for _ in range(ITERATIONS):
@@ -188,7 +188,7 @@ class _Search:
         return best
 
     def _inside(self, start: Array, best: Array) -> Array | None:
-        """A position a little inside the boundary, feasible for `inverse`."""
+        """A position slightly inside the boundary, at which `inverse` has a solution."""
         way = best - start
         way = way / max(float(np.linalg.norm(way)), 1e-12)
         for share in INWARD:

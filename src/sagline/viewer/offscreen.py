@@ -1,4 +1,4 @@
-"""Off-screen scenes, their pictures, and the legend below."""
+"""Off-screen scenes, their pictures, and the legends below the pictures."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def strip_of(view: View, *remarks: str) -> dict[str, Any]:
     }
 
 
-PATIENCE: Final = 30.0  # s to wait for a picture
-NAMES: Final = ("/names", "/platform/notice")  # nodes left out of pictures
+PATIENCE: Final = 30.0  # longest wait for a picture [s]
+NAMES: Final = ("/names", "/platform/notice")  # nodes that pictures omit
 STATIC: Final = ("/hull", "/slice")  # nodes that do not change over time
 BORDER: Final = 1.06  # factor on the robot's size, for a margin
 SHAPES: Final = 0.8, 2.4  # smallest and largest ratio of width to height
-DEEPEST: Final = 950.0  # m from the camera: in requested pictures viser draws nothing beyond 1000 m
-_FIRST: Final = 32  # px, size of the discarded first picture
+DEEPEST: Final = 950.0  # largest depth [m]: viser does not draw objects beyond 1000 m in requested pictures
+_FIRST: Final = 32  # size of the discarded first picture [px]
 
 
 class Shot(NamedTuple):
@@ -57,12 +57,12 @@ class Shot(NamedTuple):
     width: int  # [px]
     field: float  # vertical field of view [rad]
     pixel: float  # size of a pixel at the distance of the robot [m]
-    # distance in front of the client's camera, for robots that end beyond the drawing distance [m]
+    # advance of the client's camera, for robots that extend beyond the largest depth [m]
     forward: float
 
     @classmethod
     def of(cls, camera: viser.CameraHandle, low: Array, high: Array, width: int, height: int = 0) -> Shot:
-        """A picture of the part of a box that a client's window shows, for any proportions of the window."""
+        """Picture of the visible part of a box in a client's window, for any proportions of the window."""
         right, up, far, forward = _seen(camera, low, high)
         rows = height or round(width / float(np.clip(right / up, *SHAPES)))
         slope = BORDER * max(up, right * rows / width)
@@ -70,7 +70,7 @@ class Shot(NamedTuple):
 
 
 def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, float, float, float]:
-    """Extent of a box to the side and upward [slope], its distance, and the advance of the camera [m]."""
+    """Visible extent of a box to the side and upward [slope], its distance, and the advance of the camera [m]."""
     try:
         eye = np.array(camera.position, dtype=np.float64).reshape(3)
         edge = tan(0.5 * float(camera.fov)) * np.array([float(camera.aspect), 1.0])
@@ -83,15 +83,15 @@ def _seen(camera: viser.CameraHandle, low: Array, high: Array) -> tuple[float, f
         raise InvalidValueError("camera", "not known", "a position, a direction and a field of view", step) from None
     depth = place[:, 2]
     far, forward = float(depth.mean()), max(0.0, float(depth.max()) - DEEPEST)
-    if depth.min() <= forward:  # some of the box is behind the camera
+    if depth.min() <= forward:  # part of the box is behind the camera
         return float(edge[0]), float(edge[1]), max(far, 0.1 * float(np.linalg.norm(high - low))), 0.0
     reach, nearer = (np.abs(place[:, :2] / (depth - nearer)[:, None]).max(axis=0) for nearer in (0.0, forward))
-    right, up = (nearer * np.minimum(1.0, edge / reach)).tolist()  # the part shown in the window
+    right, up = (nearer * np.minimum(1.0, edge / reach)).tolist()  # the part within the window
     return right, up, far - forward, forward
 
 
 def _turn(camera: viser.CameraHandle) -> Rotation:
-    """From a camera's axes, right, down and forward, to those of the world."""
+    """Rotation from a camera's axes (right, down and forward) to the world axes."""
     return Rotation.from_quat(np.array(camera.wxyz, dtype=np.float64).reshape(4), scalar_first=True)
 
 
@@ -107,7 +107,7 @@ class _OffscreenScene:
         played: Played | None,
         line_width: float,
     ) -> None:
-        """Build the scene of what is played, or of the view."""
+        """Build the scene of the played motion, or of the view."""
         self._client, self._shot = client, shot
         snapshot = view.snapshot
         robot, home = (snapshot.robot, snapshot.pose) if played is None else (played.robot, played.home)
@@ -131,7 +131,7 @@ class _OffscreenScene:
             )
 
     def take(self, kind: Literal["png", "jpeg"]) -> None:
-        """Have the page take and store a picture, and wait for this."""
+        """Make the page take and store a picture, and wait for it."""
         self._render(self._shot.height, self._shot.width, kind)
 
     def _render(self, height: int, width: int, kind: Literal["png", "jpeg"]) -> None:
@@ -152,23 +152,23 @@ def offscreen_scene(
     line_width: float,
     played: Played | None = None,
 ) -> Iterator[_OffscreenScene]:
-    """Context of an off-screen scene."""
+    """Context manager of an off-screen scene."""
     try:
         yield _OffscreenScene(client, server, shot, view, played, line_width)
     finally:
         client.scene.reset()
 
 
-TEXT: Final = 8.0  # pt
-LINE: Final = 0.3  # pt on paper for a pixel on a screen: about one for a cable
+TEXT: Final = 8.0  # text size [pt]
+LINE: Final = 0.3  # points on paper per pixel on a screen; a cable is about 1 pt wide
 TOPIC: Final = "picture"
 
 
 class _Paper(NamedTuple):
-    """A size of print."""
+    """Size of a printed picture."""
 
-    width: float  # [in]
-    dots: int  # per inch
+    width: float  # width [in]
+    dots: int  # dots per inch
 
     @property
     def pixels(self) -> int:
@@ -195,7 +195,7 @@ def save_picture(
     *,
     strip: bool,
 ) -> None:
-    """Have a client's page save a picture of the view from its camera, without gizmo and labels."""
+    """Make a client's page save a picture of the view from its camera, without gizmo and labels."""
     text = TEXT * paper.dots / 72.0
     beneath = round(HEIGHT * text) if strip else 0
     shot = Shot.of(client.camera, *extent, paper.pixels)

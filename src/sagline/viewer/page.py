@@ -1,4 +1,4 @@
-"""Page of a robot: one thread waits for a change, solves and draws; callbacks only wake it."""
+"""Page of a robot. One thread waits for a change, solves and draws; callbacks only wake this thread."""
 
 from __future__ import annotations
 
@@ -32,35 +32,35 @@ from sagline.viewer.server import Channel
 from sagline.viewer.snapshot import Settings, Snapshot, depends_on_history, snapshot_at
 from sagline.viewer.tension_scale import TensionScale
 
-FRAME_TIME = 1.0 / 60.0  # s: shortest time between updates
-SOON = 0.05  # s: longest wait while the result of a background task is expected
-IDLE = 0.5  # s: longest wait; Ctrl-C is not noticed earlier where waiting cannot be interrupted
+FRAME_TIME = 1.0 / 60.0  # shortest time between updates [s]
+SOON = 0.05  # longest wait for the result of a background task [s]
+IDLE = 0.5  # longest wait [s], which also is the longest delay of Ctrl-C on systems that cannot interrupt a wait
 
 F = TypeVar("F", bound=Feature)
 
 
 class Source(NamedTuple):
-    """Python expressions for the objects that a page was opened with."""
+    """Python expressions for the objects with which a page was opened."""
 
-    robot: str = ""  # "" where it is not known
-    mass: float | None = None  # of the platform with a payload [kg]; None for the robot's own
-    played: str = ""  # plan, simulation or execution; "" for none
+    robot: str = ""  # robot; "" if unknown
+    mass: float | None = None  # mass of the platform with a payload [kg]; None for the robot's own mass
+    played: str = ""  # plan, simulation or execution; "" if there is none
 
     @classmethod
     def of_robot(cls, name_or_path: str | PathLike[str], mass: float | None = None) -> Source:
-        """A robot by its name or its file, perhaps with another mass [kg]."""
+        """A robot from its name or its file, possibly with another mass [kg]."""
         return cls(f"sl.load_robot({fspath(name_or_path)!r})", mass)
 
     @classmethod
     def of_file(cls, kind: str, file: PathLike[str]) -> Source:
-        """A plan, simulation, execution or calibration in a file."""
+        """A plan, simulation, execution or calibration from a file."""
         loaded = f"sl.load_{kind}({fspath(file)!r})"
         robot = f"{loaded}.state.one_robot" if kind == "plan" else f"{loaded}.robot"
         return cls(robot, None, "" if kind == "calibration" else loaded)
 
 
 class Page:
-    """Page of a robot, optionally with a run or simulation; the caller starts and stops the server.
+    """Page of a robot, optionally with a run or simulation. The caller starts and stops the server.
 
     Its state is used in the thread of `serve`; other threads call only `later`, `refresh`, `extend` and `stop`.
 
@@ -75,13 +75,13 @@ class Page:
         scale: Colors of tensions.
         size: Size of the robot [m].
         home: Initial pose of the platform.
-        extent: Lowest and highest corner of all that is drawn [m].
-        wrench: External wrench on the platform while it is dragged, shape (6,), as `inverse` takes it; None for none.
-        found: A calibration of the robot to be shown; None for none.
-        mode: Name of the mode that moves at first, "1" or "massless 1"; "" for none.
-        source: Expressions for what the page was opened with.
-        view: The view that is shown; None at first, and the one before while features follow.
-        features: All features, in the order in which they follow.
+        extent: Lowest and highest corner of everything that is drawn [m].
+        wrench: External wrench on the platform while it is dragged, shape (6,), as in `inverse`; None if there is none.
+        found: A calibration of the robot to show; None if there is none.
+        mode: Name of the initially animated mode, "1" or "massless 1"; "" if there is none.
+        source: Expressions for the objects with which the page was opened.
+        view: The shown view; None at first. While features follow a new view, it is the previous view.
+        features: All features, in the order of their updates.
         updates: Number of views that were shown.
     """
 
@@ -119,10 +119,10 @@ class Page:
         self.player = Player(played, self._put_on, beside)
         self.features = tuple(feature for make in features if (feature := make(self)) is not None)
         self._build_gizmo()
-        self._depended: dict[Feature, Hashable] = {}  # on which each feature depended when it followed last
-        self._traced: tuple[int, int, float] = (0, 0, 0.0)  # key of the traces that are drawn
-        self._extended = 0  # number of extensions of what is played
-        self._changed: tuple[tuple[float, float, float], Robot] | None = None  # settings, and the robot with them
+        self._depended: dict[Feature, Hashable] = {}  # key of each feature at its last update
+        self._traced: tuple[int, int, float] = (0, 0, 0.0)  # key of the drawn traces
+        self._extended = 0  # number of extensions of the played motion
+        self._changed: tuple[tuple[float, float, float], Robot] | None = None  # settings, and the robot with these
         self._previous: Plan | None = None  # plan of the previous pose, for a method that depends on history
 
     def serve(self) -> None:
@@ -145,23 +145,23 @@ class Page:
             last = now
 
     def later(self, task: Callable[[], None]) -> None:
-        """Have the serving thread call a function; from any thread."""
+        """Make the serving thread call a function; callable from any thread."""
         self._tasks.append(task)
         self._wake.set()
 
     def refresh(self) -> None:
-        """Show everything again; from any thread."""
+        """Show everything again; callable from any thread."""
         self._wake.set()
 
     def extend(self, played: Played) -> None:
-        """Replace what is played by a longer version of it; from any thread.
+        """Replace the played motion by a longer version of it; callable from any thread.
 
         A clock at its end moves to the new end; a clock at an earlier time stays there.
         """
         self.later(lambda: self._extend(played))
 
     def stop(self) -> None:
-        """Let `serve` return; from any thread."""
+        """Make `serve` return; callable from any thread."""
         self._stopping.set()
         self._wake.set()
 
@@ -172,11 +172,11 @@ class Page:
 
     @property
     def state(self) -> Equilibrium | None:
-        """The shown equilibrium; None in motion, and if the pose is not feasible."""
+        """The shown equilibrium; None during a motion, and if the pose is not feasible."""
         return None if self.view is None else self.view.state
 
     def feature(self, kind: type[F]) -> F:
-        """The feature of a type."""
+        """The feature with a given type."""
         return next(each for each in self.features if isinstance(each, kind))
 
     def go(self, pose: Pose) -> None:
@@ -195,7 +195,7 @@ class Page:
         self.go(pose)
 
     def check_near(self, pose: Pose) -> None:
-        """Refuse a pose out of reach."""
+        """Reject a pose out of reach."""
         self.scene.check_near(pose.position)
         both = np.stack((self.home.position, pose.position)), np.stack((self.home.quaternion, pose.quaternion))
         check_reach(self.robot, Pose.from_quaternion(*both), "pose")
@@ -212,7 +212,7 @@ class Page:
             self._tasks.popleft()()
 
     def _put_on(self, played: Played | None) -> None:
-        """Play another motion, or none."""
+        """Play another motion, or stop playing."""
         if played is None:
             self.scene.show_traces(np.empty((0, 3)), np.empty((0, 3)))
         for feature in self.features:
@@ -236,7 +236,7 @@ class Page:
         self._previous = None
 
     def _update(self) -> None:
-        """Solve and show once."""
+        """Solve and show the present state once."""
         player = self.player
         try:
             settings = self.panel.settings()
@@ -255,7 +255,7 @@ class Page:
         robot, pose = self._changed[1], self.scene.dragged_pose()
         snapshot = snapshot_at(robot, pose, settings, self._previous, self.wrench)
         if not depends_on_history(settings.tension):
-            self._forget()  # the tensions of another method are no history
+            self._forget()  # the tensions of another method are not a history
         elif snapshot.feasible:
             self._previous = snapshot.plan
         return snapshot

@@ -16,7 +16,7 @@ from sagline.viewer.by_hand import BY_HAND, ByHand
 from sagline.viewer.snapshot import METHODS, MODELS, Settings, depends_on_history
 from sagline.viewer.tension_scale import TensionScale
 
-LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # px
+LEFT_WIDTH, RIGHT_WIDTH = 310, 380  # width of the panel [px]
 _LIGHTEST, _HEAVIEST = 0.1, 4.0  # limits relative to the robot's mass
 
 
@@ -31,7 +31,7 @@ class ControlPanel:
         changed: Callable[[], None],
         forget: Callable[[], None],
     ) -> None:
-        """Build the panels; any thread calls `changed` when a value changes, and `forget` to reset the history."""
+        """Build the panels. Any thread calls `changed` after a change of a value, and `forget` to reset the history."""
         self._gui = server.gui
         self._changed = changed
         self._forget = forget
@@ -51,11 +51,11 @@ class ControlPanel:
                 self._polygon = self._gui.add_html("")
         readings.dock_right()
         readings.set_width(RIGHT_WIDTH)
-        readings.expand()  # in the bottom sheet of a small screen it starts closed
+        readings.expand()  # closed at first in the bottom sheet of a small screen
 
     @property
     def ghost(self) -> bool:
-        """True if straight cables are drawn beside the real ones."""
+        """True if straight cables are drawn beside the sagging ones."""
         return bool(self._ghost.value)
 
     def settings(self) -> Settings:
@@ -79,7 +79,7 @@ class ControlPanel:
         return METHODS[self._method_name]
 
     def show_what_if(self, reason: str) -> None:
-        """Show the controls that change the robot, or the reason why it cannot be changed."""
+        """Show the controls that change the robot, or the reason why the robot cannot be changed."""
         shown = not reason
         for handle in (self._mass, self._density, self._stiffness, self._model, self._method):
             handle.visible = shown
@@ -102,7 +102,7 @@ class ControlPanel:
 
     @property
     def method_name(self) -> str:
-        """Name of the tension distribution method that was chosen last."""
+        """Name of the last chosen tension distribution method."""
         return self._method_name
 
     def choose_method(self, name: str) -> None:
@@ -110,7 +110,7 @@ class ControlPanel:
         self._method.value = name
 
     def choose_by_hand(self, method: ByHand) -> None:
-        """Choose tensions by hand; the list of methods contains this choice from then on."""
+        """Choose tensions by hand, and add this choice to the list of methods."""
         self._by_hand = method
         if BY_HAND not in self._method.options:
             self._method.options = (*METHODS, BY_HAND)
@@ -118,11 +118,11 @@ class ControlPanel:
         self._changed()
 
     def refuse(self, message: str) -> None:
-        """Write why a setting is refused."""
+        """Write the reason why a setting is invalid."""
         self._verdict.content = readout.refused(message)
 
     def watched(self, handle: Any) -> Any:
-        """A control that calls `changed` on a change."""
+        """Make a control call `changed` after every change."""
         handle.on_update(lambda _: self._changed())
         return handle
 
@@ -183,7 +183,7 @@ def _slid(slider: Any) -> float:
 
 
 def written_mass(mass: float) -> float:
-    """A mass [kg] with the digits that its field shows; a calibrated mass has more."""
+    """A mass [kg] rounded to the digits of its field; a calibrated mass has more digits."""
     return float(f"{mass:.5g}")
 
 

@@ -1,4 +1,4 @@
-"""Plans and simulations as the timeline plays them."""
+"""Plans and simulations in the form for the timeline."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ def _event_text(event: Occurrence, unit: ForceUnit) -> str:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedPlan:
-    """A plan of N poses, with the poses confirmed by forward kinematics."""
+    """A plan of N poses, with its poses confirmed by forward kinematics."""
 
     plan: Plan
-    confirmation: Confirmation  # with exact cables
+    confirmation: Confirmation  # confirmed poses with exact cables
     time: Array  # times of the samples from 0 [s], shape (N,); one second per pose without a path
 
     name = "run"
@@ -83,7 +83,7 @@ class PlayedPlan:
         return float(self.time[-1])
 
     def index_at(self, time: float) -> int:
-        """Number of the sample at or before a time [s]."""
+        """Index of the sample at or before a time [s]."""
         return _sample_at(self.time, time)
 
     def at(self, time: float) -> Snapshot:
@@ -94,7 +94,7 @@ class PlayedPlan:
         return Snapshot(plan.state.one_robot, plan.state.pose, plan, rest)
 
     def code(self, source: str, time: float) -> list[str]:
-        """Lines of Python of a sample; `source` is an expression for the plan."""
+        """Lines of Python for a sample; `source` is an expression for the plan."""
         index = self.index_at(time)
         lines = [f"plan = {source}", f"index = {index}"]
         lines += ["robot, pose = plan.state.one_robot, plan.state.pose[index]", "tension = plan.chord_tension[index]"]
@@ -116,14 +116,14 @@ class PlayedPlan:
         return Track(self.time, (tension, length), infeasible_spans(plan, self.time, unit), (), paths)
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Desired and actual positions (n, 3), n <= most, the error drawn some times as large; NaN in gaps."""
+        """Desired and actual positions (n, 3), n <= most, with a scaled error; NaN in gaps."""
         rows = np.unique(np.linspace(0, len(self.time) - 1, most).astype(np.intp))
         wanted = self.plan.state.pose.position[rows]
         return wanted, wanted + error_scale * self.confirmation.position_error[rows]
 
 
 def _sample(plan: Plan, i: int) -> Plan:
-    """The plan of one of its poses."""
+    """The plan of one pose of a plan."""
     values = {field.name: getattr(plan, field.name) for field in fields(plan)}
     entries = {name: value[i] for name, value in values.items() if isinstance(value, np.ndarray)}
     return replace(plan, state=plan.state[i], path=None, **entries)
@@ -189,7 +189,7 @@ class PlayedSimulation:
         )
 
     def code(self, source: str, time: float) -> list[str]:
-        """Lines of Python of a sample; `source` is an expression for the simulation."""
+        """Lines of Python for a sample; `source` is an expression for the simulation."""
         index = _sample_at(self.time, time)
         return [
             f"simulation = {source}",
@@ -199,7 +199,7 @@ class PlayedSimulation:
         ]
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """No desired positions, and the actual ones (n, 3), n <= most."""
+        """Actual positions (n, 3), n <= most, without desired positions."""
         rows = np.unique(np.linspace(0, self.time.size - 1, most).astype(np.intp))
         actual = self.simulation.pose.position[rows]
         return np.full_like(actual, np.nan), actual

@@ -23,22 +23,22 @@ from sagline.viewer.timeline import Track
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InMotion:
-    """One sample of a simulation or of a log, drawn from the lengths of its cables or from their nodes."""
+    """One sample of a simulation or a log, drawn from the lengths of its cables or from their nodes."""
 
     robot: Robot
     pose: Pose
     index: int  # index of the sample
-    tension: Array  # [N], shape (m,); NaN if there is none
-    length: Array  # unstrained, off the drums [m], shape (m,); NaN if there is none
+    tension: Array  # tensions [N], shape (m,); NaN if unknown
+    length: Array  # unstrained lengths off the drums [m], shape (m,); NaN if unknown
     verdict: str  # HTML of the state and of the events
     heads: tuple[str, ...]  # column heads of the table of cables
-    columns: Sequence[Sequence[str]]  # of that table, a text for each cable
-    why_no_choice: str  # reason why tensions are not chosen
+    columns: Sequence[Sequence[str]]  # columns of this table, one text per cable
+    why_no_choice: str  # reason why tensions cannot be chosen
     feasible: bool = True
-    rest: Pose | None = None  # second pose that is shown
-    truth: Pose | None = None  # true pose, where it is known
+    rest: Pose | None = None  # second pose to show
+    truth: Pose | None = None  # true pose, if known
     nodes: Array | None = None  # positions of the cables at their nodes [m], shape (m, P, 3)
-    broken: list[int] = field(default_factory=list)  # cables that have broken
+    broken: list[int] = field(default_factory=list)  # True for broken cables
     notice: str = ""  # label of a platform that is not feasible
 
     def numbers(self, scale: TensionScale) -> str:
@@ -55,7 +55,7 @@ class InMotion:
         return courses
 
     def _catenaries(self, sag_scale: float) -> Array:
-        """Points of catenaries of the lengths, which leave their pulleys where their chords do."""
+        """Points of catenaries with the given lengths; their exit points are those of the chords."""
         robot, pose = self.robot, self.pose
         wraps = shapes.wraps(robot, pose, None)
         ends = shapes.chords(robot, pose, wraps[:, -1])
@@ -75,11 +75,11 @@ Configuration: TypeAlias = Snapshot | InMotion
 
 
 class Played(Protocol):
-    """A run, a simulation or a log."""
+    """Played motion: a run, a simulation or a log."""
 
     @property
     def name(self) -> str:
-        """Name of its kind."""
+        """Name of the kind of motion."""
 
     @property
     def robot(self) -> Robot:
@@ -91,20 +91,20 @@ class Played(Protocol):
 
     @property
     def duration(self) -> float:
-        """Time of its end [s]."""
+        """Time of the end [s]."""
 
     @property
     def unchanged(self) -> str:
-        """Text in place of the controls that would change the robot."""
+        """Text in place of the controls for changes of the robot."""
 
     def at(self, time: float) -> Configuration:
         """Configuration at a time [s]."""
 
     def code(self, source: str, time: float) -> list[str]:
-        """Lines of Python of the sample at a time [s]; `source` is an expression for what is played."""
+        """Lines of Python for the sample at a time [s]; `source` is an expression for the motion."""
 
     def traces(self, most: int, error_scale: float) -> tuple[Array, Array]:
-        """Desired and actual positions (n, 3), n <= most, the error scaled by a factor; NaN in gaps."""
+        """Desired and actual positions (n, 3), n <= most, with a scaled error; NaN in gaps."""
 
     def track(self) -> Track:
         """Charts of the timeline."""
@@ -123,22 +123,22 @@ class Timeline:
 
     duration: float  # time of the end [s]
     time: float = 0.0  # shown time [s], 0 to duration
-    playing: bool = False  # true if the clock runs
+    playing: bool = False  # True if the clock runs
 
     def advanced(self, elapsed: float, speed: float) -> Timeline:
-        """Clock after an interval of real time [s] at a speed, the ratio of times; it stops at the end."""
+        """Clock after an interval of real time [s] at a speed (ratio of the times); it stops at the end."""
         if not self.playing:
             return self
         time = self.time + max(elapsed, 0.0) * speed
         return Timeline(self.duration, min(time, self.duration), time < self.duration)
 
     def extended(self, duration: float) -> Timeline:
-        """Clock with a later end [s]; a paused clock at the end stays at the end."""
+        """Clock with a later end [s]; a paused clock at the former end moves to the new end."""
         time = duration if self.time >= self.duration and not self.playing else self.time
         return Timeline(duration, time, self.playing)
 
     def toggled(self) -> Timeline:
-        """Clock that runs if it was paused, from the start if it was at the end; else a paused one."""
+        """Running clock if this one is paused, from the start if it is at its end; otherwise a paused clock."""
         time = 0.0 if not self.playing and self.time >= self.duration else self.time
         return Timeline(self.duration, time, not self.playing)
 
@@ -151,20 +151,20 @@ class PlayerState(NamedTuple):
     """State of a player."""
 
     played: Played | None
-    original: bool  # true if the page was opened with it
+    original: bool  # True if the page was opened with it
     clock: Timeline
-    following: bool  # true if it was shown, and not a pose of the user
+    following: bool  # True if the motion was shown, False for a pose of the user
 
 
 class Player:
-    """A run, a simulation or a log, and its clock.
+    """Player of a run, a simulation or a log, with its clock.
 
     Attributes:
-        played: Played motion; None for none.
-        clock: Its clock.
-        following: True if it is shown, and not a pose of the user.
-        speed: Ratio of its time to real time.
-        number: Number of what is played; a longer version has the same.
+        played: Played motion; None if there is none.
+        clock: Clock of the motion.
+        following: True if the motion is shown, False for a pose of the user.
+        speed: Ratio of the time of the motion to real time.
+        number: Number of the played motion; a longer version has the same number.
     """
 
     def __init__(
@@ -173,14 +173,14 @@ class Player:
         put_on: Callable[[Played | None], None],
         beside: Beside | None = None,
     ) -> None:
-        """Play a motion or none; `put_on` is called whenever another motion is played."""
+        """Play a motion, or None; `put_on` is called whenever another motion is played."""
         self._put_on, self._original, self._beside = put_on, original, beside
         self.speed, self.number = 1.0, 0
         self.play(original)
 
     @property
     def is_original(self) -> bool:
-        """True if the page was opened with what is played."""
+        """True if the page was opened with the played motion."""
         return self.played is self._original
 
     @property
@@ -189,7 +189,7 @@ class Player:
         return self._beside if self.played is not None and self.is_original else None
 
     def play(self, played: Played | None, *, at_once: bool = False) -> None:
-        """Play something else, or nothing."""
+        """Play another motion, or stop playing."""
         self.played = played
         self.number += 1
         self.following = played is not None
@@ -197,8 +197,8 @@ class Player:
         self._put_on(played)
 
     def extend(self, played: Played) -> None:
-        """Replace the original by a longer version; a clock at its end moves to the new end."""
-        shown = self.is_original  # else the simulation of a cut is shown
+        """Replace the original motion by a longer version; a clock at the former end moves to the new end."""
+        shown = self.is_original  # otherwise the simulation of a cut is shown
         self._original = played
         if shown:
             self.played = played
@@ -215,7 +215,7 @@ class Player:
         return PlayerState(self.played, self.is_original, self.clock, self.following)
 
     def restore(self, kept: PlayerState) -> None:
-        """Return to a state; the original includes later extensions."""
+        """Return to a stored state; the original motion keeps its later extensions."""
         self.play(self._original if kept.original else kept.played)
         self.clock = self.clock.scrubbed(kept.clock.time)
         if kept.clock.playing:
@@ -232,16 +232,16 @@ class Player:
         return self.played.at(self.clock.time)
 
     def leave(self) -> None:
-        """Pause, and show the pose of the user."""
+        """Pause, and show a pose of the user."""
         self.clock = self.clock.scrubbed(self.clock.time)
         self.following = False
 
     def follow(self) -> None:
-        """Show what is played, if anything is."""
+        """Show the played motion, if there is one."""
         self.following = self.played is not None
 
     def toggle(self) -> None:
-        """Play, or pause."""
+        """Play or pause."""
         self.clock = self.clock.toggled()
         self.follow()
 

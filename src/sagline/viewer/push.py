@@ -1,4 +1,4 @@
-"""Response of the platform to a force: displacement, reserve up to a limit, compliance."""
+"""Response of the platform to a force: displacement, reserve up to a limit, and compliance."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from sagline.robot.equilibrium import Equilibrium
 from sagline.robot.pose import Pose
 from sagline.statics.stiffness import stiffness
 
-FORCES: Final = 24  # trials in an iteration, which narrows the bounds of a limit to a 23rd
+FORCES: Final = 24  # trials per iteration, which narrows the bounds of a limit by a factor of about 23
 ITERATIONS: Final = 4
 SMALLEST: Final = 1e-4  # first trial, as a share of the largest force
-BEYOND: Final = 1e3  # largest force, of the robot's weight and tensions, if its cables have no upper limit
-AT_LIMIT: Final = 1e-9  # share of the largest tension: smaller excess over a limit counts as at the limit
+BEYOND: Final = 1e3  # largest force, relative to weight and tensions, for cables without an upper limit
+AT_LIMIT: Final = 1e-9  # relative to the largest tension: a smaller excess over a limit counts as at the limit
 
 
 class Push(NamedTuple):
     """A force on the platform."""
 
-    force: Array  # world axes [N], shape (3,)
+    force: Array  # force in world axes [N], shape (3,)
     at: Array  # point at which it acts, platform frame [m], shape (3,)
 
     def wrench(self, state: Equilibrium, factor: Array | float = 1.0) -> Array:
-        """Wrench on the platform at an equilibrium, the force scaled by a factor, shape (..., 6)."""
+        """Wrench on the platform at an equilibrium, with the force multiplied by factors, shape (..., 6)."""
         lever = state.pose.matrix @ (self.at - state.one_robot.center_of_mass)
         own = np.concatenate((self.force, np.cross(lever, self.force)))
         return np.asarray(state.wrench + np.multiply.outer(factor, own))
@@ -41,9 +41,9 @@ class Push(NamedTuple):
 class Reserve(NamedTuple):
     """Largest force in a direction."""
 
-    force: float  # its magnitude [N]; infinite where no limit was found
-    cable: int | None = None  # the cable that reaches its limit first; None if unknown
-    upper: bool = False  # true if that is its upper limit
+    force: float  # magnitude of the force [N]; infinite if no limit was found
+    cable: int | None = None  # index of the cable that reaches its limit first; None if unknown
+    upper: bool = False  # True if this is its upper limit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +64,7 @@ class PushResponse:
 
     @property
     def displacement(self) -> Array:
-        """Displacement of the point at which it acts [m], shape (3,); NaN if unknown."""
+        """Displacement of the point of application [m], shape (3,); NaN if unknown."""
         if self.loaded is None:
             return np.full(3, np.nan)
         return np.asarray(self.loaded.pose.transform(self.push.at) - self.state.pose.transform(self.push.at))
@@ -77,7 +77,7 @@ class PushResponse:
         return np.asarray((self.loaded.pose.rotation * self.state.pose.rotation.inv()).as_rotvec())
 
     def scaled_pose(self, factor: float) -> Pose | None:
-        """Pose with the force, its motion scaled by a factor."""
+        """Pose with the force, with its motion multiplied by a factor."""
         if self.loaded is None:
             return None
         rest, rotation = self.state.pose, Rotation.from_rotvec(factor * self.rotation) * self.state.pose.rotation
@@ -111,7 +111,7 @@ def semi_axes(compliance: Array) -> tuple[Array, Array]:
 
 
 def _reserve(state: Equilibrium, push: Push) -> Reserve:
-    """Largest force before a tension is at a limit, the lengths kept."""
+    """Largest force until a tension reaches a limit, at constant lengths."""
     robot, unit = state.one_robot, Push(push.force / np.linalg.norm(push.force), push.at)
     lengths = np.tile(state.unstrained_length, (FORCES, 1))
     edge = AT_LIMIT * float(np.nanmax(state.limited_tension))
@@ -138,7 +138,7 @@ def _reserve(state: Equilibrium, push: Push) -> Reserve:
 
 
 def _redistributed(state: Equilibrium, push: Push) -> Reserve:
-    """Largest force for which tensions within the limits balance the platform at its pose."""
+    """Largest force that tensions within the limits can balance at the pose of the state."""
     robot, unit = state.one_robot, Push(push.force / np.linalg.norm(push.force), push.at)
     poses = Pose.from_quaternion(np.tile(state.pose.position, (FORCES, 1)), np.tile(state.pose.quaternion, (FORCES, 1)))
 
@@ -150,7 +150,7 @@ def _redistributed(state: Equilibrium, push: Push) -> Reserve:
 
 
 def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[float, float]:
-    """Bounds of the first force that exceeds a limit [N]; infinite where none does."""
+    """Bounds of the first force that exceeds a limit [N]; infinite if no force does."""
     low, forces = 0.0, np.geomspace(SMALLEST * largest, largest, FORCES)
     high = np.inf
     for _ in range(ITERATIONS):
@@ -164,7 +164,7 @@ def _bracket(is_exceeded: Callable[[Array], Flags], largest: float) -> tuple[flo
 
 
 def _upper_bound(state: Equilibrium) -> float:
-    """A force larger than the cables of the robot can balance [N]."""
+    """A force that is larger than the cables of the robot can balance [N]."""
     robot = state.one_robot
     weight = robot.mass * robot.gravity
     if np.isfinite(robot.tension_max).all():

@@ -31,7 +31,7 @@ def html_block(content: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """HTML of a remark."""
+    """HTML of a sentence."""
     return f'<div class="sagline quiet">{text}</div>'
 
 
@@ -43,7 +43,7 @@ def verdict(snapshot: Snapshot) -> str:
 
 
 def headline(snapshot: Snapshot) -> str:
-    """The verdict in a word or two; a pose neither feasible nor proved infeasible is named by its status."""
+    """The verdict in one or two words; it is the status if a pose is neither feasible nor proved infeasible."""
     if snapshot.feasible:
         return "Feasible"
     if snapshot.status is PoseStatus.INFEASIBLE:
@@ -52,7 +52,7 @@ def headline(snapshot: Snapshot) -> str:
 
 
 def refused(message: str) -> str:
-    """Box of a setting that is refused."""
+    """Box for an invalid setting."""
     return verdict_box("bad", "Not possible", escape(message))
 
 
@@ -90,7 +90,7 @@ def legend(scale: TensionScale, robot: Robot) -> str:
 
 
 def verdict_box(kind: str, head: str, text: str) -> str:
-    """A verdict in a box: "good", "bad" or "quiet"."""
+    """A verdict in a box of a class: "good", "bad" or "quiet"."""
     return (
         f'<div class="sagline sagline-verdict {kind}"><h2>{head}</h2>'
         f'<div style="color:var(--sagline-text)">{text}</div></div>'
@@ -98,7 +98,7 @@ def verdict_box(kind: str, head: str, text: str) -> str:
 
 
 def definitions(rows: Iterable[tuple[str, str]], kind: str = "") -> str:
-    """HTML of a list of names and descriptions, perhaps of a class of page.css."""
+    """HTML of a list of names and descriptions, optionally with a class of page.css."""
     start = f'<dl class="{kind}">' if kind else "<dl>"
     return start + "".join(f"<dt>{name}</dt><dd>{text}</dd>" for name, text in rows) + "</dl>"
 
@@ -109,12 +109,12 @@ def swatch(color: Array | Color) -> str:
 
 
 def color_key(entries: Iterable[tuple[Array | Color, str]]) -> str:
-    """HTML of a key: colors and their meanings."""
+    """HTML of a legend: colors and their meanings."""
     return "".join(f'<span class="key">{swatch(color)}{text}</span>' for color, text in entries)
 
 
 def cable_table_html(heads: Iterable[str], columns: Sequence[Sequence[str]], colors: Array | Colors) -> str:
-    """HTML of a table with a row per cable: number with its color, and its texts of each column."""
+    """HTML of a table with one row per cable: its number with its color, and its text in each column."""
     rows = "".join(
         f"<tr><td>{swatch(colors[i])}{i}</td>{''.join(f'<td>{text}</td>' for text in texts)}</tr>"
         for i, texts in enumerate(zip(*columns, strict=True))
@@ -123,7 +123,7 @@ def cable_table_html(heads: Iterable[str], columns: Sequence[Sequence[str]], col
 
 
 def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:
-    """Ticks and their positions, without those that would overlap the one before."""
+    """Ticks and their positions, without ticks that would overlap the previous tick."""
     kept: list[tuple[float, float]] = []
     for tick in scale.ticks():
         place = float(scale.fraction(np.array(tick)))
@@ -152,14 +152,14 @@ def _summary(snapshot: Snapshot) -> str:
 
 
 def _ends(robot: Robot) -> str:
-    """Meaning of the ends of the scale: limits, where the robot has them."""
+    """Meaning of the two ends of the scale: limits, if the robot has limits."""
     low = "lowest allowed" if robot.tension_min.min() > 0.0 else "no lower limit"
     high = "highest allowed" if np.isfinite(robot.tension_max).all() else "no upper limit"
     return f"ends: {low}, {high}"
 
 
 def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
-    """The tension nearest to its limit, the limit and the distance; or all that are at their limits."""
+    """The tension nearest to its limit, with the limit and the distance; or all tensions at their limits."""
     margin, robot = snapshot.margin, snapshot.robot
     reach = _ALONE * float(np.nanmax(np.where(np.isfinite(robot.tension_max), robot.tension_max, margin.max())))
     at = np.flatnonzero(margin <= reach)
@@ -173,7 +173,7 @@ def _nearest_limit(snapshot: Snapshot, unit: ForceUnit) -> str:
 
 
 def pose_line(pose: Pose) -> str:
-    """Position and angles."""
+    """Text of position and angles."""
     position = ", ".join(number_text(value, ".3f") for value in pose.position)
     turned = ", ".join(f"{number_text(value, '.1f')}°" for value in pose.rotation.as_euler("ZYX", degrees=True))
     return f"<b>Position</b> {position} m<br><b>α, β, γ</b> {turned}"
@@ -196,7 +196,7 @@ def _cable_numbers(snapshot: Snapshot, scale: TensionScale) -> str:
 
 
 def _wrap_column(snapshot: Snapshot) -> dict[str, tuple[Array, str]]:
-    """Wrap angles [degree] and how they are written, of a robot with pulleys."""
+    """Wrap angles [degree] and their format, for a robot with pulleys."""
     radius = pulleys_of(snapshot.robot).radius
     if not radius.any():
         return {}
@@ -206,7 +206,7 @@ def _wrap_column(snapshot: Snapshot) -> dict[str, tuple[Array, str]]:
 
 
 def _pulley_line(robot: Robot) -> str:
-    """Pulleys and dead lengths, with a remark where the path of a dead length is not known."""
+    """Pulleys and dead lengths, with a remark if the path of a dead length is unknown."""
     winches = robot.winches
     if winches is None or not winches.anything_behind:
         return ""
@@ -228,7 +228,7 @@ def _listed(frequencies: Array | None) -> str:
 
 
 def _pressed(mode: int, frequency: float) -> str:
-    """A frequency [Hz] that is pressed to see its mode move, where it has one."""
+    """A frequency [Hz]; if it has a mode, it is a button that animates the mode."""
     text = number_text(frequency, ".2f")
     if not frequency > 0.0:  # also excludes NaN
         return text

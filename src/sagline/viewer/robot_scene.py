@@ -23,14 +23,14 @@ from sagline.viewer.tension_scale import Colors, TensionScale
 
 
 class Nodes:
-    """Nodes of a scene by name, created when they are first drawn and updated afterward.
+    """Nodes of a scene by name. A node is created when it is first drawn, and updated afterward.
 
     Attributes:
         scene: The scene.
     """
 
     def __init__(self, scene: viser.SceneApi, pixel: float = 0.0) -> None:
-        """Draw nothing yet; `pixel` [m] is the width of a line of 1 px, 0 for that of the screen."""
+        """Begin without nodes; `pixel` is the size of a pixel [m], 0 for line widths in pixels of the screen."""
         self.scene, self._pixel = scene, pixel
         self._made: dict[str, Any] = {}
 
@@ -39,7 +39,7 @@ class Nodes:
         node = self._made.get(name)
         points = values.get("points")
         if node is not None and points is not None and len(node.points) != len(points):
-            node.remove()  # another number of points and colors would not arrive together
+            node.remove()  # points and colors of another number would not arrive together
             node = None
         if node is None:
             node = self._made[name] = make(name, visible=visible, **values)
@@ -50,7 +50,7 @@ class Nodes:
         return node
 
     def lines(self, name: str, segments: Array, color: Any, width: float) -> None:
-        """Draw segments (k, 2, 3) of a width [px], in one color or in those of their ends."""
+        """Draw segments (k, 2, 3) of a width [px], in one color or in the colors of their ends."""
         if not len(segments):
             self.hide(name)
             return
@@ -89,7 +89,7 @@ class Nodes:
         )
 
     def body(self, name: str, solid: Solid, color: Any, opacity: float, pose: Pose, position: Any = None) -> None:
-        """Draw a solid at a pose, or with the rotation of the pose at another position."""
+        """Draw a solid at a pose, optionally at another position."""
         place = pose.position if position is None else position
         self.draw(name, self.scene.add_frame, show_axes=False, position=place, wxyz=np.roll(pose.quaternion, 1))
         self.draw(
@@ -108,43 +108,43 @@ class Nodes:
                 self._made[name].visible = False
 
     def keep_first(self, name: str, count: int) -> None:
-        """Remove the nodes below a name that are numbered from a count on."""
+        """Remove the numbered nodes below a name, starting with a given number."""
         while f"{name}/{count}" in self._made:
             self.remove(f"{name}/{count}")
             count += 1
 
     def remove(self, *names: str) -> None:
-        """Remove nodes and those below them, if they exist."""
+        """Remove nodes and the nodes below them, if they exist."""
         for name in names:
             for found in [each for each in self._made if each == name or each.startswith(f"{name}/")][::-1]:
                 self._made.pop(found).remove()
 
 
-# Contrast to the white and to the dark background: 3 : 1 or more, except for the floor.
+# Colors have a contrast of at least 3 : 1 on the white and on the dark background, except for the floor.
 STEEL, DRUM, FLOOR, SECTION = (120, 128, 138), (104, 112, 122), (172, 178, 186), (132, 138, 146)
 PLATFORM, INFEASIBLE, REST = (58, 134, 201), (220, 56, 48), (200, 118, 16)
 TRUTH = (150, 90, 190)
-SKY, GROUND, SKYLIGHT = (255, 255, 255), (130, 130, 130), 3.5  # light from above and from below, and its intensity
-WANTED, ACTUAL = PLATFORM, REST  # the paths of these two platforms
+SKY, GROUND, SKYLIGHT = (255, 255, 255), (130, 130, 130), 3.5  # light from above and below, and its intensity
+WANTED, ACTUAL = PLATFORM, REST  # colors of the desired and the actual path
 GHOST = (128, 134, 142)
-CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # px
+CABLE_WIDTH, GHOST_WIDTH, TRACE_WIDTH, ARM_WIDTH = 3.5, 1.5, 2.5, 3.0  # line widths [px]
 TRACE_POINTS = 600
-NEAR = 0.03  # anchors this close have one label, as a share of the robot's size
-FAR = 5.0  # of the robot's size: largest distance of the platform from the middle; larger ones are invalid data
-APART = 0.0035  # smaller distances between chord and cable are not visible, as a share of the robot's size
-_ARM = 0.12  # longest arm of the axes (share of the robot's size)
-_BELOW: Final = np.array([0.02, 0.07, 0.03])  # space for the axes and their names (share of the robot's size)
-_ABOVE: Final = np.array([0.02, 0.0, 0.08])  # space for the names of cables
-_GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo (share of the robot's size)
+NEAR = 0.03  # anchors closer than this have one label, as a share of the robot's size
+FAR = 5.0  # largest valid distance of the platform from the middle, as a share of the robot's size
+APART = 0.0035  # smallest visible distance between chord and cable, as a share of the robot's size
+_ARM = 0.12  # longest arm of the axes, as a share of the robot's size
+_BELOW: Final = np.array([0.02, 0.07, 0.03])  # space for the axes and their names, as shares of the robot's size
+_ABOVE: Final = np.array([0.02, 0.0, 0.08])  # space for the names of cables, as shares of the robot's size
+_GIZMO: Final = (0.09, 0.16)  # smallest and largest reach of the gizmo, as shares of the robot's size
 
 
 class RobotScene:
-    """The robot's parts in a scene, which all clients of a server see and may drag."""
+    """The robot's parts in a scene, which all clients of a server see and can drag."""
 
     def __init__(
         self, scene: viser.SceneApi, robot: Robot, home: Pose, *, live: bool = True, pixel: float = 0.0
     ) -> None:
-        """Build the scene with the platform at home."""
+        """Build the scene with the platform at its home pose."""
         self._scene, self._live, self._pixel = scene, live, pixel
         self._build_lights()
         self._low, self._high = shapes.bounds(robot)
@@ -157,7 +157,7 @@ class RobotScene:
         self._platform: Any = self._scene.add_mesh_simple("/platform/body", body.vertices, body.faces, color=PLATFORM)
         self._rest_frame = self._scene.add_frame("/rest", show_axes=False, visible=False)
         self._scene.add_mesh_simple("/rest/body", body.vertices, body.faces, color=REST, opacity=0.55)
-        self._truth: Any = None  # created when it is known for the first time
+        self._truth: Any = None  # created when it is first known
         self._over_pulleys = pulleys_of(robot).radius > 0.0
         self._wheels = self._build_pulleys(robot, home) if self._over_pulleys.any() else None
         blank = np.zeros((robot.cable_count * (shapes.points_per_cable(robot) - 1), 2, 3))
@@ -176,7 +176,7 @@ class RobotScene:
         return gizmo
 
     def extent(self, pose: Pose) -> tuple[Array, Array]:
-        """Lowest and highest corner of all that is drawn with the platform at a pose, with names and axes [m]."""
+        """Lowest and highest corner of the whole drawing with the platform at a pose, with names and axes [m]."""
         corners = np.vstack((self._low, self._high, pose.transform(self._body.vertices), self._winches.vertices))
         return corners.min(axis=0) - _BELOW * self._size, corners.max(axis=0) + _ABOVE * self._size
 
@@ -191,7 +191,7 @@ class RobotScene:
         return Pose.from_quaternion(position, unit(np.roll(wxyz, -1)))
 
     def check_near(self, position: Array) -> None:
-        """Refuse invalid positions, and those far outside of the robot."""
+        """Reject invalid positions and positions far outside the robot."""
         far = FAR * self._size
         if not np.all(np.abs(position - 0.5 * (self._low + self._high)) < far):
             raise InvalidValueError(
@@ -232,19 +232,19 @@ class RobotScene:
             _move(self._truth, drawn.pose, drawn.truth, error_scale)
 
     def swing(self, rest: Pose, pose: Pose, courses: Array) -> None:
-        """Draw the platform and the cables (m, P, 3) displaced, with the gizmo at the rest pose."""
+        """Draw the displaced platform and cables (m, P, 3), with the gizmo at the pose of rest."""
         back = rest.rotation.inv()
         self._platform.position = back.as_matrix() @ (pose.position - rest.position)
         self._platform.wxyz = np.roll((back * pose.rotation).as_quat(), 1)
         self._cables.points = shapes.segments(courses, dashed=False).astype(np.float32)
 
     def settle(self) -> None:
-        """Move the platform back to its gizmo."""
+        """Move the platform back to the pose of its gizmo."""
         self._platform.position = np.zeros(3)
         self._platform.wxyz = np.array([1.0, 0.0, 0.0, 0.0])
 
     def show_traces(self, wanted: Array, actual: Array) -> None:
-        """Draw the desired and the actual path (n, 3), which replace those before; with gaps at NaN."""
+        """Draw the desired and the actual path (n, 3) instead of the previous paths; NaN is a gap."""
         while self._traces:
             self._traces.pop().remove()
         for name, points, color in (("/wanted", wanted, WANTED), ("/actual", actual, ACTUAL)):
@@ -254,15 +254,15 @@ class RobotScene:
                 self._traces.append(self._scene.add_line_segments(name, known, color, **self._wide(TRACE_WIDTH)))
 
     def _wide(self, pixels: float) -> dict[str, Any]:
-        """Arguments of the width of lines."""
+        """Arguments for the width of lines."""
         if self._pixel == 0.0:
             return {"thickness": pixels, "thickness_units": "screen"}
         return {"thickness": pixels * self._pixel, "thickness_units": "world"}
 
     def _build_lights(self) -> None:
-        """Add light from above and below, without shadows and environment map, for pages without a graphics card.
+        """Add light from above and below without shadows and environment map, for computers without a graphics card.
 
-        There, the environment map of viser would block the page for five seconds.
+        On these, the environment map of viser would block the page for five seconds.
         """
         self._scene.configure_environment_map(hdri=None)
         self._scene.configure_default_lights(cast_shadow=False)
@@ -294,7 +294,7 @@ class RobotScene:
             )
 
     def _build_pulleys(self, robot: Robot, pose: Pose) -> viser.BatchedMeshHandle:
-        """Pulleys in their size; they swivel with the platform."""
+        """Draw pulleys in their real size; they swivel with the platform."""
         wheel, which = shapes.wheel(), self._over_pulleys
         return self._scene.add_batched_meshes_simple(
             "/pulleys", wheel.vertices, wheel.faces, shapes.pulley_rotations(robot, pose)[which],
@@ -303,7 +303,7 @@ class RobotScene:
         )  # fmt: skip
 
     def _build_dead_cables(self, robot: Robot) -> None:
-        """Dead lengths, dashed where only their rise is known."""
+        """Draw dead lengths, dashed if only their rise is known."""
         runs, upright = shapes.dead_runs(robot)
         for name, which in (("/dead", upright), ("/dead_assumed", ~upright)):
             shown = runs[which & (runs[:, 0, 2] != runs[:, 1, 2])]
@@ -312,7 +312,7 @@ class RobotScene:
                 self._scene.add_line_segments(name, pieces, STEEL, **self._wide(GHOST_WIDTH))
 
     def _build_axes(self) -> None:
-        """World axes at a corner of the floor, with a round length as the scale."""
+        """Draw world axes at a corner of the floor, with a round length as the scale."""
         arm = shapes.round_below(_ARM * self._size)
         corner = self._low - np.array([0.0, 0.06 * self._size, 0.0])
         arms = np.stack((np.zeros((3, 3)), arm * np.eye(3)), axis=1) + corner
@@ -324,11 +324,11 @@ class RobotScene:
         )
 
     def _build_gizmo(self, robot: Robot, body: shapes.Solid) -> viser.TransformControlsHandle:
-        free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5  # world axes along which the platform may move
+        free = np.abs(robot.freedom[:, :3]).max(axis=0) > 0.5  # world axes along which the platform can move
         least, most = (share * self._size for share in _GIZMO)
         return self._scene.add_transform_controls(
             "/platform", scale=float(np.clip(1.6 * np.abs(body.vertices).max(), least, most)), line_width=2.0,
-            depth_test=True,  # drawn in front of what is behind the platform
+            depth_test=True,  # drawn in front of objects behind the platform
             opacity=0.8,
             active_axes=(bool(free[0]), bool(free[1]), bool(free[2])),
             disable_rotations=robot.motion_pattern not in ROTATING,
@@ -336,7 +336,7 @@ class RobotScene:
 
 
 def _move(frame: Any, pose: Pose, other: Pose | None, error_scale: float) -> None:
-    """Move a frame to another pose, its distance scaled by a factor; hide it where that is not known."""
+    """Move a frame to another pose, with its distance scaled by a factor; hide it if the pose is unknown."""
     frame.visible = other is not None and bool(np.isfinite(other.position).all())
     if frame.visible and other is not None:
         frame.position = scaled_position(pose, other, error_scale)
@@ -349,25 +349,25 @@ def scaled_position(pose: Pose, other: Pose, factor: float) -> Array:
 
 
 def cable_segments(drawn: Configuration, sag_scale: float) -> Array:
-    """Segments of the cables (m (P - 1), 2, 3), dashed where the pose is not feasible."""
+    """Segments of the cables (m (P - 1), 2, 3), dashed if the pose is not feasible."""
     return shapes.segments(drawn.courses(sag_scale), dashed=not drawn.feasible)
 
 
 def chord_segments(drawn: Configuration, sag_scale: float, apart: float) -> Array:
-    """Segments of the chords where a cable is farther from its own than a distance [m]; else of zero length."""
+    """Segments of the chords; zero length where the cable is closer to its chord than a distance [m]."""
     free = drawn.courses(sag_scale)[:, -shapes.POINTS :]
     chords = shapes.straight(free[:, [0, -1]])
     return shapes.segments(chords, dashed=False, shown=np.linalg.norm(free - chords, axis=2) > apart)
 
 
 def cable_colors(drawn: Configuration, scale: TensionScale) -> Colors:
-    """Colors of both ends of every segment as viser takes them, shape (m (P - 1), 2, 3)."""
+    """Colors of both ends of every segment in the form for viser, shape (m (P - 1), 2, 3)."""
     ends = 2 * (shapes.points_per_cable(drawn.robot) - 1)
     return np.repeat(scale.linear_colors(drawn.tension), ends, axis=0).reshape(-1, 2, 3)
 
 
 def _neighbors(points: Array, near: float) -> list[tuple[Array, list[int]]]:
-    """Points (m, 3) in groups about as close as `near`: middle and members of each group."""
+    """Groups of points (m, 3) with distances of about `near`: middle and members of each group."""
     groups: list[list[int]] = []
     for i, point in enumerate(points):
         home = next((group for group in groups if np.linalg.norm(points[group[0]] - point) < near), None)

@@ -1,7 +1,7 @@
-"""Web server with our title, styles and scripts in the page of viser, and the channel of messages to and from pages.
+"""Web server of viser's page with additional title, styles and scripts, and the channel for messages of pages.
 
-The channel (the other end is browser/channel.js) is beside the messages of viser: a hidden text field carries the
-messages of pages, hidden pieces of HTML those to pages, which viser repeats to clients that connect later.
+The channel, whose other end is browser/channel.js, is independent of viser's own messages. Messages from pages arrive
+in a hidden text field. Messages to pages are hidden pieces of HTML, which viser repeats to clients that connect later.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from viser import infra
 from sagline.core.errors import InvalidValueError
 
 STYLES: Final = ("page.css", "state.css", "keys.css", "balance.css", "film.css", "timeline.css")
-SCRIPTS: Final = (  # in the order in which they run, before viser's client
+SCRIPTS: Final = (  # in the order of execution, before viser's client
     "theme.js", "channel.js", "choices.js", "dress.js", "dialog.js",
     "pose.js", "copies.js", "link.js", "names.js", "said.js", "keys.js",
     "dot.js", "hand.js",
@@ -36,10 +36,10 @@ SCRIPTS: Final = (  # in the order in which they run, before viser's client
 NAME: Final = "sagline"  # title, label of the hidden text field, and prefix of the hidden pieces of HTML
 LOOPBACK: Final = "127.0.0.1"
 PORT: Final = 8080
-LOUD: Final = ("websockets.server", "asyncio")  # loggers
-LONGEST: Final = 10_000  # characters of a message of a page
+LOUD: Final = ("websockets.server", "asyncio")  # loggers to silence
+LONGEST: Final = 10_000  # largest number of characters in a message from a page
 _STOCK = infra.WebsockServer
-_ICON = (  # a platform on two cables that sag
+_ICON = (  # icon: a platform on two cables that sag
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" rx="7" fill="#10335c"/>'
     '<path d="M4 6Q7 19 13 20M28 6Q25 19 19 20" fill="none" stroke="#f9973f"'
     ' stroke-width="2.6" stroke-linecap="round"/>'
@@ -51,13 +51,13 @@ Handler = Callable[[Any, int], None]
 
 
 class ClientFile(NamedTuple):
-    """A file or folder of viser's client, with the methods of a path that its web server uses."""
+    """A file or folder of viser's client, with the methods of `Path` that the web server uses."""
 
     path: Path
-    title: str  # of the page
+    title: str  # title of the page
 
     def __truediv__(self, name: str) -> ClientFile:
-        """A file in this folder."""
+        """A file or folder in this folder."""
         return ClientFile(self.path / name, self.title)
 
     def is_file(self) -> bool:
@@ -65,13 +65,13 @@ class ClientFile(NamedTuple):
         return self.path.is_file()
 
     def read_bytes(self) -> bytes:
-        """Its content; that of the first page is ours."""
+        """Content of the file; the content of the first page is `_own_page`."""
         content = self.path.read_bytes()
         return page_html(content.decode(), self.title).encode() if self.path.name == "index.html" else content
 
 
 def page_html(html: str, title: str) -> str:
-    """Page of viser with our title and icon; our styles and scripts are last in its head, to take precedence."""
+    """Page of viser with another title and icon; the last styles and scripts in its head take precedence."""
     ours = files("sagline.viewer").joinpath("browser")
     style, script = ("".join(ours.joinpath(name).read_text("utf-8") for name in names) for names in (STYLES, SCRIPTS))
     html = html.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1).replace('rel="icon"', "", 1)
@@ -82,7 +82,7 @@ def page_html(html: str, title: str) -> str:
 
 @contextmanager
 def _serving_our_page(title: str) -> Iterator[None]:
-    """Context in which a viser server that is made serves our page."""
+    """Context manager; a viser server that is created in it serves the changed page."""
 
     class PageServer(_STOCK):
         def __init__(self, **options: Any) -> None:
@@ -97,11 +97,11 @@ def _serving_our_page(title: str) -> Iterator[None]:
 
 
 _running: list[PageServer] = []
-_quiet_process = ExitStack()  # silences logging of the whole process while any server runs
+_quiet_process = ExitStack()  # silences the logging of the whole process while a server runs
 
 
 class PageServer(viser.ViserServer):
-    """A viser server with our page; no page can ask it to open a tunnel to the internet."""
+    """A viser server with the changed page; no page can make it open a tunnel to the internet."""
 
     def __init__(self, host: str, port: int, title: str) -> None:
         """Start serving, with a title for the panel and the browser's tab."""
@@ -109,16 +109,16 @@ class PageServer(viser.ViserServer):
             super().__init__(host=host, port=port, label=title, verbose=False)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuse: viser would publish this machine's page under a public address."""
+        """Reject the request, because viser would publish the page under a public address."""
         return None
 
 
 def start_server(host: str = LOOPBACK, port: int = PORT, title: str = NAME) -> PageServer:
-    """Start a server at an address ("0.0.0.0" is every one) and a port (0 for any that is free).
+    """Start a server at an address ("0.0.0.0" for all addresses) and a port (0 for any free port).
 
     Raises:
-        InvalidValueError: If the port is in use or the address is not of this machine; viser itself would take the
-            next port, or wait forever.
+        InvalidValueError: If the port is in use or the address does not belong to this computer; viser itself would
+            take the next port or wait forever.
     """
     _check(host, port)
     with ExitStack() as quiet:
@@ -142,16 +142,16 @@ def stop_server(server: PageServer) -> None:
 
 
 def url(server: PageServer, host: str) -> str:
-    """The address to open in a browser on this machine."""
+    """The address for a browser on this computer."""
     shown = "localhost" if host in ("0.0.0.0", "::", "") else f"[{host}]" if ":" in host else host
     return f"http://{shown}:{server.get_port()}"
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Context without log entries and warnings on clients that disconnect or send nonsense, and on gimbal lock.
+    """Context without log entries and warnings about disconnected clients, invalid messages and gimbal lock.
 
-    A rotation with gimbal lock has many triples of angles; one of them is shown.
+    A rotation with gimbal lock has many sets of three angles; one of them is shown.
     """
     levels = {name: logging.getLogger(name).level for name in LOUD}
     for name in LOUD:
@@ -166,7 +166,7 @@ def _quiet() -> Iterator[None]:
         for name, level in levels.items():
             logging.getLogger(name).setLevel(level)
         for each in ours:
-            with suppress(ValueError):  # it may have been removed
+            with suppress(ValueError):  # another thread may have removed it
                 warnings.filters.remove(each)  # type: ignore[attr-defined]
 
 
@@ -199,7 +199,7 @@ def chosen_by(topic: str, value: str | int) -> str:
 
 
 class Messages:
-    """Messages to pages, the latest of each topic; values are those of JSON."""
+    """Messages to pages, the latest of each topic; values are JSON values."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         """Begin without messages."""
@@ -207,7 +207,7 @@ class Messages:
         self._sent: dict[str, Any] = {}  # HTML, by topic
 
     def send(self, topic: str, value: Any) -> None:
-        """Send a value under a topic; it replaces the one before."""
+        """Send a value under a topic; it replaces the previous value."""
         content = f"{NAME}:{topic}:{json.dumps(value, separators=(',', ':'), allow_nan=False)}"
         if topic not in self._sent:
             self._sent[topic] = self._gui.add_html(content, visible=False)
@@ -216,51 +216,51 @@ class Messages:
 
 
 class Channel(Messages):
-    """Messages to and from pages."""
+    """Messages between server and pages."""
 
     def __init__(self, gui: viser.GuiApi, later: Callable[[Callable[[], None]], None]) -> None:
-        """Add the text field; `later` has the serving thread call a function."""
+        """Add the text field; `later` makes the serving thread call a function."""
         super().__init__(gui)
         self._later = later
         self._handlers: dict[str, Handler] = {}
-        self._clients: dict[int, Messages] = {}  # by number
+        self._clients: dict[int, Messages] = {}  # clients by number
         self._field = gui.add_text(NAME, "", visible=False)
 
         @self._field.on_update
-        async def _(event: Any) -> None:  # a coroutine keeps the order of messages, viser's threads do not
+        async def _(event: Any) -> None:  # coroutines preserve the order of messages, which viser's threads do not
             self._receive(event.target.value, event.client_id)
 
     def on(self, topic: str, handler: Handler) -> None:
-        """Have the serving thread call a handler with the messages of a topic."""
+        """Make the serving thread call a handler with the messages of a topic."""
         self._handlers[topic] = handler
 
     def send_to(self, client: int, topic: str, value: Any) -> None:
-        """Send a value to one client, unless it has left."""
+        """Send a value to one client, unless it has disconnected."""
         messages = self._clients.get(client)
         if messages is not None:
             messages.send(topic, value)
 
     async def connect(self, client: viser.ClientHandle) -> None:
-        """Confirm to a client that its messages arrive from now on; viser drops earlier ones.
+        """Confirm to a client that its messages arrive from now on; viser drops earlier messages.
 
-        A coroutine that awaits nothing is called before the next message of the client is read; a thread is not.
+        A coroutine without await runs before the next message of the client is read; a thread may run later.
         """
         messages = self._clients[client.client_id] = Messages(client.gui)
         messages.send("welcome", True)
 
     async def disconnect(self, client: viser.ClientHandle) -> None:
-        """Forget a client that has left."""
+        """Remove a client that has disconnected."""
         self._clients.pop(client.client_id, None)
 
     def _receive(self, text: Any, client: int | None) -> None:
-        """Pass a message to the serving thread; anything else is ignored."""
+        """Pass a message to the serving thread, and ignore invalid messages."""
         if client is None or not isinstance(text, str) or len(text) > LONGEST:
             return
         try:
             message = json.loads(text)
             topic, value = message["topic"], message["value"]
             handler = self._handlers[topic]
-            json.dumps(value, ensure_ascii=False, allow_nan=False).encode()  # half a surrogate pair cannot be sent
+            json.dumps(value, ensure_ascii=False, allow_nan=False).encode()  # an incomplete surrogate pair is invalid
         except (ValueError, TypeError, KeyError, RecursionError):
             return
         self._later(lambda: handler(value, client))

@@ -1,4 +1,4 @@
-"""Logs of the controller, as the timeline plays them."""
+"""Logs of the controller in the form for the timeline."""
 
 from __future__ import annotations
 
@@ -42,31 +42,31 @@ WRONG = (State.FAULT, State.EMERGENCY)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedLog:
-    """N cycles of a controller, from time 0 on."""
+    """N cycles of a controller, starting at time 0."""
 
     robot: Robot
     time: Array  # times of the cycles from 0 [s], shape (N,)
     began: float  # time of the first cycle on the clock of the link [s]
     state: Codes  # codes of `State`, shape (N,)
     late: Array  # delay of each cycle [s], shape (N,)
-    position: Array  # of the platform's origin, estimated [m], shape (N, 3); NaN if it is not known
-    quaternion: Array  # estimated, shape (N, 4)
-    planned: Array  # position [m], shape (N, 3); NaN without a plan
-    planned_quaternion: Array  # shape (N, 4)
-    true: Array | None  # true position [m], shape (N, 3); None if it is not known
-    true_quaternion: Array | None  # shape (N, 4)
-    tension: Array  # at the frame ends, as read [N], shape (N, m)
-    planned_tension: Array  # [N], shape (N, m)
-    length: Array  # from the encoders, with the zero of homing [m], shape (N, m)
-    set_length: Array  # set points [m], shape (N, m)
+    position: Array  # estimated position of the platform's origin [m], shape (N, 3); NaN if unknown
+    quaternion: Array  # estimated quaternions, shape (N, 4)
+    planned: Array  # planned positions [m], shape (N, 3); NaN without a plan
+    planned_quaternion: Array  # planned quaternions, shape (N, 4)
+    true: Array | None  # true positions [m], shape (N, 3); None if unknown
+    true_quaternion: Array | None  # true quaternions, shape (N, 4)
+    tension: Array  # measured tensions at the frame ends [N], shape (N, m)
+    planned_tension: Array  # planned tensions [N], shape (N, m)
+    length: Array  # lengths from the encoders, with the zeros of homing [m], shape (N, m)
+    set_length: Array  # set points of the lengths [m], shape (N, m)
     events: tuple[Event, ...]
-    shown: Array = field(init=False)  # number of the last cycle before each whose position is known, or the first
+    shown: Array = field(init=False)  # index of the last cycle with a known position up to each cycle, or of the first
 
     name = "log"
     unchanged = "A log keeps its robot and loads; drag the platform to change them."
 
     def __post_init__(self) -> None:
-        """Find the cycle whose position is shown for each cycle."""
+        """Determine for each cycle the cycle whose position is shown."""
         known = np.flatnonzero(np.isfinite(self.position[:, 0]))
         last = np.searchsorted(known, np.arange(len(self.time)), side="right") - 1
         rows = known[np.maximum(last, 0)] if known.size else np.full(len(self.time), -1)
@@ -83,7 +83,7 @@ class PlayedLog:
         return float(self.time[-1])
 
     def pose_at(self, index: int) -> Pose:
-        """Planned pose of a cycle; without a plan the estimated one, or the one before."""
+        """Planned pose of a cycle; without a plan, its estimated pose or the last known one."""
         if np.isfinite(self.planned[index]).all():
             return Pose.from_quaternion(self.planned[index], self.planned_quaternion[index])
         row = int(self.shown[index])
@@ -135,7 +135,7 @@ class PlayedLog:
         )
 
     def code(self, source: str, time: float) -> list[str]:
-        """Lines of Python of a cycle; `source` is an expression for the execution."""
+        """Lines of Python for a cycle; `source` is an expression for the execution."""
         index = self._index_at(time)
         return [
             f"log = {source}",
@@ -149,7 +149,7 @@ class PlayedLog:
 
     @staticmethod
     def _pose(positions: Array | None, quaternions: Array | None, k: int) -> Pose | None:
-        """Pose of a cycle; None if it is not known."""
+        """Pose of a cycle; None if unknown."""
         if positions is None or quaternions is None or not np.isfinite(positions[k]).all():
             return None
         return Pose.from_quaternion(positions[k], quaternions[k])
@@ -198,7 +198,7 @@ class PlayedLog:
 
 
 class LogFollower:
-    """Reader of a log in a file, and of the log of its twin, also while they grow."""
+    """Reader of a log file and of the log file of its twin, also while they grow."""
 
     def __init__(self, file: os.PathLike[str] | str, truth: os.PathLike[str] | str | None = None) -> None:
         """Open the log and the log of the twin."""
@@ -209,16 +209,16 @@ class LogFollower:
 
     @property
     def log(self) -> RecordedLog:
-        """The log as far as it was read."""
+        """The part of the log that was read."""
         return self._reader.log
 
     @property
     def robot(self) -> Robot | None:
-        """The robot of the log; None until it was read."""
+        """The robot of the log; None before it is read."""
         return self._reader.log.robot
 
     def more(self) -> PlayedLog | None:
-        """Read new cycles; the whole log, None if there is nothing new."""
+        """Read new cycles; returns the whole log, or None without new cycles."""
         grown = self._reader.more()
         if self._truth is not None and self._truth.more():
             grown = True
@@ -252,7 +252,7 @@ class LogFollower:
         whole = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}
         stamp, began = whole.pop("stamp"), float(whole["time"][0])
         true, turned = self._true(stamp)
-        whole["time"] = np.round(whole["time"] - began, 9)  # exactly 0.3, so that this time selects the cycle
+        whole["time"] = np.round(whole["time"] - began, 9)  # rounded, so that this time selects the cycle
         events = tuple(self.log.events)
         return PlayedLog(robot=robot, began=began, true=true, true_quaternion=turned, events=events, **whole)
 
@@ -267,7 +267,7 @@ class LogFollower:
 
 
 def _interpolated(time: Array, position: Array, quaternion: Array, at: Array) -> tuple[Array, Array]:
-    """Positions in between (N, 3) and nearest quaternions (N, 4) at times; NaN outside."""
+    """Interpolated positions (N, 3) and nearest quaternions (N, 4) at times; NaN outside."""
     outside = ~((at >= time[0]) & (at <= time[-1]))
     positions = np.stack([np.interp(at, time, axis) for axis in position.T], axis=1)
     quaternions = quaternion[np.clip(np.searchsorted(time, at), 0, len(time) - 1)]

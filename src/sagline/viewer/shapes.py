@@ -20,9 +20,9 @@ from sagline.robot.reach import bounds as bounds
 from sagline.robot.robot import Robot
 from sagline.statics.tables import touching_angle
 
-POINTS = 41  # along a free cable: odd, so that dashes begin and end alike
-WRAP_POINTS = 16  # along the cable on a pulley
-_UPRIGHT = 1e-6  # of a dead length: largest difference to its rise if it is vertical
+POINTS = 41  # points along a free cable; odd, so that both ends have a dash
+WRAP_POINTS = 16  # points along the cable on a pulley
+_UPRIGHT = 1e-6  # largest difference of a vertical dead length from its rise, relative to the length
 
 
 def points_per_cable(robot: Robot) -> int:
@@ -31,10 +31,10 @@ def points_per_cable(robot: Robot) -> int:
 
 
 def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
-    """Points of the cables from their frame anchors over their pulleys to where they leave them [m].
+    """Points of the cables from their frame anchors over their pulleys to their exit points [m].
 
     Returns:
-        Shape (m, WRAP_POINTS, 3); (m, 1, 3), the frame anchors, where no cable has a pulley.
+        Shape (m, WRAP_POINTS, 3); (m, 1, 3), the frame anchors, if no cable has a pulley.
     """
     if not pulleys_of(robot).radius.any():
         return robot.frame_anchors[:, None]
@@ -43,17 +43,17 @@ def wraps(robot: Robot, pose: Pose, wrap_angle: Array | None) -> Array:
 
 
 def chords(robot: Robot, pose: Pose, exits: Array | None = None) -> Array:
-    """Both ends of every free cable in the world [m], shape (m, 2, 3), from its exit point, or frame anchor."""
+    """Both ends of every free cable in the world [m], shape (m, 2, 3), starting at its exit point or frame anchor."""
     platform_ends = pose.transform(robot.platform_anchors)
     return locked(np.stack((robot.frame_anchors if exits is None else exits, platform_ends), axis=1))
 
 
 def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
-    """Dead lengths as vertical lines below the frame anchors: only their lengths and rises are known.
+    """Dead lengths as vertical lines below the frame anchors, because only their lengths and rises are known.
 
     Returns:
-        Frame anchors and the points lower by the rises [m], shape (m, 2, 3); and whether each is truly vertical by its
-        length and rise, shape (m,).
+        Frame anchors and the points lower by the rises [m], shape (m, 2, 3); and True for each one that is vertical
+        according to its length and rise, shape (m,).
     """
     winches = robot.winches
     low = robot.frame_anchors.copy()
@@ -65,7 +65,7 @@ def dead_runs(robot: Robot) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def drum_axes(robot: Robot) -> Array:
-    """Ends of the axes of the drums whose radius is known [m], shape (k, 2, 3).
+    """Ends of the axes of the drums with known radii [m], shape (k, 2, 3).
 
     A drum touches the lower end of its dead length on the side away from the robot's middle; its axis is horizontal.
     """
@@ -90,13 +90,13 @@ def straight(ends: Array) -> Array:
 
 
 def catenaries(ends: Array, cables: CableState, sag_scale: float) -> Array:
-    """Points along catenaries (m, POINTS, 3), the sag below the chord scaled by a factor."""
+    """Points along catenaries (m, POINTS, 3), with the sag below the chord scaled by a factor."""
     run = ends[:, 1] - ends[:, 0]
     span = np.hypot(run[:, 0], run[:, 1])
     level = np.divide(run[:, :2], span[:, None], out=np.zeros((len(run), 2)), where=span[:, None] > 0.0)
     along, up = np.moveaxis(cables.points(POINTS), -1, 0)
     slope = np.divide(run[:, 2], span, out=np.zeros(len(run)), where=span > 0.0)[:, None]
-    drop = np.where(span[:, None] > 0.0, up - slope * along, 0.0)  # a vertical cable stays on its chord
+    drop = np.where(span[:, None] > 0.0, up - slope * along, 0.0)  # a vertical cable remains on its chord
     height = up + (sag_scale - 1.0) * drop
     return np.asarray(ends[:, :1] + np.concatenate((level[:, None] * along[..., None], height[..., None]), axis=-1))
 
@@ -104,7 +104,7 @@ def catenaries(ends: Array, cables: CableState, sag_scale: float) -> Array:
 def courses(robot: Robot, pose: Pose, state: Equilibrium | None, sag_scale: float) -> Array:
     """Points of the cables from frame anchor over pulley to platform end [m], shape (m, points_per_cable, 3).
 
-    In an equilibrium the free cables are catenaries, their sag scaled by a factor; without one they are straight.
+    In an equilibrium the free cables are catenaries with their sag scaled by a factor; otherwise they are straight.
     """
     contact = None if state is None else state.contact
     wrapped = wraps(robot, pose, None if contact is None else contact.wrap_angle)
@@ -134,12 +134,12 @@ def segments(points: Array, *, dashed: bool, shown: NDArray[np.bool_] | None = N
 
 Faces = NDArray[np.int64]
 
-_BEAM = 0.0045  # thickness of the frame's beams (share of the robot's size)
-_DASH = 0.02  # length of a dash of an assumed frame (share of the robot's size)
-_WINCH = 0.009  # radius of a winch (share of the robot's size)
-_THINNEST = 0.08  # thinnest platform, of its largest edge
+_BEAM = 0.0045  # thickness of the frame's beams, as a share of the robot's size
+_DASH = 0.02  # length of a dash of an assumed frame, as a share of the robot's size
+_WINCH = 0.009  # radius of a winch, as a share of the robot's size
+_THINNEST = 0.08  # smallest thickness of a platform, relative to its largest edge
 _SIDES = 20  # number of sides of a drum
-_WHEEL: Final = ((0.8, 0.97), (0.1, 0.26))  # radii of rim and hub, of a pulley's: the cable lies on the rim
+_WHEEL: Final = ((0.8, 0.97), (0.1, 0.26))  # radii of rim and hub, relative to the radius of the pulley
 _WHEEL_WIDTH, _SPOKE, _WHEEL_SIDES = 0.2, 0.055, 48
 _SIGNS: Final = np.array(list(product((-0.5, 0.5), repeat=3)))
 
@@ -173,20 +173,20 @@ def is_frame_assumed(robot: Robot) -> bool:
 
 
 def round_below(length: float) -> float:
-    """The largest of one, two and five times a power of ten that is not above a length, > 0."""
+    """The largest round number (1, 2 or 5 times a power of ten) that is not larger than a length > 0."""
     power = 10.0 ** floor(log10(length))
     return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= length * (1.0 + 1e-12))
 
 
 def _beams(start: Array, end: Array, thick: float, dash: float) -> list[Solid]:
-    """A beam along an axis; or dashes about so long, with gaps as long, with a dash at each end."""
+    """A beam along an axis; or dashes and gaps of about a given length, with a dash at each end."""
     pieces = 2 * round(0.5 * float(np.linalg.norm(end - start)) / dash) + 1
     cuts = start + np.linspace(0.0, 1.0, pieces + 1)[:, None] * (end - start)
     return [cuboid(0.5 * (a + b), np.abs(b - a) + thick) for a, b in zip(cuts[:-1:2], cuts[1::2], strict=True)]
 
 
 def winch_solid(robot: Robot) -> Solid:
-    """Drums that are known, and a mark at every frame anchor without a visible pulley."""
+    """Known drums, and a mark at every frame anchor without a visible pulley."""
     radius = _WINCH * size_of(robot)
     marked = robot.frame_anchors[pulleys_of(robot).radius < radius]
     parts = [drum(place, radius) for place in np.unique(marked, axis=0)]
@@ -198,7 +198,7 @@ def winch_solid(robot: Robot) -> Solid:
 
 def wheel() -> Solid:
     """A pulley of radius 1 for a cable along x that enters at the origin; its middle is at x = 1."""
-    from trimesh.creation import annulus  # in an extra that figures do without
+    from trimesh.creation import annulus  # an optional dependency that figures do not require
 
     rim, hub = (annulus(*radii, _WHEEL_WIDTH, sections=_WHEEL_SIDES).triangles.reshape(-1, 3) for radii in _WHEEL)
     spokes = [rod(np.array([inner, outer]), _SPOKE) for inner, outer in _spokes()]
@@ -209,7 +209,7 @@ def wheel() -> Solid:
 
 
 def _spokes() -> Array:
-    """Inner and outer ends of the spokes of a lying wheel, shape (k, 2, 3)."""
+    """Inner and outer ends of the spokes of a horizontal wheel, shape (k, 2, 3)."""
     angle = np.linspace(0.0, 2.0 * np.pi, 5, endpoint=False)
     out = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
     return np.stack((_WHEEL[1][1] * out, _WHEEL[0][0] * out), axis=1)
@@ -255,7 +255,7 @@ def cuboid(middle: Array, edges: Array) -> Solid:
 
 
 def drum(middle: Array, radius: float) -> Solid:
-    """A cylinder as wide as it is thick, its axis upright."""
+    """A vertical cylinder whose height equals its diameter."""
     angle = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
     ring = radius * np.stack((np.cos(angle), np.sin(angle), np.zeros(_SIDES)), axis=1)
     up = np.array([0.0, 0.0, radius])
@@ -263,7 +263,7 @@ def drum(middle: Array, radius: float) -> Solid:
 
 
 def tube(points: Array, radius: float, sides: int = 6) -> Solid:
-    """A thin tube along a line of points (P, 3), open at its ends; points that repeat the one before are left out."""
+    """A thin tube along a line of points (P, 3), open at its ends; repeated points are omitted."""
     new = np.concatenate(([True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0))
     points = points[new] if new.sum() > 1 else points
     forward = np.gradient(points, axis=0)
@@ -298,20 +298,20 @@ def _hull(points: Array) -> Solid:
     return Solid(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
-THINNEST: Final = 0.03  # of its longest axis: least axis of a drawn ellipsoid
+THINNEST: Final = 0.03  # smallest axis of a drawn ellipsoid, relative to its longest axis
 
 
 class Ellipsoids(NamedTuple):
     """Ellipsoids of errors."""
 
-    middle: Array  # [m], shape (k, 3)
+    middle: Array  # centers [m], shape (k, 3)
     turn: Array  # rotations of the axes, quaternions, scalar first, shape (k, 4)
     radius: Array  # standard errors along the axes [m], shape (k, 3)
-    which: Indices  # indices of their points, shape (k,)
+    which: Indices  # indices of the points, shape (k,)
 
     @classmethod
     def of(cls, points: Array, covariance: Array) -> Ellipsoids:
-        """Ellipsoids of points, without unknown and exact ones."""
+        """Ellipsoids of points; points with unknown or zero errors are omitted."""
         known = np.isfinite(covariance).all(axis=(1, 2)) & covariance.any(axis=(1, 2))
         which = np.flatnonzero(known).astype(np.int64)
         squares, axes = np.linalg.eigh(covariance[which])
@@ -321,13 +321,13 @@ class Ellipsoids(NamedTuple):
         return cls(points[which], turn, np.sqrt(np.maximum(squares, 0.0)), which)
 
     def drawn(self, factor: float) -> Array:
-        """Radii as drawn, scaled by a factor [m], shape (k, 3)."""
+        """Radii for the drawing, scaled by a factor [m], shape (k, 3)."""
         longest = self.radius.max(axis=1, keepdims=True)
         return np.asarray(factor * np.maximum(self.radius, THINNEST * longest))
 
 
 def readable(radius: Array, size: float) -> float:
-    """A round factor with which the largest radius is drawn about as large as a size [m]; 1 for none."""
+    """A round factor that makes the largest radius about as large as a size [m]; 1 without ellipsoids."""
     largest = float(radius.max(initial=0.0))
     return max(round_below(size / largest), 1.0) if largest > 0.0 else 1.0
 

@@ -16,9 +16,9 @@ from sagline.viewer.readout import css_color, html_block
 from sagline.viewer.tension_scale import Colors, ForceUnit
 from sagline.workspaces.region import Slice
 
-INSIDE: Final = 4  # bands above 0, the last unbounded
-OUTSIDE: Final = 2  # bands below 0, the first unbounded
-# They differ in lightness and in hue, for color-blind users and on both backgrounds.
+INSIDE: Final = 4  # number of bands above 0, the last one unbounded
+OUTSIDE: Final = 2  # number of bands below 0, the first one unbounded
+# The colors differ in lightness and in hue, for color-blind users and for both backgrounds.
 _COLORS: Final = np.array(
     [[196, 92, 40], [222, 150, 104], [126, 196, 186], [64, 160, 150], [22, 122, 116], [8, 84, 84]], dtype=np.uint8
 )
@@ -32,18 +32,18 @@ class MarginScale:
 
     @classmethod
     def up_to(cls, largest: float) -> MarginScale:
-        """Bands of a round width; the last but one ends near the largest margin [N]."""
+        """Bands of a round width; the last bounded band ends near the largest margin [N]."""
         coarse = largest / INSIDE if np.isfinite(largest) and largest > 0.0 else 1.0
         power = 10.0 ** floor(log10(coarse))
         return cls(max(times * power for times in (1.0, 2.0, 5.0) if times * power <= coarse * (1.0 + 1e-9)))
 
     @property
     def edges(self) -> Array:
-        """Margins between the bands [N], rising; one of them is 0."""
+        """Margins at the borders of the bands [N], ascending; one of them is 0."""
         return self.step * np.arange(1.0 - OUTSIDE, INSIDE)
 
     def bands(self, margin: Array) -> Indices:
-        """The band of each margin, 0 the farthest outside; zero with rounding errors is inside."""
+        """Index of the band of each margin, 0 for the most negative; zero with rounding errors counts as inside."""
         steps = np.floor(np.asarray(margin) / self.step + 1e-6)
         return np.asarray(np.clip(steps, -OUTSIDE, INSIDE - 1)).astype(np.int64) + OUTSIDE
 
@@ -52,7 +52,7 @@ class MarginScale:
         return np.asarray(_COLORS[self.bands(margin)])
 
     def key(self, unit: ForceUnit) -> str:
-        """HTML of the key of colors."""
+        """HTML of the color legend."""
         edges = [_bare(edge, unit) for edge in self.edges]
         between = [f"{low} to {high}" for low, high in pairwise(edges)]
         names = [f"below {edges[0]}", *between, f"above {edges[-1]}"]
@@ -64,21 +64,21 @@ class MarginScale:
 
 
 def _bare(edge: float, unit: ForceUnit) -> str:
-    """A margin between bands [N], without its unit."""
+    """Text of a margin at the border of a band [N], without its unit."""
     return f"{edge / unit.newtons:g}".replace("-", "−")
 
 
-APART = 0.12  # of the slice's longer side: least distance of two labels
-FINER = 3  # pixels for a point of the grid, along each axis
-INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # out of 255: the robot behind stays visible
+APART = 0.12  # smallest distance of two labels, relative to the slice's longer side
+FINER = 3  # pixels per point of the grid, along each axis
+INSIDE_OPACITY, OUTSIDE_OPACITY = 150, 90  # out of 255, so that the robot behind the slice is visible
 
 
 class Picture(NamedTuple):
     """Drawing of a slice."""
 
-    image: NDArray[np.uint8]  # red, green, blue and opacity, the first row the lowest, shape (h, w, 4)
+    image: NDArray[np.uint8]  # red, green, blue and opacity, with the lowest row first, shape (h, w, 4)
     boundary: Array  # segments of the line where the margin is 0, in the world [m], shape (b, 2, 3)
-    lines: Array  # segments between the other bands, shape (s, 2, 3)
+    lines: Array  # segments at the borders of the other bands, shape (s, 2, 3)
     marks: list[tuple[str, Array]]  # labels and their positions [m], shape (3,)
 
 
@@ -98,7 +98,7 @@ def picture_of(cut: Slice, scale: MarginScale, unit: ForceUnit) -> Picture:
 
 
 def _marks(lines: list[tuple[float, Array]], cut: Slice, unit: ForceUnit) -> list[tuple[str, Array]]:
-    """Labels of the lines, 0 first, each at the point of its line that is farthest in a direction of its own."""
+    """Labels of the lines, that of 0 first; each label is at the farthest point of its line in its own direction."""
     apart = APART * max(float(np.ptp(cut.across)), float(np.ptp(cut.up)))
     marks: list[tuple[str, Array]] = []
     for k, (edge, segments) in enumerate(lines):
@@ -127,7 +127,7 @@ def _segments(found: Any, cut: Slice) -> Array:
     if points is None:
         return np.empty((0, 2, 3))
     starts = np.ones(len(points), dtype=bool)
-    starts[offsets[1:] - 1] = False  # the last point of a line begins no segment
+    starts[offsets[1:] - 1] = False  # no segment starts at the last point of a line
     first = np.flatnonzero(starts)
     pairs = np.stack((points[first], points[first + 1]), axis=1)
     placed = np.empty((len(pairs), 2, 3))

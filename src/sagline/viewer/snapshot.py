@@ -1,4 +1,4 @@
-"""Settings of the panel, and the robot solved at one pose with them."""
+"""Settings of the panel, and the solution of the robot at one pose with these settings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sagline.viewer import shapes
 from sagline.viewer.by_hand import BY_HAND, ByHand
 from sagline.viewer.tension_scale import force_unit
 
-MODEL_NAMES: dict[type[CableModel], str] = {  # names that say more than that of the class
+MODEL_NAMES: dict[type[CableModel], str] = {  # names that are clearer than the class names
     Catenary: "catenary (exact)",
     Empirical: "empirical (the article's)",
     Elastic: "elastic, weightless",
@@ -41,19 +41,19 @@ def model_name(model: CableModel) -> str:
 
 
 def method_name(method: TensionMethod) -> str:
-    """Name of a tension distribution method, with a remark where it depends on the poses before."""
+    """Name of a tension distribution method, with a remark if it depends on previous poses."""
     name = BY_HAND if isinstance(method, ByHand) else type(method).__name__
     return f"{name} (depends on history)" if depends_on_history(method) else name
 
 
 def depends_on_history(method: TensionMethod) -> bool:
-    """True if the tensions of a pose depend on those before it."""
+    """True if the tensions of a pose depend on the tensions of previous poses."""
     return method.alone is not method
 
 
-# the exact one first
+# the exact model first
 MODELS: Final = MappingProxyType({model_name(make()): make() for make in reversed(ALL_MODELS.values())})
-# methods that depend on history are last: the default depends on the pose alone
+# methods that depend on history are last, so that the default depends only on the pose
 METHODS: Final = MappingProxyType(
     {
         method_name(method): method
@@ -64,12 +64,12 @@ METHODS: Final = MappingProxyType(
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """The robot's changes, how it is solved, and how it is drawn."""
+    """Changes of the robot, and settings of its solution and drawing."""
 
-    mass: float  # of the platform with its load [kg], > 0; the inertia scales with it
+    mass: float  # mass of the platform with its load [kg], > 0; the inertia is proportional to it
     density: float = 1.0  # factor on the cables' linear density, > 0
     stiffness: float = 1.0  # factor on the cables' axial stiffness, > 0
-    model: CableModel = field(default_factory=Catenary)  # of the planned lengths
+    model: CableModel = field(default_factory=Catenary)  # cable model of the planned lengths
     tension: TensionMethod = field(default_factory=MinimumNorm)
     sag_scale: float = 1.0  # factor on the drawn sag, >= 0
     error_scale: float = 1.0  # factor on the drawn position error, >= 0
@@ -83,11 +83,11 @@ class Settings:
 
     @property
     def changes(self) -> tuple[float, float, float]:
-        """Changes of the robot: mass, density and stiffness."""
+        """Key of the changes of the robot: mass, density and stiffness."""
         return self.mass, self.density, self.stiffness
 
     def applied(self, robot: Robot) -> Robot:
-        """The robot with its load and cables changed."""
+        """The robot with changed load and cables."""
         if self.mass == robot.mass and self.density == self.stiffness == 1.0:
             return robot
         cables = robot.cables
@@ -98,15 +98,15 @@ class Settings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """A robot held at one pose."""
+    """A robot at rest at one pose."""
 
-    robot: Robot  # with the changes of the settings
+    robot: Robot  # robot with the changes of the settings
     pose: Pose  # planned pose
     plan: Plan | None  # the plan for this pose; None if a cable has no chord
-    # pose of equilibrium with catenaries of the planned lengths; None if the pose is not feasible or the model is exact
+    # equilibrium pose with catenaries of the planned lengths; None if the pose is not feasible or the model is exact
     rest: Pose | None
-    refusal: str = ""  # reason why a cable over a pulley has no chord; "" where all have one
-    # tensions from which a method that depends on history continued [N], shape (m,); None for none
+    refusal: str = ""  # reason why a cable over a pulley has no chord; "" if all cables have chords
+    # previous tensions of a method that depends on history [N], shape (m,); None without them
     previous: Array | None = None
 
     @property
@@ -121,7 +121,7 @@ class Snapshot:
 
     @property
     def reason(self) -> str:
-        """Reason why it is not feasible, with the shortfall and the blocking cables; "" if it is."""
+        """Reason why the pose is not feasible, with shortfall and blocking cables; "" if it is feasible."""
         if self.feasible:
             return ""
         if self.plan is None:
@@ -141,11 +141,11 @@ class Snapshot:
 
     @property
     def margin(self) -> Array:
-        """Distance of each limited tension to its nearer limit [N], shape (m,); NaN for none."""
+        """Distance of each limited tension to its nearer limit [N], shape (m,); NaN without a solution."""
         return self.tension if self.plan is None else cable_margins(self.plan.state)
 
     def nearer_limit(self, cable: int) -> str:
-        """The limit that a cable's tension is nearer to, by name."""
+        """Name of the limit that is nearer to a cable's tension."""
         if self.plan is None:
             return ""
         tension, robot = self.plan.state.limited_tension[cable], self.robot
@@ -165,7 +165,7 @@ class Snapshot:
         return None if self.rest is None else self.rest.position - self.pose.position
 
     def courses(self, sag_scale: float) -> Array:
-        """Points of the cables (m, P, 3), their sag scaled by a factor; straight where the pose is not feasible."""
+        """Points of the cables (m, P, 3), with their sag scaled by a factor; straight if the pose is not feasible."""
         state = self.plan.state if self.plan is not None and self.feasible else None
         return shapes.courses(self.robot, self.pose, state, sag_scale)
 
@@ -177,7 +177,7 @@ def snapshot_at(
     previous: Plan | None,
     wrench: Array | None = None,
 ) -> Snapshot:
-    """A robot, already changed by the settings, held at rest at a pose."""
+    """Solution of a robot, already changed by the settings, at rest at a pose."""
     reference = _remembered(previous, settings.tension)
     try:
         plan = inverse(robot, pose, settings.model, settings.tension, wrench, reference)
@@ -189,7 +189,7 @@ def snapshot_at(
 
 
 def _remembered(previous: Plan | None, tension: TensionMethod) -> Array | None:
-    """Tensions from which a method continues, in its variable [N], shape (m,); None for none."""
+    """Previous tensions of a method, in its variable [N], shape (m,); None without them."""
     if previous is None or not depends_on_history(tension) or not previous.feasible or previous.at_border:
         return None
     return shared_tension(previous.state, tension.variable)

@@ -14,13 +14,14 @@ from sagline.robot.robot import Robot
 
 Color = tuple[int, int, int]  # red, green and blue, 0 to 255
 
-# The most different hues first, each visible on white and on dark: most robots have up to eight cables.
+# The most different hues come first, because most robots have up to eight cables. Each color is visible on a white and
+# on a dark background.
 CABLES: Final[tuple[Color, ...]] = (
     (14, 147, 132), (232, 160, 32), (122, 92, 196), (94, 156, 60), (206, 84, 128), (24, 135, 196),
     (158, 104, 66), (150, 146, 20), (70, 96, 210), (210, 100, 56), (44, 170, 110), (176, 80, 176),
     (80, 140, 150), (196, 146, 96), (124, 164, 30), (160, 60, 80),
 )  # fmt: skip
-NONE: Final[Color] = (150, 155, 162)  # where no cable limits
+NONE: Final[Color] = (150, 155, 162)  # color without a limiting cable
 
 
 def cable_color(cable: int) -> Color:
@@ -30,26 +31,26 @@ def cable_color(cable: int) -> Color:
 
 Colors = NDArray[np.uint8]
 
-# From blue over red to ochre. Each step has a contrast of 3 : 1 on the white and on the dark background, so their
-# lightness is similar; blue and yellow are also distinct for color-blind users.
+# The scale goes from blue over red to ochre. Each step has a contrast of 3 : 1 on the white and on the dark background,
+# so that all steps have a similar lightness. Color-blind users can also distinguish blue and yellow.
 _STEPS = np.array(
     [[62, 96, 232], [170, 74, 194], [200, 74, 166], [214, 80, 126], [216, 98, 78], [206, 128, 20]], dtype=np.float64
 )
-GRAY = np.array([130, 136, 144], dtype=np.uint8)  # of a cable without a tension
-_SPREAD = 100.0  # highest over lowest tension where the robot has no lower limit
-_PER_WEIGHT = 4.0  # highest tension over the platform's weight where the robot has no upper limit
+GRAY = np.array([130, 136, 144], dtype=np.uint8)  # color of a cable without a tension
+_SPREAD = 100.0  # ratio of highest to lowest tension for a robot without a lower limit
+_PER_WEIGHT = 4.0  # ratio of highest tension to platform weight for a robot without an upper limit
 
 
 @dataclass(frozen=True, slots=True)
 class TensionScale:
-    """Tensions on a logarithmic scale: a robot's limits are often two decades apart."""
+    """Tensions on a logarithmic scale, because a robot's limits often differ by a factor of a hundred."""
 
     low: float  # tension at the blue end [N], > 0
     high: float  # tension at the yellow end [N], > low
 
     @classmethod
     def of(cls, robot: Robot) -> TensionScale:
-        """The scale between the limits of a robot; where it has none, between guesses from its weight."""
+        """The scale between the limits of a robot; missing limits are estimated from its weight."""
         weight = robot.mass * max(robot.gravity, 1.0)
         top, bottom = float(robot.tension_max.max()), float(robot.tension_min.min())
         high = top if isfinite(top) and top > 0.0 else max(_PER_WEIGHT * weight, 10.0 * bottom)
@@ -57,7 +58,7 @@ class TensionScale:
         return cls(low, high) if low < high else cls(0.5 * low, 2.0 * high)
 
     def fraction(self, tension: Array) -> Array:
-        """Fractions of the scale at which tensions lie, 0 to 1, clipped beyond its ends."""
+        """Positions of tensions on the scale, 0 to 1, clipped at its ends."""
         inside = np.clip(tension, self.low, self.high)
         return np.asarray((np.log(inside) - log(self.low)) / (log(self.high) - log(self.low)))
 
@@ -71,7 +72,7 @@ class TensionScale:
         return np.where(known[..., None], np.rint(mixed).astype(np.uint8), GRAY)
 
     def linear_colors(self, tension: Array) -> Colors:
-        """The same colors with the sRGB curve undone: viser's client applies it to the colors of line ends."""
+        """The same colors before the sRGB curve, which viser's client applies to the colors of line ends."""
         return linear(self.colors(tension))
 
     def ticks(self) -> tuple[float, ...]:
@@ -82,7 +83,7 @@ class TensionScale:
 
 
 _NONE = "–"
-KILO_FROM = 1e5  # N: forces from here on are written in kilonewtons
+KILO_FROM = 1e5  # smallest force that is written in kilonewtons [N]
 
 
 class ForceUnit(NamedTuple):
@@ -99,7 +100,7 @@ class ForceUnit(NamedTuple):
 
     @classmethod
     def up_to(cls, highest: float) -> ForceUnit:
-        """The unit for forces up to a highest one [N]."""
+        """The unit for forces up to a highest force [N]."""
         return cls("N", 1.0, ".1f") if highest < KILO_FROM else cls("kN", 1e3, ".2f")
 
     def bare(self, force: float) -> str:
@@ -112,7 +113,7 @@ class ForceUnit(NamedTuple):
 
 
 def number_text(value: float, form: str) -> str:
-    """A number, or a dash for one that is not finite; what rounds to zero has no sign."""
+    """Text of a number, or a dash if it is not finite; a number that rounds to zero does not have a sign."""
     if not isfinite(value):
         return _NONE
     text = f"{value:{form}}"
@@ -120,12 +121,12 @@ def number_text(value: float, form: str) -> str:
 
 
 def force_unit(robot: Robot) -> ForceUnit:
-    """Unit of the forces of a robot, by its highest tension, the same at all poses."""
+    """Unit of the forces of a robot, determined by its highest tension and the same at all poses."""
     return ForceUnit.up_to(TensionScale.of(robot).high)
 
 
 def linear(colors: Colors) -> Colors:
-    """Colors with the sRGB curve undone, as viser's client needs those of line ends."""
+    """Colors before the sRGB curve, in the form for line ends in viser's client."""
     share = colors / 255.0
     undone = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     return np.rint(255.0 * undone).astype(np.uint8)

@@ -16,72 +16,72 @@ from sagline.kinematics.status import PoseStatus
 from sagline.robot.robot import Robot
 from sagline.viewer.tension_scale import ForceUnit
 
-# Colors of cables by number in charts; none is used for the platform, its path, tensions or verdicts.
-# Contrast 3 : 1 on the panels of both themes.
-COLORS: Final = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794")  # lines beyond them are dashed
+# Colors of cables by number in charts, different from those of the platform, its path, tensions and verdicts. Their
+# contrast is 3 : 1 on the panels of both themes.
+COLORS: Final = ("#0e9384", "#8a8a12", "#9a6f52", "#1897b8", "#5e9a3c", "#7d8794")  # further lines are dashed
 _ENDS: Final = {"chord": "the chord", "frame_end": "the frame end"}
 
 
 class ChartLimit(NamedTuple):
     """A limit of a chart."""
 
-    value: float  # in the unit of the chart
+    value: float  # value in the unit of the chart
     name: str
-    upper: bool  # true if it is an upper limit
+    upper: bool  # True for an upper limit
 
 
 class Span(NamedTuple):
-    """A time of an infeasible pose, a violated limit or a fault."""
+    """A range of time with an infeasible pose, a violated limit or a fault."""
 
-    start: float  # [s]
-    end: float  # [s]
+    start: float  # start [s]
+    end: float  # end [s]
     why: str  # reason
 
 
 class TimelineMark(NamedTuple):
     """An event."""
 
-    time: float  # [s]
+    time: float  # time [s]
     text: str
-    bad: bool  # true if it is a fault or a failure
+    bad: bool  # True for a fault or a failure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chart:
-    """A quantity of each cable, or along each axis, over time."""
+    """A quantity of each cable or along each axis over time."""
 
     title: str
     unit: str
     decimals: int  # number of decimals
     names: tuple[str, ...]  # names of the lines: numbers of cables, or axes
-    # function that returns the values of some samples, shape (n, k); NaN if there is none
+    # function that returns the values of given samples, shape (n, k); NaN for missing values
     values: Callable[[slice], Array]
     limits: tuple[ChartLimit, ...] = ()  # limits of the values
 
     @property
     def of_cables(self) -> bool:
-        """True if its lines are cables."""
+        """True if the lines of the chart are cables."""
         return self.names[0] == "0"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Charts, spans and marks of something that is played."""
+    """Charts, spans and marks of a played motion."""
 
-    time: Array  # times of the samples [s], from 0 on, shape (N,)
+    time: Array  # times of the samples [s], starting at 0, shape (N,)
     charts: tuple[Chart, ...]  # charts, tensions first
     spans: tuple[Span, ...] = ()  # spans, in order
     marks: tuple[TimelineMark, ...] = ()  # marks, in order
-    # names and colors of the paths that are drawn in the scene
+    # names and colors of the drawn paths in the scene
     paths: tuple[tuple[str, tuple[int, int, int]], ...] = ()
 
     def within(self, start: float, end: float) -> slice:
-        """The samples from a time to another [s], and the one before and the one after."""
+        """The samples between two times [s], and one sample before and after them."""
         first, stop = np.searchsorted(self.time, [start, end])
         return slice(max(int(first) - 1, 0), int(stop) + 1)
 
     def step_from(self, time: float, steps: int) -> float:
-        """Time of the sample a number of steps after that at or before a time [s]."""
+        """Time of the sample that is a number of steps after the sample at a time [s]."""
         now = int(np.searchsorted(self.time, time, side="right")) - 1
         return float(self.time[min(max(now + steps, 0), self.time.size - 1)])
 
@@ -92,7 +92,7 @@ def cable_names(robot: Robot) -> tuple[str, ...]:
 
 
 def chart_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, ...]:
-    """The tension limits; where they differ between cables, the tightest."""
+    """The tension limits; if they differ between cables, the tightest ones."""
     low, high = float(robot.tension_min.max()), float(robot.tension_max.min())
     other = "" if at == robot.tension_limits_of else f", of {_ENDS[robot.tension_limits_of]}"
     lower = (ChartLimit(low / newtons, f"lowest allowed{other}", upper=False),) if low > 0.0 else ()
@@ -100,11 +100,11 @@ def chart_limits(robot: Robot, newtons: float, *, at: str) -> tuple[ChartLimit, 
     return lower + upper
 
 
-MOST_SPANS: Final = 400  # largest number on a timeline; close ones are joined
+MOST_SPANS: Final = 400  # largest number of spans on a timeline; close ones are joined
 
 
 def spans_of(time: Array, wrong: NDArray[np.bool_], why: Callable[[slice], str]) -> tuple[Span, ...]:
-    """Runs of consecutive flagged samples; a sample lasts until the next."""
+    """Spans of consecutive flagged samples; a sample lasts until the next sample."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], wrong, [False])).astype(np.int8))).reshape(-1, 2)
     if not edges.size:
         return ()
@@ -141,7 +141,7 @@ def infeasible_spans(plan: Plan, time: Array, unit: ForceUnit) -> tuple[Span, ..
 
 def limit_violations(robot: Robot, time: Array, tension: Array, unit: ForceUnit) -> tuple[Span, ...]:
     """Spans in which a tension at the winch, shape (N, m) [N], is not within its limits."""
-    below = np.asarray(tension < robot.tension_min)  # NaN is neither
+    below = np.asarray(tension < robot.tension_min)  # NaN is neither above nor below a limit
     above = np.asarray(tension > robot.tension_max)
 
     def why(rows: slice) -> str:
@@ -164,22 +164,22 @@ def _cables(which: NDArray[np.intp]) -> str:
     return f"cable{'s' if which.size > 1 else ''} {', '.join(map(str, which))}"
 
 
-MOST_COLUMNS: Final = 1500  # columns
+MOST_COLUMNS: Final = 1500  # largest number of columns
 MOST_MARKS: Final = 300
-_NEAR: Final = 0.6  # of the values' spread: a limit within this distance is drawn, others are written
-_BORDER: Final = 0.05  # of the spread, above and below
+_NEAR: Final = 0.6  # limits within this distance, relative to the spread of values, are drawn; others are written
+_BORDER: Final = 0.05  # margins above and below, relative to the spread
 
 
 class _Columns(NamedTuple):
-    """Samples, or groups of them."""
+    """Columns of a chart: samples or groups of samples."""
 
-    time: Array  # start of each [s], shape (C,)
-    low: Array  # least value of each line in it, shape (C, k); NaN if there is none
-    high: Array  # largest value
+    time: Array  # start of each column [s], shape (C,)
+    low: Array  # smallest value of each line in a column, shape (C, k); NaN for missing values
+    high: Array  # largest value of each line in a column
 
 
 def columns(time: Array, values: Array, most: int = MOST_COLUMNS) -> _Columns:
-    """_Columns of equal numbers of samples (N,) with values (N, k), at most `most`."""
+    """Columns with equal numbers of samples (N,) with values (N, k), at most `most`."""
     if time.size <= most:
         return _Columns(time, values, values)
     starts = (np.arange(most) * time.size) // most
@@ -213,7 +213,7 @@ def _columns(track: Track, chart: Chart, start: float, end: float) -> _Columns:
 
 
 def _matching(track: Track, first: Chart, chart: int) -> Chart:
-    """The chart of a track to show beside another, by its title, or by its number."""
+    """The chart of a track for display beside another chart, by its title or its number."""
     same = [each for each in track.charts if each.title == first.title]
     return same[0] if same else track.charts[chart if chart < len(track.charts) else 0]
 
@@ -243,14 +243,14 @@ def _track_message(
 
 
 def _most_important(track: Track) -> list[Any]:
-    """Marks of a track; of too many, the faults and the last of the others."""
+    """Marks of a track; if there are too many, the faults and the last of the other marks."""
     bad = [mark for mark in track.marks if mark.bad][-MOST_MARKS:]
     rest = [mark for mark in track.marks if not mark.bad]
     return sorted(bad + rest[len(rest) - (MOST_MARKS - len(bad)) :] if len(track.marks) > MOST_MARKS else track.marks)
 
 
 def _range(parts: Sequence[_Columns], charts: Sequence[Chart]) -> tuple[float, float, list[ChartLimit]]:
-    """Lowest and highest value of the axis, and the limits that lie on it."""
+    """Lowest and highest value of the axis, and the limits within this range."""
     ends = [_extent(part) for part in parts]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
     if low > high:
@@ -268,7 +268,7 @@ def _extent(part: _Columns) -> tuple[float, float]:
 
 
 def _extremes(which: np.ufunc, values: Array, starts: Any) -> Array:
-    """Extreme values of the samples from each start to the next, line by line."""
+    """Extreme values of the samples from each start to the next one, for each line."""
     return np.stack([which.reduceat(np.ascontiguousarray(line), starts) for line in values.T], axis=1)
 
 

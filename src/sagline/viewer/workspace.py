@@ -28,16 +28,16 @@ from sagline.workspaces.orientations import Orientations
 from sagline.workspaces.region import Find, Region, region_of
 from sagline.workspaces.wrench_sets import WrenchSet
 
-OPACITY: Final = 0.35  # the robot inside stays visible
+OPACITY: Final = 0.35  # opacity, so that the robot inside is visible
 
 
 class Patch(NamedTuple):
     """Faces of one color."""
 
-    vertices: Array  # corners, each in a face [m], shape (V, 3)
-    faces: Indices  # shape (F, 3)
+    vertices: Array  # corners, each used by a face [m], shape (V, 3)
+    faces: Indices  # faces as indices of corners, shape (F, 3)
     color: tuple[int, int, int]  # red, green and blue, 0 to 255
-    opacity: float = OPACITY  # 0 to 1
+    opacity: float = OPACITY  # opacity, 0 to 1
 
     @classmethod
     def of(cls, vertices: Array, faces: Indices, color: tuple[int, int, int]) -> Patch:
@@ -47,7 +47,7 @@ class Patch(NamedTuple):
 
 
 def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "double") -> None:
-    """Draw patches below a name, which replace those before; in `atomic`, so that corners and faces change together."""
+    """Draw patches below a name instead of the previous ones; `atomic` changes corners and faces together."""
     for k, patch in enumerate(patches):
         nodes.draw(
             f"{name}/{k}",
@@ -63,17 +63,17 @@ def draw_patches(nodes: Nodes, name: str, patches: list[Patch], side: str = "dou
     nodes.keep_first(name, len(patches))
 
 
-CELLS: Final = 30  # along each edge of a cube; another box has the same number of cubic cells
-MOST_CELLS: Final = 64  # along the longest edge
+CELLS: Final = 30  # cells along each edge of a cube; another box has the same total number of cubic cells
+MOST_CELLS: Final = 64  # largest number of cells along the longest edge
 ROUGH: Final = 2  # factor on the size of cells in the first hull
-SMALL: Final = 0.25  # of its box: a smaller region is computed again with smaller cells
-LEAST: Final = 0.005  # of the boundary: smaller shares are not written
+SMALL: Final = 0.25  # smallest share of its box; a smaller region is computed again with smaller cells
+LEAST: Final = 0.005  # smallest share of the boundary that is written
 
 
 class WorkspaceQuery(NamedTuple):
     """Robot, orientation, cable model and loads of a workspace."""
 
-    robot: Robot  # with the changes of the settings
+    robot: Robot  # robot with the changes of the settings
     quaternion: Array  # orientation of the platform, shape (4,)
     model: CableModel
     wrenches: WrenchSet
@@ -84,7 +84,7 @@ class WorkspaceQuery(NamedTuple):
         return Orientations(Rotation.from_quat(self.quaternion))
 
     def levels(self) -> Levels:
-        """Levels whose sign change is the boundary."""
+        """Levels, whose change of sign is the boundary."""
         margin = (LeastMargin(),)
         return Levels(self.robot, self.wrenches, self.orientations, margin, self.model, MinimumNorm(), None, None)
 
@@ -94,17 +94,17 @@ class Hull:
     """Boundary of a region."""
 
     vertices: Array  # corners [m], shape (V, 3)
-    faces: Indices  # shape (F, 3)
-    margin: Array  # at the vertices [N], shape (V,)
-    owner: Indices  # the cable that limits at each face, -1 where none does, shape (F,)
-    on_box: Flags  # which faces are those of the robot's box, shape (F,)
-    text: str  # HTML that describes it
-    by_cable: list[Patch]  # the faces by their owners
-    longest: float  # the longest edge of a face [m]; 0 without any
+    faces: Indices  # faces as indices of corners, shape (F, 3)
+    margin: Array  # margins at the vertices [N], shape (V,)
+    owner: Indices  # index of the limiting cable at each face, -1 if there is none, shape (F,)
+    on_box: Flags  # True for faces on the robot's box, shape (F,)
+    text: str  # HTML with the description of the hull
+    by_cable: list[Patch]  # patches of faces by limiting cable
+    longest: float  # the longest edge of a face [m]; 0 without faces
 
     @classmethod
     def of(cls, vertices: Array, faces: Indices, margin: Array, cable: Indices, on_box: Flags, text: str) -> Hull:
-        """A hull from the cable that limits at each vertex."""
+        """Hull from the limiting cable at each vertex."""
         owner = np.where(on_box, -1, _majority(cable[faces]))
         patches = [Patch.of(vertices, faces[owner == k], cable_color(k)) for k in np.unique(owner).tolist()]
         corners = vertices[faces]
@@ -112,7 +112,7 @@ class Hull:
         return cls(vertices, faces, margin, owner, on_box, text, patches, longest)
 
     def by_margin(self, scale: MarginScale) -> list[Patch]:
-        """The faces by the margin there, a patch for each color of a scale."""
+        """Patches of the faces by margin, one patch per color of a scale."""
         margin = self.margin[self.faces].mean(axis=1)
         bands = scale.bands(margin)
         shades = scale.colors(margin)
@@ -123,7 +123,7 @@ class Hull:
 
 
 def region_in(query: WorkspaceQuery, rough: bool) -> Region:
-    """The region to search, with as many cells as a cube of `CELLS` along each edge; rough: an eighth of them."""
+    """The region to search, with as many cells as a cube of `CELLS` along each edge; rough: an eighth as many."""
     box = region_of(query.robot, None, CELLS)
     cells = max(_cells_of(box.high - box.low)) if box.flat is None else MOST_CELLS
     return region_of(query.robot, None, cells // ROUGH if rough else cells)
@@ -132,7 +132,7 @@ def region_in(query: WorkspaceQuery, rough: bool) -> Region:
 def region_hull(query: WorkspaceQuery, rough: bool, progress: Callable[[int, int], None]) -> Hull:
     """The hull of a region at one orientation; `progress` receives the number of poses done and the expected total."""
     region, levels = region_in(query, rough), query.levels()
-    total = 2 * int(np.prod(np.array(region.cells) + 1))  # vertices take as long as nodes
+    total = 2 * int(np.prod(np.array(region.cells) + 1))  # a vertex takes as long as a node
     done = 0
 
     def count(poses: int) -> None:
@@ -150,7 +150,7 @@ def region_hull(query: WorkspaceQuery, rough: bool, progress: Callable[[int, int
 
 
 def _around(found: Outline, region: Region) -> Region | None:
-    """The box around a region that fills little of its own, a cell wider; None if it fills it, or is empty."""
+    """The box of a region plus one cell, if the region fills only a small part of the searched box; else None."""
     if not len(found.surface.faces) or region.flat is not None:
         return None
     cell = found.grid.step
@@ -162,7 +162,7 @@ def _around(found: Outline, region: Region) -> Region | None:
 
 
 def _cells_of(size: Array) -> tuple[int, int, int]:
-    """Numbers of cells along the edges of a box [m], about cubes."""
+    """Numbers of nearly cubic cells along the edges of a box [m]."""
     along = CELLS * size / np.prod(size) ** (1.0 / 3.0)
     x, y, z = np.clip(np.rint(along), 1, MOST_CELLS).astype(int).tolist()
     return x, y, z
@@ -185,7 +185,7 @@ def _hull_text(found: Outline, query: WorkspaceQuery, region: Region) -> str:
 
 
 def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bool) -> str:
-    """HTML for an empty region, with the best position; for a rough one, that the search continues."""
+    """HTML for an empty region, with the best position; for a rough search, with the remark that it continues."""
     if rough:
         return "<b>Region</b> none is seen at a rough look"
     reason = nearest_to(query.levels(), found.grid, region.box.low, region.box.high).reason
@@ -193,20 +193,20 @@ def _empty_text(found: Outline, query: WorkspaceQuery, region: Region, rough: bo
 
 
 def _majority(cables: Indices) -> Indices:
-    """The cable of most corners of each face; of three different ones the first."""
+    """The cable of most corners of each face; the first one if all three differ."""
     return np.where(cables[:, 1] == cables[:, 2], cables[:, 1], cables[:, 0])
 
 
-BESIDE: Final = 0.01  # of the reach: distance of patches from their wall, which would hide them here and there
+BESIDE: Final = 0.01  # distance of patches from their wall, relative to the reach; avoids hidden parts
 REACH: Final = 0.16  # patches of a wall nearer than this are drawn, as a share of the robot's size
-_RINGS: Final = (0.0, 0.4, 0.7, 1.0)  # of the reach
-_OPACITIES: Final = (0.6, 0.35, 0.15)  # opacity in each ring, of which two lie behind each other
+_RINGS: Final = (0.0, 0.4, 0.7, 1.0)  # radii of the rings, relative to the reach
+_OPACITIES: Final = (0.6, 0.35, 0.15)  # opacity in each ring; two patches lie behind each other
 
 
 def near_patches(hull: Hull, position: Array, reach: float) -> list[Patch]:
-    """Patches of a wall within a distance, more opaque the nearer, in the colors of the cables that limit there.
+    """Patches of a wall within a distance, in the colors of the limiting cables; nearer patches are more opaque.
 
-    The faces of the robot's box are no wall.
+    The faces of the robot's box are not a wall.
     """
     near = np.linalg.norm(hull.vertices - position, axis=1) < reach + hull.longest
     faces_near = np.flatnonzero(near[hull.faces].any(axis=1) & ~hull.on_box)
@@ -223,7 +223,7 @@ def near_patches(hull: Hull, position: Array, reach: float) -> list[Patch]:
 
 
 def margin_text(margin: float, cable: int, unit: ForceUnit) -> str:
-    """Margin at the platform and the cable that limits it."""
+    """Text of the margin at the platform and of the limiting cable."""
     by = f", cable {cable}" if cable >= 0 else ""
     if not np.isfinite(margin):
         return "nothing limits it" if margin > 0.0 else "nothing holds it"
@@ -231,7 +231,7 @@ def margin_text(margin: float, cable: int, unit: ForceUnit) -> str:
 
 
 def _on_both_sides(corners: Array, distance: float) -> Array:
-    """Triangles (F, 3, 3) twice, so far [m] before and behind where they are."""
+    """Each triangle (F, 3, 3) twice, displaced by a distance [m] to both sides."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     away = distance * (normal / np.maximum(length, np.finfo(np.float64).tiny))[:, None]
@@ -239,15 +239,15 @@ def _on_both_sides(corners: Array, distance: float) -> Array:
 
 
 def _quartered(corners: Array) -> Array:
-    """Each triangle (F, 3, 3) in four, one after the other."""
+    """Each triangle (F, 3, 3) divided into four, in order."""
     first, second, third = (corners[:, k] for k in range(3))
     one, two, three = 0.5 * (first + second), 0.5 * (second + third), 0.5 * (third + first)
     parts = ((first, one, three), (one, second, two), (three, two, third), (one, two, three))
     return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)
 
 
-_STEPS: Final = 20  # of the scan along each direction; narrower gaps may be missed
-_BISECTIONS: Final = 14  # of a step: accurate to about 1e-4 of it
+_STEPS: Final = 20  # steps of the scan along each direction; it may miss narrower gaps
+_BISECTIONS: Final = 14  # bisections of a step, which reduce the error to about 1e-4 of it
 DIRECTIONS: Final = np.vstack((np.eye(3), -np.eye(3)))  # +x, +y, +z, -x, -y, -z
 NAMES: Final = ("+x", "+y", "+z", "−x", "−y", "−z")
 
@@ -257,12 +257,12 @@ class FreeTravel:
     """Free travel from a position in directions of the axes, at one orientation."""
 
     start: Array  # position [m], shape (3,)
-    inside: bool  # true if it is within the workspace
-    margin: float  # capacity margin there [N]
-    which: Indices  # directions in which this robot can move, indices of `DIRECTIONS`, shape (K,)
+    inside: bool  # True if the position is in the workspace
+    margin: float  # capacity margin at the position [N]
+    which: Indices  # indices of `DIRECTIONS` in which this robot can move, shape (K,)
     distance: Array  # distance to the boundary, or to the end of the box [m], shape (K,)
-    crossed: Flags  # true if the boundary is reached, shape (K,)
-    cable: Indices  # the cable that limits there, -1 where none does, shape (K,)
+    crossed: Flags  # True if the boundary is reached, shape (K,)
+    cable: Indices  # index of the limiting cable there, -1 if there is none, shape (K,)
 
     @property
     def ends(self) -> Array:
@@ -305,13 +305,13 @@ def free_travel(find: Find, start: Array, which: Indices, low: Array, high: Arra
 
 
 def _levels_at(find: Find, places: Array) -> tuple[Array, Indices]:
-    """Levels and limiting cables at places (K, S, 3)."""
+    """Levels and limiting cables at positions (K, S, 3)."""
     found = find(places.reshape(-1, 3))
     return found.level.reshape(places.shape[:2]), found.cable.reshape(places.shape[:2])
 
 
 def travel_text(found: FreeTravel, unit: ForceUnit) -> str:
-    """HTML: the margin, the nearest boundary and what limits there, and all directions in a table."""
+    """HTML: margin, nearest boundary with its limit, and a table of all directions."""
     head = f"<b>Margin</b> {unit.written(found.margin)}<br>"
     crossed = [k for k in range(len(found.which)) if found.crossed[k]]
     if crossed:

@@ -20,7 +20,7 @@ from sagline.viewer.features.tensions import TensionsFeature
 from sagline.viewer.features.timeline import TimelineFeature
 from sagline.viewer.page import Page
 
-# in the order of their controls on the page, in which they also follow a view; the state is last: it needs all controls
+# the order is that of the controls on the page and of updates; `State` is last, because it requires all controls
 FEATURES: Final[tuple[Callable[[Page], Feature | None], ...]] = (
     CalibrationFeature.of_page,
     ModesFeature,

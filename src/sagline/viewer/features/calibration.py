@@ -32,19 +32,19 @@ from sagline.viewer.server import chosen_by
 from sagline.viewer.shapes import Ellipsoids, ball, readable
 
 FIELD: Final = "Row of the log"
-TOPIC: Final = "row"  # of the messages with the number of a row that is clicked
-LARGEST: Final = 100.0  # times the factor at first
+TOPIC: Final = "row"  # topic of the messages with the number of a clicked row
+LARGEST: Final = 100.0  # largest factor, relative to the initial one
 OPACITY: Final = 0.55
-_DOT: Final = 0.0055  # radius of a pose (share of the robot's size)
+_DOT: Final = 0.0055  # radius of the dot of a pose, as a share of the robot's size
 _ABOVE: Final = 0.02  # distance of the label of a pose, as a share of the robot's size
 NODES: Final[dict[Anchors, str]] = {"frame_anchors": "", "platform_anchors": "/platform"}
-MOST_POSES: Final = 2000  # drawn poses; of more, a regular selection and all outliers
-MOST_NAMED: Final = 8  # outliers with labels in the scene
+MOST_POSES: Final = 2000  # largest number of drawn poses; of more, a regular selection and all outliers are drawn
+MOST_NAMED: Final = 8  # largest number of outliers with labels in the scene
 LARGE: Final = 0.04  # initial size of the largest ellipsoid, as a share of the robot's size
-QUANTILES: Final = (0.95, 0.999)  # of chi squared, between the colors
+QUANTILES: Final = (0.95, 0.999)  # limits of chi squared between the colors
 COLORS: Final = np.array([PLATFORM, REST, INFEASIBLE], dtype=np.uint8)
 NAMES: Final = ("as expected", "one in 20", "one in 1,000")
-MOST_LISTED = 12  # outliers
+MOST_LISTED = 12  # largest number of listed outliers
 
 
 def degrees_of_freedom(found: Calibration) -> Indices:
@@ -60,7 +60,7 @@ def bands(found: Calibration) -> Indices:
 
 
 def _key_text(counts: Indices) -> str:
-    """HTML of the key of colors, with the number of poses of each."""
+    """HTML of the color legend, with the number of poses per color."""
     key = color_key((color, f"{name}: {count}") for color, name, count in zip(COLORS, NAMES, counts, strict=True))
     return html_block(f"<b>Chi squared of the poses</b><br>{key}")
 
@@ -99,7 +99,7 @@ def _ellipsoids_text(factor: float, *, relative: bool) -> str:
 
 
 def _outliers_text(found: Calibration, chosen: int | None) -> str:
-    """HTML of the outliers, each to be clicked."""
+    """HTML of the outliers, each of them clickable."""
     if not found.outliers:
         return sentence("No outliers.")
     rows = "".join(
@@ -133,7 +133,7 @@ def pose_residuals(found: Calibration, number: int) -> str:
 
 
 def _cell(residual: float, deviation: float, unit: str) -> str:
-    """Cells of a residual, also in standard deviations."""
+    """Table cells of a residual, in its unit and in standard deviations."""
     if not np.isfinite(residual):
         return "<td>–</td><td></td>"
     times = residual / deviation
@@ -142,7 +142,7 @@ def _cell(residual: float, deviation: float, unit: str) -> str:
 
 
 def _direction_text(one: Direction) -> str:
-    """A direction, and the part of its prior error that remains where it is observed."""
+    """A direction, and the part of its prior error that remains after the calibration."""
     left = f", {100.0 * one.known:.0f} % of the error before" if one.known < 0.995 else ""
     return f"{escape(one.name.replace('_', ' '))}{left}"
 
@@ -167,13 +167,13 @@ class CalibrationFeature(Feature):
         outliers = np.isin(found.rows, [one.row for one in found.outliers]) | (self._bands == self._bands.max())
         some = np.arange(0, len(found.rows), -(-len(found.rows) // MOST_POSES))
         self._drawn = np.union1d(some, np.flatnonzero(outliers)[:MOST_POSES])
-        self._ellipsoids: Hashable = ()  # settings for which they are drawn
+        self._ellipsoids: Hashable = ()  # settings of the present drawing
         self._poses: bool | None = None
         self._row: str | None = None
 
     @classmethod
     def of_page(cls, page: Page) -> CalibrationFeature | None:
-        """The feature of a page with a calibration; None for a page without."""
+        """The feature of a page with a calibration; None for other pages."""
         return None if page.found is None else cls(page, page.found)
 
     def _build_tab(self, page: Page, factor: float) -> None:
@@ -196,12 +196,12 @@ class CalibrationFeature(Feature):
         page.refresh_on(self._wanted, self._relative, self._factor, self._poses_wanted, self._field)
 
     def depends(self, view: View) -> Hashable:
-        """The controls alone."""
+        """Key of the controls, without the view."""
         controls = self._wanted, self._relative, self._factor, self._poses_wanted, self._field
         return tuple(each.value for each in controls)
 
     def follow(self, view: View) -> None:
-        """Draw and write for the values of the controls."""
+        """Update drawing and text for the values of the controls."""
         try:
             self._follow_ellipsoids()
         except SaglineError as error:
@@ -216,15 +216,15 @@ class CalibrationFeature(Feature):
 
     @property
     def _typed(self) -> str:
-        """The requested row, as typed; "" for none."""
+        """The requested row as typed; "" if none is requested."""
         return " ".join(str(self._field.value).split())[:20]
 
     def _toggle(self, row: Any) -> None:
-        """Select a clicked row, or none if it was selected before."""
+        """Select a clicked row; a second click removes the selection."""
         self._field.value = "" if str(row) == self._typed else str(row)
 
     def _anchors(self, which: Anchors, *, relative: bool) -> Ellipsoids:
-        """Ellipsoids of the anchors of frame or platform; none where they were not calibrated."""
+        """Ellipsoids of the anchors of frame or platform; none if they were not calibrated."""
         points = getattr(self._found.robot, which)
         covariance = anchor_covariance(self._found.parameters, self._found.covariance, which)
         if covariance is None:
@@ -274,7 +274,7 @@ class CalibrationFeature(Feature):
         self._nodes.lines(f"{parent}/moves", ends, TRUTH, TRACE_WIDTH)
 
     def _draw_balls(self, name: str, places: Array, turns: Array, scales: Array, colors: Any, **looks: Any) -> Any:
-        """Draw balls at places (k, 3), with quaternions (k, 4) and scales (k,) or (k, 3)."""
+        """Draw balls at positions (k, 3), with quaternions (k, 4) and scales (k,) or (k, 3)."""
         return self._nodes.draw(
             name,
             self._nodes.scene.add_batched_meshes_simple,

@@ -27,25 +27,25 @@ from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.tension_scale import force_unit
 
 LOSSES: Final = Damping(loss_time=1e-3)
-PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # s: ends of the parts; the first is short, to be shown soon
+PARTS: Final = (0.03, 0.1, 0.3, 0.7, 1.5, 2.8, 4.2)  # ends of the parts [s]; the first part is short and shown soon
 DURATION: Final = PARTS[-1]
 ELEMENTS: Final = 10  # elements of a cable with mass; twice as many take four times as long
 CABLE_MASS = {"massless": "none", "with cable mass": "lumped"}
-TOP = -10.0  # order value: above all other controls
+TOP = -10.0  # order value, above all other controls
 HELP: Final = sentence("Click a cable in the scene, or choose one.")
-MARK: Final = (200, 60, 130)  # 3 : 1 on both backgrounds
-_WIDTH: Final = 7.0  # px
+MARK: Final = (200, 60, 130)  # color with a contrast of 3 : 1 on both backgrounds
+_WIDTH: Final = 7.0  # width of the mark [px]
 _PLACE: Final = 0.4  # position of the name along the cable, from the frame end
-TOPIC: Final = "pick"  # of the messages of browser/hand.js
-NEAR: Final = 14.0  # px: largest distance of a click, or of a finger, from a cable
+TOPIC: Final = "pick"  # topics of the messages of browser/hand.js
+NEAR: Final = 14.0  # largest distance of a click, or of a finger, from a cable [px]
 
 
 def simulate_cut(state: Equilibrium, cable: int, cable_mass: str) -> Iterator[Simulation]:
-    """Simulation of the break of a cable, the other lengths kept; each part continues the one before."""
+    """Simulation of the break of a cable with constant other lengths; each part continues the previous one."""
     given = initial_conditions(state, None, None, DURATION)
     elements = ELEMENTS if cable_mass == "lumped" else 0
     losses = LOSSES
-    if elements:  # the losses of waves in stiff cables need no smaller steps than the waves themselves
+    if elements:  # the damping of waves in stiff cables does not require smaller steps than the waves
         losses = Damping(loss_time=min(LOSSES.loss_time, 2.0 / wave_frequency(given, elements)))
     run = started_run(given, elements, events=(Break(cable=cable, time=0.0),), damping=losses)
     for part in PARTS:
@@ -62,7 +62,7 @@ def peak_of(simulation: Simulation, cut: int) -> tuple[int, float, float]:
 
 
 def _outcome_text(simulation: Simulation, cut: int, *, whole: bool) -> str:
-    """HTML: largest displacement of the platform and highest tension after a cut; `whole` if it is complete."""
+    """HTML: largest displacement of the platform and highest tension after a cut; `whole`: a complete simulation."""
     unit, (cable, tension, time) = force_unit(simulation.robot), peak_of(simulation, cut)
     limit = float(simulation.robot.tension_max[cable])  # infinite without a limit
     away = np.linalg.norm(simulation.pose.position - simulation.pose.position[0], axis=1)
@@ -88,10 +88,10 @@ class CutFeature(Feature):
         """Build folder and buttons."""
         self._page, self._player, self._nodes = page, page.player, Nodes(page.server.scene)
         self._task = BackgroundTask(page.later)
-        self._is_marked = False  # true if a cable is marked in the scene
-        self._requested = self._playing = 0  # numbers of the last requested cut, and of the played one
+        self._is_marked = False  # True if a cable is marked in the scene
+        self._requested = self._playing = 0  # numbers of the last requested cut and of the played cut
         self._number = 0  # of the player, for the played cut
-        self._before: list[tuple[Pose, PlayerState]] = []  # states before each of the successive cuts
+        self._before: list[tuple[Pose, PlayerState]] = []  # states of the page before each of the successive cuts
         gui = page.server.gui
         with gui.add_folder("Cut a cable", expand_by_default=False):
             self._cable: Any = gui.add_dropdown("Cable to cut", tuple(map(str, range(page.robot.cable_count))))
@@ -123,7 +123,7 @@ class CutFeature(Feature):
         return view if self._is_marked else None
 
     def follow(self, view: View) -> None:
-        """Mark the cable that would be cut, with its tension and a button."""
+        """Mark the chosen cable, and show its tension and a button to cut it."""
         state, nodes, cable = view.state, self._nodes, self._chosen
         self._button.visible = shown = self._is_marked and state is not None
         if not shown or state is None:
@@ -180,12 +180,12 @@ class CutFeature(Feature):
         self._text.content = refused(message)
 
     def _play(self, number: int, simulation: Simulation, cable: int, before: tuple[Pose, PlayerState]) -> None:
-        """Play a part of a simulation, which contains those before."""
+        """Play a part of a simulation, which includes the previous parts."""
         if number != self._requested:
             return
         if self._playing == number:
             if self._player.number != self._number:
-                return  # something else is played now
+                return  # another motion is played now
             self._player.grow(PlayedSimulation(simulation))
         else:
             self._playing, self._is_marked = number, False
@@ -200,7 +200,7 @@ class CutFeature(Feature):
         self._is_marked = True
 
     def _pick(self, value: Any, client: int) -> None:
-        """Mark the cable at a point of the picture; `value` is not checked yet."""
+        """Mark the cable at a point of the picture; `value` is unchecked data of a client."""
         at, camera, view = screen_point(value), camera_of(self._page.server, client), self._page.view
         if at is None or camera is None or view is None or self._page.state is None:
             return

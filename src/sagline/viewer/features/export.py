@@ -28,16 +28,16 @@ from sagline.viewer.server import Messages
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import TensionScale
 
-WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # px
-RATE = 30.0  # pictures per second
-LONGEST = 120.0  # s of film: more pictures fill the memory of a browser
-LINE_WIDTH = 1.4  # relative to the line width on the screen
-TOPIC: Final = "film"  # description of the film
-CLOCK: Final = "film clock"  # texts of its strip, before each picture
+WIDTH, HEIGHT, TEXT = 1920, 1080, 26  # size of a picture [px]
+RATE = 30.0  # pictures of a film per second
+LONGEST = 120.0  # longest film [s]; a longer one would fill the memory of a browser
+LINE_WIDTH = 1.4  # line width relative to that on the screen
+TOPIC: Final = "film"  # topic of the description of the film
+CLOCK: Final = "film clock"  # topic of the texts of its strip, before each picture
 
 
-_CABLE_RADIUS = 0.0012  # share of the robot's size; real cables would be too thin to see
-_DEAD_RADIUS = 0.0006  # of the robot's size, for dead lengths
+_CABLE_RADIUS = 0.0012  # radius of cables, as a share of the robot's size; real cables would be too thin to see
+_DEAD_RADIUS = 0.0006  # radius of dead lengths, as a share of the robot's size
 _Z_UP_TO_Y_UP = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
@@ -75,7 +75,7 @@ def scene_as_glb(snapshot: Snapshot | InMotion, scale: TensionScale, sag_scale: 
 
 
 def _add(scene: Any, name: str, solid: shapes.Solid, color: tuple[int, ...], place: Any = None) -> None:
-    """Add a solid of a color to a scene of trimesh."""
+    """Add a colored solid to a scene of trimesh."""
     import trimesh
 
     mesh = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
@@ -97,22 +97,22 @@ def _filmed(
     extent: tuple[Array, Array],
     cancelled: Callable[[], bool],
 ) -> None:
-    """Have a client's page make a film of all that is played, from its camera; other clients are not affected.
+    """Make a client's page record a film of the played motion from its camera; other clients are not affected.
 
     Args:
         client: The client.
         server: The server; its scene is hidden from the client until the film is complete.
         messages: Messages to the client's page.
-        played: Run, simulation or log.
-        view: View that is drawn, with other configurations.
-        speed: Ratio of the time of what is played to that of the film.
+        played: Played motion: a run, a simulation or a log.
+        view: View whose settings are used for all configurations of the motion.
+        speed: Ratio of the time of the played motion to the time of the film.
         name: Name of the file, without suffix.
-        extent: Lowest and highest corner of all that is drawn [m].
-        cancelled: Function that returns whether the film was cancelled.
+        extent: Lowest and highest corner of everything that is drawn [m].
+        cancelled: Function that returns True if the film was cancelled.
 
     Raises:
         InvalidValueError: If the film would be too long.
-        RuntimeError: If the client disconnects, or sends no picture.
+        RuntimeError: If the client disconnects or does not send a picture.
         TimeoutError: If a picture does not arrive in time.
     """
     times = moments(played.duration, speed)
@@ -123,7 +123,7 @@ def _filmed(
         "width": WIDTH, "height": HEIGHT, "text": TEXT, "strip": strip,
     }  # fmt: skip
     shot = Shot.of(client.camera, *extent, WIDTH, HEIGHT - strip)
-    messages.send(CLOCK, None)  # pictures without a clock are not part of the film
+    messages.send(CLOCK, None)  # pictures without a clock do not belong to the film
     messages.send(TOPIC, about)
     try:
         with offscreen_scene(client, server, shot, view, LINE_WIDTH, played) as scene:
@@ -152,14 +152,14 @@ def moments(duration: float, speed: float) -> Array:
 
 
 def _clock(view: View, time: float, speed: float) -> dict[str, Any]:
-    """Text of the strip that changes from picture to picture."""
+    """Texts of the strip for one picture."""
     digits = max(1, ceil(-log10(speed / RATE)))
     text = headline(view.snapshot) if isinstance(view.snapshot, Snapshot) else view.snapshot.notice
     return {"time": f"{time:.{digits}f} s", "text": "" if view.snapshot.feasible else text}
 
 
 class _Exporter:
-    """A client with its exports, one at a time."""
+    """Exports of one client, one at a time."""
 
     def __init__(self, client: viser.ClientHandle) -> None:
         """Begin without exports."""
@@ -173,7 +173,7 @@ Send = Callable[[_Exporter], None]
 
 
 class ExportFeature(Feature):
-    """Buttons for a picture, the scene, and a film; an export waits in a thread of viser, other clients do not."""
+    """Buttons for a picture, the scene, and a film; an export runs in a thread and does not block other clients."""
 
     def __init__(self, page: Page) -> None:
         """Build the panel."""
@@ -197,11 +197,11 @@ class ExportFeature(Feature):
         self.put_on(page.player.played)
 
     def depends(self, view: View) -> Hashable:
-        """Key independent of the view."""
+        """Constant key, because the panel does not depend on the view."""
         return None
 
     def put_on(self, played: Played | None) -> None:
-        """Offer a film of what is played, or none."""
+        """Show the controls of a film if a motion is played."""
         self._film.visible = played is not None
         self._film.label = f"Film of the {None if played is None else played.name}"
 
@@ -238,13 +238,13 @@ class ExportFeature(Feature):
         return "sagline" if view is None else file_stem(view.snapshot.robot.name)
 
     def _export(self, send: Send, event: viser.GuiEvent[Any]) -> None:
-        """Export for the client of an event; nothing if it has disconnected, or sends no picture."""
+        """Export for the client of an event; nothing if the client has disconnected or does not send a picture."""
         client = event.client
         if client is None:
             return
         exporter = self._exporters.setdefault(client.client_id, _Exporter(client))
         if not exporter.busy.acquire(blocking=False):
-            return  # pressed twice
+            return  # the button was pressed twice
         try:
             send(exporter)
         except (RuntimeError, TimeoutError, SaglineError) as error:

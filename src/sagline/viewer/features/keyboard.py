@@ -37,7 +37,7 @@ def _description(robot: Robot) -> str:
 
 
 def place_of(pose: Pose) -> str:
-    """Position and, if not zero, angles of a platform in words."""
+    """Position and nonzero angles of a platform in words."""
     x, y, z = (number_text(value, ".2f") for value in pose.position)
     angles = [number_text(value, ".0f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
     place = f"x {x}, y {y}, z {z} m"
@@ -58,9 +58,9 @@ def _tensions(robot: Robot, tension: Array) -> str:
     return f"tensions {low} to {high} {unit.name}"
 
 
-STEP: Final = 0.01  # translation by a key, as a share of the robot's size
-TURN: Final = np.radians(1.0)  # rotation by a key
-MOST: Final = 100.0  # largest number of steps in one message (keys held during a delay)
+STEP: Final = 0.01  # translation per key press, as a share of the robot's size
+TURN: Final = np.radians(1.0)  # rotation per key press
+MOST: Final = 100.0  # largest number of steps in one message, for keys that are held during a delay
 
 
 class KeyboardFeature(Feature):
@@ -94,7 +94,7 @@ class KeyboardFeature(Feature):
         except SaglineError as error:
             self._channel.send("nudge-reply", str(error))
         else:
-            self._pose = pose  # the next key may arrive before this pose is shown
+            self._pose = pose  # the next key press may arrive before this pose is shown
             self._channel.send("nudge-reply", None)
 
 
@@ -105,7 +105,7 @@ def nudged(pose: Pose, displacement: Array, turn: Array) -> Pose:
 
 
 def _steps(value: Any) -> Array | None:
-    """Six numbers within the range of keys; None for anything else."""
+    """Six valid numbers of steps from a message; None for invalid data."""
     if not isinstance(value, list) or len(value) != 6:
         return None
     if not all(isinstance(each, int | float) and abs(each) <= MOST for each in value):  # also excludes NaN

@@ -25,8 +25,8 @@ from sagline.viewer.snapshot import Snapshot, method_name
 from sagline.viewer.tension_scale import ForceUnit, force_unit, number_text
 
 GO: Final = "go-there"  # topic of the button that moves the platform to the nearest pose
-NEGLIGIBLE: Final = 1e-9  # of the force at an arm of one meter: smaller moments count as zero
-OTHERWISE: Final = "AnalyticCenter"  # has a solution at every feasible pose
+NEGLIGIBLE: Final = 1e-9  # smaller moments, relative to the force at an arm of one meter, count as zero
+OTHERWISE: Final = "AnalyticCenter"  # a method that has a solution at every feasible pose
 
 
 def explanation(
@@ -78,7 +78,7 @@ def _missing_rows(snapshot: Snapshot, missing: MissingWrench) -> list[tuple[str,
 
 
 def _other_rows(snapshot: Snapshot) -> list[tuple[str, str]]:
-    """Rows where no missing force is known."""
+    """Table rows without a known missing force."""
     status = snapshot.status
     if status in (PoseStatus.NOT_COVERED, PoseStatus.UNBOUNDED) and snapshot.plan is not None:
         other = OTHERWISE if status is PoseStatus.NOT_COVERED else "MinimumNorm"
@@ -100,12 +100,12 @@ def _moment(missing: MissingWrench) -> str:
     return n(float(np.linalg.norm(missing.moment)), ".4g", "N m")
 
 
-FEASIBLE: Final = (28, 140, 92)  # the platform at the nearest feasible pose
-WIDTH, LINE_WIDTH = 5.0, 2.0  # px
-SMALL: Final = 0.8  # of the size of other labels
+FEASIBLE: Final = (28, 140, 92)  # opacity of the platform at the nearest feasible pose
+WIDTH, LINE_WIDTH = 5.0, 2.0  # width of its lines [px]
+SMALL: Final = 0.8  # size relative to other labels
 LONG: Final = 0.2  # length of the arrow, as a share of the robot's size
-_ARROW: Final = np.array([0.006, 0.014, 0.04])  # radii of shaft and head, length of the head; of the robot's size
-ALONG: Final = (0.32, 0.44, 0.56)  # of a cable from its anchor: positions of labels, different for neighbors
+_ARROW: Final = np.array([0.006, 0.014, 0.04])  # radii of shaft and head, length of the head, per size of the robot
+ALONG: Final = (0.32, 0.44, 0.56)  # positions of labels, as shares of a cable from its anchor; different for neighbors
 
 Key = tuple[object, ...]
 
@@ -114,23 +114,23 @@ class MissingFeature(Feature):
     """Text and drawing of the missing force, the cables at limits and the nearest feasible pose."""
 
     def __init__(self, page: Page) -> None:
-        """Draw nothing yet."""
+        """Begin without a drawing."""
         self._page, self._panel, self._nodes = page, page.panel, Nodes(page.server.scene)
         self._body = shapes.platform_solid(page.robot)
         self._task = BackgroundTask(page.later)
-        self.missing: MissingWrench | None = None  # at the pose that is shown
-        self._key: Key = ()  # of the pose that is shown; () while it is feasible
+        self.missing: MissingWrench | None = None  # missing wrench at the shown pose
+        self._key: Key = ()  # key of the shown pose; () while it is feasible
         self._found: tuple[Key, NearestFeasible | None] = ((), None)
         self._shown: tuple[Snapshot, View] | None = None
         page.channel.on(GO, self._go)
 
     @property
     def waiting(self) -> bool:
-        """True while the nearest pose is searched."""
+        """True while the nearest feasible pose is computed."""
         return self._task.busy
 
     def follow(self, view: View) -> None:
-        """Explain an infeasible pose; draw nothing at a feasible one."""
+        """Explain an infeasible pose; remove the explanation at a feasible pose."""
         snapshot = view.snapshot
         if not isinstance(snapshot, Snapshot) or snapshot.feasible:
             self.missing = None
@@ -150,7 +150,7 @@ class MissingFeature(Feature):
         self._explain()
 
     def _search(self) -> None:
-        """Have the nearest feasible pose computed."""
+        """Start the computation of the nearest feasible pose."""
         assert self._shown is not None
         (snapshot, view), key = self._shown, self._key
         model, wrench = _load(snapshot, view)
@@ -167,7 +167,7 @@ class MissingFeature(Feature):
         )
 
     def _explain(self) -> None:
-        """Write the explanation, and draw the nearest feasible pose, at first that of the pose before."""
+        """Write the explanation, and draw the nearest feasible pose; the previous one until it is computed."""
         assert self._shown is not None
         snapshot, nearest = self._shown[0], self._found[1] if self._found[0] else None
         searching = self._found[0] != self._key
@@ -194,7 +194,7 @@ class MissingFeature(Feature):
         self._nodes.label("/missing_name", missing_label(missing, force_unit(snapshot.robot)), tip)
 
     def _draw_limits(self, snapshot: Snapshot, missing: MissingWrench | None) -> None:
-        """Draw the cables at limits in the colors of these tensions, with their names."""
+        """Draw the cables at limits in the colors of these limits, with their names."""
         nodes, scale = self._nodes, self._page.scale
         limits = () if missing is None else missing.limits
         nodes.keep_first("/limits_names", len(limits))

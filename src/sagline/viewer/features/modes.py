@@ -1,4 +1,4 @@
-"""Modes with cable mass: list, frequency response, and a mode in motion."""
+"""Modes with cable mass: list, frequency response, and animation of a mode."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from sagline.viewer.tension_scale import number_text
 
 Place = Callable[[Array], Array]
 
-WIDTH, HEIGHT = 340, 210  # px
-LEFT, RIGHT, TOP, BOTTOM = 36, 10, 28, 36  # px around the axes
-HIGHEST_RESPONSE, LOWEST_RESPONSE = 2e2, 1e-3  # of the static response: limits for undamped peaks and zeros
-MARK = 12  # px, of a mode's mark
+WIDTH, HEIGHT = 340, 210  # size of the figure [px]
+LEFT, RIGHT, TOP, BOTTOM = 36, 10, 28, 36  # margins around the axes [px]
+HIGHEST_RESPONSE, LOWEST_RESPONSE = 2e2, 1e-3  # limits for undamped peaks and zeros, relative to the static response
+MARK = 12  # radius of a mode's mark [px]
 
 
 def _response_figure(curves: ResponseCurves, modes: list[ListedMode], words: str, chosen: str) -> str:
-    """HTML: both curves on logarithmic axes, a mark for every mode with cable mass, which can be clicked."""
+    """HTML: both curves on logarithmic axes, and a clickable mark for every mode with cable mass."""
     low = max(min(curves.with_mass.min(), curves.massless.min()), LOWEST_RESPONSE * curves.static)
     high = min(max(curves.with_mass.max(), curves.massless.max()), HIGHEST_RESPONSE * curves.static)
     decades = 10.0 ** floor(log10(low)), 10.0 ** ceil(log10(high))
@@ -68,7 +68,7 @@ def _response_figure(curves: ResponseCurves, modes: list[ListedMode], words: str
 
 
 def _points(x: Array, y: Array) -> str:
-    """Points of a polyline without those in the same half pixel."""
+    """Points of a polyline, at most one per half pixel."""
     cells = np.round(np.stack((2.0 * x, 2.0 * y)))
     kept = np.concatenate(([True], np.any(np.diff(cells, axis=1) != 0.0, axis=0)))
     return " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x[kept], y[kept], strict=True))
@@ -94,10 +94,10 @@ def _axes(words: str, across: Place, up: Place, decades: tuple[float, float], fi
     return "".join(marks)
 
 
-UP_TO = 20.0  # Hz, at the start
-HIGHEST = 200.0  # Hz
+UP_TO = 20.0  # initial highest frequency [Hz]
+HIGHEST = 200.0  # largest value of the highest frequency [Hz]
 FIELD = "Mode"
-TOPIC: Final = "mode"  # of the messages with the name of a mode that is clicked
+TOPIC: Final = "mode"  # topic of the messages with the name of a clicked mode
 
 
 def range_of_modes(vibration: Vibration) -> str:
@@ -138,21 +138,21 @@ def _row(mode: ListedMode, chosen: str) -> str:
     )
 
 
-RESTED: Final = 0.25  # s without a change before modes are computed
+RESTED: Final = 0.25  # delay of the computation after a change [s]
 DAMPING: Final = Damping(modal_damping=0.01)
 
 
 class ModesFeature(Feature):
-    """A tab with the list of modes and a frequency response; the chosen mode moves in the scene."""
+    """A tab with the list of modes and a frequency response; the scene animates the chosen mode."""
 
     def __init__(self, page: Page) -> None:
         """Build the tab."""
         self._scene, self._task = page.scene, BackgroundTask(page.later)
         self._key: Hashable = None
         self._state: Equilibrium | None = None
-        self._due: float | None = None  # time at which the modes are to be computed [s]
+        self._due: float | None = None  # time at which the computation of modes starts [s]
         self._vibration: Vibration | None = None
-        self._curves: dict[str, ResponseCurves] = {}  # of the vibration, by force
+        self._curves: dict[str, ResponseCurves] = {}  # responses of the vibration, by force
         self._listed: tuple[object, ...] = ()  # key of the list and the figure
         self.swing: Swing | None = None
         gui = page.server.gui
@@ -169,16 +169,16 @@ class ModesFeature(Feature):
 
     @property
     def moving(self) -> bool:
-        """True if a mode moves."""
+        """True if a mode is animated."""
         return self.swing is not None
 
     @property
     def waiting(self) -> bool:
-        """True while modes or a response are computed."""
+        """True while modes or a response are being computed."""
         return self._due is not None or self._task.busy
 
     def follow(self, view: View) -> None:
-        """Have the modes of the equilibrium that is shown computed, or show the chosen one."""
+        """Start the computation of the shown equilibrium's modes, or show the chosen mode."""
         state, key = self._at_rest(view)
         key = (key, self._highest)
         if state is None or key != self._key:
@@ -190,7 +190,7 @@ class ModesFeature(Feature):
             self._choose(self._vibration)
 
     def tick(self) -> None:
-        """Start a calculation that is due, write its time, and draw the next picture of the moving mode."""
+        """Start a due calculation, write its elapsed time, and draw the next picture of the animated mode."""
         now = time.monotonic()
         if self._due is not None and now >= self._due and self._state is not None:
             self._due = None
@@ -204,7 +204,7 @@ class ModesFeature(Feature):
 
     @property
     def _chosen(self) -> str:
-        """Name of the mode that is to move; "" for none."""
+        """Name of the chosen mode; "" if none is chosen."""
         return " ".join(str(self._mode.value).split())[:40]
 
     @property
@@ -219,7 +219,7 @@ class ModesFeature(Feature):
         return self._force.value if self._force.value in MOTIONS else MOTIONS[0]
 
     def _toggle(self, name: Any) -> None:
-        """Select a clicked mode, or none if it was selected before."""
+        """Select a clicked mode; a second click removes the selection."""
         self._mode.value = "" if str(name) == self._chosen else str(name)
 
     def _refuse(self, message: str) -> None:
@@ -228,7 +228,7 @@ class ModesFeature(Feature):
         self._list.content = refused(message)
 
     def _at_rest(self, view: View) -> tuple[Equilibrium | None, Hashable]:
-        """The equilibrium whose modes are to be computed, and a key of it."""
+        """The equilibrium of the modes, and a key of it."""
         snapshot, settings = view.snapshot, view.settings
         if view.playing or isinstance(snapshot, InMotion) or snapshot.plan is None or not snapshot.feasible:
             return None, None
@@ -241,7 +241,7 @@ class ModesFeature(Feature):
             self._choose(vibration)
 
     def _response(self, vibration: Vibration) -> ResponseCurves | None:
-        """The response to the chosen force; None while it is computed."""
+        """The response to the chosen force; None while it is being computed."""
         force = self._axis
         if _has_modes(vibration) and force not in self._curves and not self._task.busy:
 
@@ -254,7 +254,7 @@ class ModesFeature(Feature):
         return self._curves.get(force)
 
     def _choose(self, vibration: Vibration) -> None:
-        """Move the chosen mode, and write list and response."""
+        """Animate the chosen mode, and write list and response."""
         mode = mode_of(vibration, self._chosen)
         if mode is None:
             self._stop_swing()

@@ -1,4 +1,4 @@
-"""Proof: the polygon of the forces on the platform, and these forces in the scene."""
+"""Force balance of the shown pose: polygon of the forces on the platform, and arrows in the scene."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ class _PlatformForce:
     """A force on the platform."""
 
     name: str  # number of its cable, or "weight", "load" or "missing"
-    color: Color  # color of its cable, or its own
+    color: Color  # color of its cable, or a color of its own
     force: Array  # world axes [N], shape (3,)
-    moment: Array  # about the center of mass, world axes [N m], shape (3,)
+    moment: Array  # moment about the center of mass, world axes [N m], shape (3,)
     at: Array  # point at which it acts [m], shape (3,)
 
 
 def forces_of_cables(state: Equilibrium) -> Array:
-    """Forces of the cables on the platform [N], shape (m, 3), in the directions of their ends."""
+    """Forces of the cables on the platform [N], shape (m, 3), along the tangents of their platform ends."""
     back = (state.exit_point - state.pose.transform(state.one_robot.platform_anchors))[:, :2]
     far = np.linalg.norm(back, axis=1, keepdims=True)
     level = np.divide(back, far, out=np.zeros_like(back), where=far > 0.0)
@@ -45,7 +45,7 @@ def forces_of_cables(state: Equilibrium) -> Array:
 
 
 def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tuple[_PlatformForce, ...]:
-    """All forces on a platform: of its cables in order of azimuth, then weight, load and missing force."""
+    """All forces on a platform: those of the cables in order of azimuth, then weight, load and missing force."""
     robot, pose = state.one_robot, state.pose
     center = pose.transform(robot.center_of_mass)
     ends = pose.transform(robot.platform_anchors)
@@ -63,7 +63,7 @@ def forces_on_platform(state: Equilibrium, missing: Array | None = None) -> tupl
 
 
 def residual(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> tuple[float, float]:
-    """Residual of the force balance along the free motions: force [N] and moment [N m]."""
+    """Residual of the force balance along the free motions: magnitudes of force [N] and moment [N m]."""
     whole = np.concatenate((sum(each.force for each in forces), sum(each.moment for each in forces)))
     freedom = state.one_robot.freedom
     rest = freedom.T @ (freedom @ whole)
@@ -71,23 +71,23 @@ def residual(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> tuple[fl
 
 
 def _can_rotate(state: Equilibrium) -> bool:
-    """True if the platform can rotate, so that moments balance too."""
+    """True if the platform can rotate, so that the balance includes moments."""
     return bool(np.abs(state.one_robot.freedom[:, 3:]).max() > 0.0)
 
 
-WIDTH, BORDER = 340.0, 24.0  # px
-HIGHEST: Final = 200.0  # px, of a view
-HEAD: Final = (7.0, 2.8)  # length and half the width of an arrow's head [px]
-SHORT: Final = 3.0  # px: shorter arrows have no name
-LETTER: Final = (7.5, 11.0)  # px: largest width and height of a letter
-BESIDE: Final = 3.0  # px, between an arrow and its name
-SHARES: Final = (0.5, 0.35, 0.65, 0.2, 0.8)  # of an arrow: positions of its name, in order of preference
-SIDES: Final = ((0, 2), (1, 2), (0, 1))  # axes to the right and up: from the front, from the side, from above
-FLAT: Final = 1e-3  # of the largest projection: smaller ones are not shown
-SHOWN: Final = 2  # projections, those with the largest areas
+WIDTH, BORDER = 340.0, 24.0  # width of the figure, and its margin [px]
+HIGHEST: Final = 200.0  # largest height of a view [px]
+HEAD: Final = (7.0, 2.8)  # length and half width of an arrow's head [px]
+SHORT: Final = 3.0  # shortest arrow with a name [px]
+LETTER: Final = (7.5, 11.0)  # largest width and height of a letter [px]
+BESIDE: Final = 3.0  # distance between an arrow and its name [px]
+SHARES: Final = (0.5, 0.35, 0.65, 0.2, 0.8)  # positions of a name along its arrow, in order of preference
+SIDES: Final = ((0, 2), (1, 2), (0, 1))  # axes to the right and up, for front, side and top view
+FLAT: Final = 1e-3  # smallest shown projection, relative to the largest one
+SHOWN: Final = 2  # number of projections; those with the largest areas are shown
 
 
-Label = tuple[float, float, float, float]  # middle, to the right and down, and half the width and height of a name [px]
+Label = tuple[float, float, float, float]  # center of a name, to the right and down, and half its width and height [px]
 
 
 def _overlap(one: Label, other: Label) -> float:
@@ -103,7 +103,7 @@ def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> st
     views = [("xyz"[right] + "xyz"[up], corners[:, [right, up]]) for right, up in SIDES]
     areas = [float(np.prod(np.ptp(points, axis=0))) for _, points in views]
     shown = np.sort(np.argsort(areas)[::-1][:SHOWN])
-    views = [views[k] for k in shown if areas[k] > FLAT * max(areas)] or views[:1]  # a planar robot has one
+    views = [views[k] for k in shown if areas[k] > FLAT * max(areas)] or views[:1]  # a planar robot has one projection
     extents = np.array([np.ptp(points, axis=0) for _, points in views])
     scale = float(min((WIDTH - 2.0 * BORDER) / max(extents[:, 0].max(), 1e-12), HIGHEST / extents[:, 1].max()))
     drawn = "".join(_projection(*view, forces, scale) for view in views)
@@ -111,7 +111,7 @@ def force_polygon_figure(state: Equilibrium, missing: Array | None = None) -> st
 
 
 def _projection(axes: str, points: Array, forces: tuple[_PlatformForce, ...], scale: float) -> str:
-    """SVG of the polygon with corners (k + 1, 2) [N], between which the forces act, on two axes."""
+    """SVG of a force polygon on two axes; its k sides are the forces between corners (k + 1, 2) [N]."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = scale * float(high[1] - low[1]) + 2.0 * BORDER
     left = 0.5 * (WIDTH - scale * float(high[0] - low[0]))
@@ -130,7 +130,7 @@ def _projection(axes: str, points: Array, forces: tuple[_PlatformForce, ...], sc
 
 
 def _arrow(force: _PlatformForce, start: Array, end: Array, labels: list[Label]) -> str:
-    """An arrow with its name, which avoids the labels before; the missing force is dashed."""
+    """An arrow with its name, which avoids previous labels; the missing force is dashed."""
     way = end - start
     length = float(np.hypot(*way))
     if length < 0.5:
@@ -169,7 +169,7 @@ def _label(name: str, start: Array, way: Array, normal: Array, labels: list[Labe
 
 
 def _residual_text(state: Equilibrium, forces: tuple[_PlatformForce, ...], missing: Array | None) -> str:
-    """Sentence on the residual."""
+    """Sentence about the residual."""
     force, moment = residual(state, forces)
     left = n(force, ".2g", "N")
     if _can_rotate(state):
@@ -202,7 +202,7 @@ def _table(state: Equilibrium, forces: tuple[_PlatformForce, ...]) -> str:
 
 
 def _decimals(largest: float) -> int:
-    """Number of decimals for a largest force, by the width of the table."""
+    """Number of decimals for a largest force, limited by the width of the table."""
     return 1 if largest >= 99.95 else 2 if largest >= 9.995 else 3
 
 
@@ -212,14 +212,14 @@ def _cells(force: Array, moment: Array, decimals: int, *, turning: bool) -> str:
     return "".join(f"<td>{cell}</td>" for cell in cells)
 
 
-LONG: Final = 0.22  # the longest arrow in the scene, as a share of the robot's size
-_ARROW: Final = np.array([0.0045, 0.011, 0.03])  # radii of shaft and head, length of the head; of the robot's size
+LONG: Final = 0.22  # length of the longest arrow in the scene, as a share of the robot's size
+_ARROW: Final = np.array([0.0045, 0.011, 0.03])  # radii of shaft and head, length of the head, per size of the robot
 NOT_AT_REST: Final = "The force balance is shown for a pose at rest, not for a motion or a log."
 UNKNOWN: Final = "Neither tensions nor a missing force are known here."
 
 
 class ProofFeature(Feature):
-    """A tab with the force balance of the pose that is shown, and the forces in the scene."""
+    """A tab with the force balance of the shown pose, and the forces as arrows in the scene."""
 
     def __init__(self, page: Page) -> None:
         """Build the tab."""
@@ -232,7 +232,7 @@ class ProofFeature(Feature):
         page.refresh_on(self._wanted)
 
     def follow(self, view: View) -> None:
-        """Write and draw the force balance."""
+        """Write the force balance and draw its forces."""
         state, missing = self._balance(view)
         if state is None:
             self._html.content = sentence(NOT_AT_REST if not isinstance(view.snapshot, Snapshot) else UNKNOWN)
@@ -241,7 +241,7 @@ class ProofFeature(Feature):
         self._draw(state if self._wanted.value else None, missing)
 
     def _balance(self, view: View) -> tuple[Equilibrium | None, Array | None]:
-        """The equilibrium, and the missing wrench."""
+        """The equilibrium with its missing wrench."""
         snapshot = view.snapshot
         if not isinstance(snapshot, Snapshot):
             return None, None

@@ -1,4 +1,4 @@
-"""Push: a force that the user applies to the platform, and the response to it."""
+"""Force of the user on the platform, and the response to it."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from sagline.viewer.robot_scene import Nodes
 from sagline.viewer.shapes import THINNEST, ball, readable
 from sagline.viewer.tension_scale import ForceUnit, force_unit
 
-COLOR: Final = (200, 60, 130)  # contrast 3 : 1 on both backgrounds, not used for platforms
+COLOR: Final = (200, 60, 130)  # color with a contrast of 3 : 1 on both backgrounds, different from platforms
 GHOST_OPACITY, BALL_OPACITY = 0.5, 0.3
-_ARROW: Final = np.array([0.003, 0.009, 0.025])  # radii of shaft and head, length of the head; of the robot's size
-_BELOW: Final = 0.03  # distance of the label of the reserve below the point, as a share of the robot's size
-FARTHEST: Final = 1e4  # m: largest distance of a point of the platform from its frame
+_ARROW: Final = np.array([0.003, 0.009, 0.025])  # radii of shaft and head, length of the head, per size of the robot
+_BELOW: Final = 0.03  # distance of the reserve's label below the point, as a share of the robot's size
+FARTHEST: Final = 1e4  # largest distance of a point from the platform frame's origin [m]
 HELP: Final = sentence("Ctrl-drag the platform, or type a force.")
-TOPIC: Final = "pull"  # of the messages of browser/hand.js
-FAR: Final = 0.25  # share of the robot's size: a drag of this length applies the mean of the tension limits
-NEAR: Final = 12.0  # px: largest distance of a pointer that grabs the platform
+TOPIC: Final = "pull"  # topics of the messages of browser/hand.js
+FAR: Final = 0.25  # length of a drag, as a share of the robot's size, that applies the mean of the tension limits
+NEAR: Final = 12.0  # largest distance of a pointer that grabs the platform [px]
 LARGE: Final = 0.06  # longest semi-axis of the ellipsoid, as a share of the robot's size
-LONGEST: Final = 0.6  # longest arrow of a force that is typed, as a share of the robot's size
+LONGEST: Final = 0.6  # longest arrow of a typed force, as a share of the robot's size
 
 
 def response_text(response: PushResponse, drawn_for: float | None) -> str:
-    """HTML of a response; `drawn_for` is the force that the ellipsoid is drawn for [N], None without one."""
+    """HTML of a response; `drawn_for` is the force of the drawn ellipsoid [N], None without an ellipsoid."""
     unit = force_unit(response.state.one_robot)
     rows = [
         ("Force", unit.written(response.force)),
@@ -60,7 +60,7 @@ def _motion_text(response: PushResponse) -> str:
 
 
 def _reserve_text(response: PushResponse, reserve: Reserve, unit: ForceUnit) -> str:
-    """Difference between a reserve and the force."""
+    """Text of the difference between a reserve and the force."""
     if not np.isfinite(reserve.force):
         return "no limit found"
     more = reserve.force - response.force
@@ -84,15 +84,15 @@ def _compliance_text(response: PushResponse, drawn_for: float | None) -> str:
 
 
 class PushFeature(Feature):
-    """A folder with the fields of a force, typed or dragged, and the response in the scene."""
+    """A folder with the fields of a typed or dragged force, and the response in the scene."""
 
     def __init__(self, page: Page) -> None:
         """Build the folder."""
         self._page, self._size, self._nodes = page, page.size, Nodes(page.server.scene)
         self.body, self._ball = shapes.platform_solid(page.robot), ball()
         scale = page.scale
-        self._stiffness = float(np.sqrt(scale.low * scale.high)) / (FAR * self._size)  # N/m of a drag
-        self._hold: tuple[int, Array] | None = None  # client and point that it drags, platform frame [m]
+        self._stiffness = float(np.sqrt(scale.low * scale.high)) / (FAR * self._size)  # [N/m], force of a drag
+        self._hold: tuple[int, Array] | None = None  # client, and the point that it drags, platform frame [m]
         self.response: PushResponse | None = None
         self._unit = force_unit(page.robot)
         self._build_folder(page)
@@ -121,7 +121,7 @@ class PushFeature(Feature):
         self._release.on_click(lambda _: page.later(self.release))
 
     def depends(self, view: View) -> Hashable:
-        """The view while there is a force."""
+        """Key: the view if a force is applied."""
         return view if self._force.value != 0.0 else None
 
     def follow(self, view: View) -> None:
@@ -152,7 +152,7 @@ class PushFeature(Feature):
             self.response = response
 
     def _typed(self) -> Push | None:
-        """The force in the fields; None for none."""
+        """The force in the fields; None if it is zero."""
         size = self._unit.newtons * float(_numbers(self._force.value, 1, "force", "a number >= 0")[0])
         if size == 0.0:
             return None
@@ -177,12 +177,12 @@ class PushFeature(Feature):
             self._at.value = tuple(float(x) for x in push.at)
 
     def _show_text(self, html: str) -> None:
-        """Write the response; "" for how to apply a force."""
+        """Write the response; "" shows how to apply a force."""
         self._text.content = html or HELP
         self._release.visible = bool(html)
 
     def _show_none(self, html: str) -> None:
-        """Draw no response, and write why."""
+        """Remove the drawing of the response, and write the reason."""
         self._nodes.hide("/push", "/push_tip", "/push_below", "/pushed", "/gives_way")
         self._show_text(html)
         self.response = None
@@ -227,7 +227,7 @@ class PushFeature(Feature):
             self.release()
 
     def _on_drag(self, value: Any, client: int) -> None:
-        """Apply the force of a drag; `value` is not checked yet."""
+        """Apply the force of a drag; `value` is unchecked data of a client."""
         if not isinstance(value, dict):
             return
         phase, at = value.get("phase"), screen_point(value.get("at"))
@@ -247,7 +247,7 @@ class PushFeature(Feature):
             self._hold = None
 
     def _grab(self, camera: Camera, at: tuple[float, float], client: int) -> None:
-        """_Hold the point of the platform that is seen at a point of the picture, if there is one."""
+        """Hold the platform point that is visible at a point of the picture, if there is one."""
         state: Equilibrium | None = self._page.state
         if state is None:
             return
@@ -257,7 +257,7 @@ class PushFeature(Feature):
         if distance is not None:
             self._hold = client, start + distance * direction
             return
-        points = self.body.vertices[self.body.faces].mean(axis=1)  # a thin platform is easily missed
+        points = self.body.vertices[self.body.faces].mean(axis=1)  # the ray easily misses a thin platform
         places, depth = camera.project(state.pose.transform(points))
         away = np.linalg.norm(places - np.asarray(at) * camera.pixels, axis=1)
         away[~(depth > 0.0)] = np.inf  # behind the camera
@@ -272,7 +272,7 @@ def _drag(camera: Camera, at: tuple[float, float], start: Array) -> Array:
 
 
 def _ellipsoid(axes: Array) -> tuple[Array, tuple[float, float, float]]:
-    """Quaternion (scalar first) and scale of a unit ball for semi-axes (3, 3); with a least thickness."""
+    """Quaternion (scalar first) and scale of a unit ball for semi-axes (3, 3), with a minimum thickness."""
     lengths = np.linalg.norm(axes, axis=0)
     directions = axes / np.maximum(lengths, 1e-300)
     if np.linalg.det(directions) < 0.0:
@@ -282,7 +282,7 @@ def _ellipsoid(axes: Array) -> tuple[Array, tuple[float, float, float]]:
 
 
 def _numbers(value: Any, count: int, item: str, allowed: str) -> Array:
-    """Finite numbers of a field; its value is not checked by viser."""
+    """Finite numbers of a field, whose value viser does not check."""
     try:
         found = np.asarray(value, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError, OverflowError):

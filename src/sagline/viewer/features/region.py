@@ -38,12 +38,12 @@ from sagline.workspaces.levels import Levels
 from sagline.workspaces.region import Plane, Region, region_of, slice_of
 from sagline.workspaces.wrench_sets import WrenchBox
 
-BOUNDARY_WIDTH, LINE_WIDTH, LINE_COLOR = 4.0, 1.5, (120, 128, 138)  # px
-_SMALL, _TEXT_SCALE = 0.7, 0.85  # text scale of labels on lines, and of other labels
-INWARD, OUTWARD = REST, PLATFORM  # arrows back to the workspace, and to its boundary
-_BELOW: Final = 0.04  # of the robot's size, from the platform to the text below it
-_ARROW: Final = np.array([0.002, 0.009, 0.03])  # radii of shaft and head, length of the head; of the robot's size
-# turn x and y of a picture to the two axes of a plane, by its normal
+BOUNDARY_WIDTH, LINE_WIDTH, LINE_COLOR = 4.0, 1.5, (120, 128, 138)  # line widths [px], and color
+_SMALL, _TEXT_SCALE = 0.7, 0.85  # text scale of labels on lines and of other labels
+INWARD, OUTWARD = REST, PLATFORM  # colors of arrows back to the workspace and to its boundary
+_BELOW: Final = 0.04  # distance from the platform to the text below it, as a share of the robot's size
+_ARROW: Final = np.array([0.002, 0.009, 0.03])  # radii of shaft and head, length of the head, per size of the robot
+# rotations from x and y of a picture to the two axes of a plane, by the normal of the plane
 _TURNS: Final = np.array([[0.5, 0.5, 0.5, 0.5], [np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
 POINTS: Final = 40  # points of a slice along each axis of its plane
 COARSE: Final = 7  # points along each axis whose margins give the range of the colors
@@ -56,17 +56,17 @@ _Result = tuple[Hashable, bool, Hull | None]
 
 
 class _SupersededError(SaglineError):
-    """Another workspace is requested."""
+    """Signal that another workspace is requested."""
 
 
 def planes_of(robot: Robot) -> tuple[int, ...]:
-    """Normals of the planes in which a robot's space can be sliced: of a planar robot its own."""
+    """Normals of the planes of possible slices; for a planar robot, only the normal of its plane."""
     flat = region_of(robot, None, CELLS).flat
     return (2, 1, 0) if flat is None else (flat,)
 
 
 class RegionFeature(Feature):
-    """A tab with the loads and the choice of region, slice and free travel, which are drawn in the scene."""
+    """A tab with loads and a choice of region, slice and free travel, which are drawn in the scene."""
 
     def __init__(self, page: Page) -> None:
         """Build the tab."""
@@ -78,11 +78,11 @@ class RegionFeature(Feature):
         self._region: Region | None = None
         self._place = np.zeros(3)  # position of the platform [m]
         self._scale = MarginScale(1.0)
-        self._scale_key: Hashable = None  # of the workspace that the scale is for
-        # key of the workspace, true if the hull is the coarse one, and the hull; None if it cannot be computed
+        self._scale_key: Hashable = None  # key of the workspace of the scale
+        # key of the workspace, True for the coarse hull, and the hull; None if it cannot be computed
         self._result: _Result | None = None
-        self._hull_key: Hashable = None  # of the hull that is drawn
-        self._slice_key: Hashable = None  # of the slice that is drawn
+        self._hull_key: Hashable = None  # key of the drawn hull
+        self._slice_key: Hashable = None  # key of the drawn slice
         self._progress = 0.0
         self._build_tab(page)
 
@@ -116,21 +116,21 @@ class RegionFeature(Feature):
 
     @property
     def _anything(self) -> bool:
-        """True if anything is to be drawn."""
+        """True if the user has chosen a drawing."""
         return bool(self._region_box.value or self._slice_box.value or self._travel_box.value)
 
     @property
     def _by_cable(self) -> bool:
-        """True if the colors of the hull are those of the limiting cables."""
+        """True if the hull has the colors of the limiting cables."""
         return bool(self._color.value != BY_MARGIN)
 
     @property
     def _scaled(self) -> bool:
-        """True if anything is drawn in the colors of margins."""
+        """True if a drawing has the colors of margins."""
         return bool(self._slice_box.value or (self._region_box.value and not self._by_cable))
 
     def depends(self, view: View) -> Hashable:
-        """The view while anything is to be drawn."""
+        """Key: the view if the user has chosen a drawing."""
         return view if self._anything else None
 
     def follow(self, view: View) -> None:
@@ -158,7 +158,7 @@ class RegionFeature(Feature):
             self._hull_html.content = sentence(text)
 
     def _arrange(self) -> None:
-        """Show the choices for what is drawn, and clear the text of what is not."""
+        """Show the choices of active drawings, and clear the texts of the others."""
         self._color.visible, self._plane.visible = bool(self._region_box.value), bool(self._slice_box.value)
         if not self._region_box.value:
             self._hull_html.content = self._margin_html.content = ""
@@ -171,14 +171,14 @@ class RegionFeature(Feature):
         self._hull_html.content, self._margin_html.content = refused(message), ""
 
     def _prepare(self, robot: Robot, pose: Pose, model: CableModel, wrench: Array | None) -> tuple[Levels, Region]:
-        """Levels and region, made again where they would differ."""
+        """Levels and region, created again if their inputs have changed."""
         loads = _load(self._force, "N"), _load(self._moment, "N m")
         key = (id(robot), pose.quaternion.tobytes(), type(model), loads, None if wrench is None else wrench.tobytes())
         if key != self._key or self._levels is None or self._region is None:
             quaternion = locked(np.array(pose.quaternion))
             self._query = WorkspaceQuery(
                 robot, quaternion, model, WrenchBox(*loads, center=wrench)
-            )  # keeps the robot, and so its id
+            )  # keeps the robot alive, so that its id remains unique
             self._region, self._levels = region_of(robot, None, CELLS), self._query.levels()
             self._key = key
         if self._scale_key != key and self._scaled:
@@ -186,12 +186,12 @@ class RegionFeature(Feature):
         return self._levels, self._region
 
     def _show_hull(self, patches: list[Patch], *, opened: bool = False) -> None:
-        """Draw the hull, its front faces left out where opened."""
+        """Draw the hull; if it is opened, without its front faces."""
         with self._server.atomic():
             draw_patches(self._nodes, "/hull", patches, "back" if opened else "double")
 
     def _follow_hull(self) -> None:
-        """Draw the latest hull, and have a better one computed."""
+        """Draw the latest hull, and start the computation of a better one."""
         if not self._region_box.value:
             self._show_hull([])
             self._hull_key = self._result = None
@@ -213,18 +213,18 @@ class RegionFeature(Feature):
             self._hull_html.content = html_block(hull.text)
 
     def _compute(self, *, rough: bool) -> None:
-        """Have the hull of the workspace that is shown computed in the background."""
+        """Start the computation of the shown workspace's hull in the background."""
         query, key = self._query, self._key
         assert query is not None
         self._progress = 0.0
 
-        def progress(done: int, total: int) -> None:  # in the background thread
+        def progress(done: int, total: int) -> None:  # runs in the background thread
             self._progress = min(done / max(total, 1), 1.0)
             if self._key != key and not rough:  # a rough hull is shown while a slider moves
                 raise _SupersededError
 
         def failed(message: str) -> None:
-            if not message:  # superseded
+            if not message:  # a newer calculation has replaced this one
                 self._receive(self._result)
             elif self._key == key:
                 self._receive((key, False, None))
@@ -304,7 +304,7 @@ class RegionFeature(Feature):
         self._travel_html.content = travel_text(travel, force_unit(robot))
 
     def _draw_travel(self, travel: FreeTravel) -> None:
-        """Draw an arrow in each direction, with its length where it ends at the boundary."""
+        """Draw an arrow in each direction, with its length if it ends at the boundary."""
         ends = np.stack((np.broadcast_to(travel.start, travel.ends.shape), travel.ends), axis=1)
         self._nodes.arrows("/travel", ends, OUTWARD if travel.inside else INWARD, *(_ARROW * self._size))
         for k, which in enumerate(travel.which):
@@ -312,7 +312,7 @@ class RegionFeature(Feature):
             self._nodes.label(f"/travel/{NAMES[which]}", text, travel.ends[k], scale=_TEXT_SCALE)
 
     def _clear(self) -> None:
-        """Draw nothing, and forget the workspace."""
+        """Remove the drawing and the stored workspace."""
         self._nodes.remove("/hull", "/wall", "/slice", "/travel")
         self._nodes.hide("/platform/left")
         self._hull_key = self._key = self._result = self._slice_key = None

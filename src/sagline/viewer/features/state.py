@@ -1,4 +1,4 @@
-"""Field of the pose, and the state of the page as code or as a link."""
+"""Field of the pose, and state of the page as code or as a link."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from sagline.viewer.readout import html_block
 from sagline.viewer.snapshot import Settings, Snapshot
 from sagline.viewer.tension_scale import number_text
 
-FIRST: Final = -0.9  # order among the controls: above all but what is played
+FIRST: Final = -0.9  # order among the controls: above all controls except those of the played motion
 EXAMPLE: Final = "1, 0, 1.5 or 1, 0, 1.5, 10, 0, 0"
 POSE_STEP: Final = f"Give meters, and degrees about z, y and x: {EXAMPLE}."
 HINT: Final = "Position in meters; angles about z, y and x in degrees, if any. Enter moves the platform there."
@@ -50,13 +50,13 @@ _CONTENT: Final = html_block(
     '<button type="button" data-copy="link" title="A link that opens this state on another page">Copy link</button>'
     '<button type="button" data-keys class="small" aria-label="Keys" title="List of the keys">?</button></div></div>'
 )
-LONGEST_NAME: Final = 40  # characters of the name of a request
-MASS, SHARING, HAND = "platform-load", "tensions", "by-hand"  # names of two controls, and of tensions chosen by hand
+LONGEST_NAME: Final = 40  # largest number of characters in the name of a request
+MASS, SHARING, HAND = "platform-load", "tensions", "by-hand"  # names of two controls and of tensions by hand
 SHOWN: Final = "print(tension)  # [N], cable by cable"
 
 
 def _pose_text(pose: Pose) -> str:
-    """A pose as the field takes it, to a tenth of a millimeter and a hundredth of a degree; no angles where level."""
+    """A pose in the format of the field, to 0.1 mm and 0.01 degree; without angles if the platform is level."""
     place = [_short(value, ".4f") for value in pose.position]
     angles = [_short(value, ".2f") for value in pose.rotation.as_euler("ZYX", degrees=True)]
     return ", ".join(place if angles == ["0"] * 3 else place + angles)
@@ -70,13 +70,13 @@ class StateFeature(Feature):
     """Field of the pose, and the state as code or as a link."""
 
     def __init__(self, page: Page) -> None:
-        """Build the panel, after all other controls, as links contain them."""
+        """Build the panel after all other controls, because links contain their values."""
         page.server.gui.add_html(_CONTENT, order=FIRST)
         self._page, self._channel, self._robot = page, page.channel, page.robot
         self._controls = LinkedControls(page.server.gui)
         self._view: View | None = None
         self._time = 0.0
-        self._requests: deque[tuple[Any, int]] = deque()  # for texts, and their clients
+        self._requests: deque[tuple[Any, int]] = deque()  # requests for texts, and their clients
         page.channel.on("pose", self._on_pose)
         page.channel.on("copy", lambda value, client: self._requests.append((value, client)))
         page.channel.on("link", self._on_link)
@@ -87,7 +87,7 @@ class StateFeature(Feature):
         self._channel.send("pose", _pose_text(view.snapshot.pose))
 
     def tick(self) -> None:
-        """Answer the requests for texts, when the changes before them are shown."""
+        """Answer the requests for texts after earlier changes are shown."""
         while self._requests:
             value, client = self._requests.popleft()
             self._answer(client, "copy-reply", value, partial(self._copy, client))
@@ -138,7 +138,7 @@ class StateFeature(Feature):
         return {"text": code_of(view, self._robot, source, self._time)}
 
     def _link_to(self, view: View, client: int) -> str:
-        """A link to a view, through the camera of a client."""
+        """A link to a view with the camera of a client."""
         parts = {"robot": name_of(self._robot)}
         if view.played is not None:
             parts["time"] = repr(float(self._page.player.clock.time))
@@ -158,7 +158,7 @@ class StateFeature(Feature):
         return link_text({**parts, **controls})
 
     def _open_link(self, text: str, client: int) -> None:
-        """Bring the page, and the camera of a client, to the state of a link; nothing changes if it is refused."""
+        """Bring the page, and the camera of a client, to the state of a link; an invalid link changes nothing."""
         parts = parts_of(text)
         check_robot(parts.pop("robot"), self._robot)
         place, framing = self._place(parts), self._page.framing
@@ -200,7 +200,7 @@ def _six(text: str | None, item: str, unit: str, largest: float) -> Array | None
 
 
 def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
-    """Lines of Python whose last names hold what is shown: `robot`, `pose`, `tension`."""
+    """Lines of Python that create the shown objects as `robot`, `pose` and `tension`."""
     snapshot = view.snapshot
     if view.played is not None:
         lines = view.played.code(source.played, time)
@@ -213,7 +213,7 @@ def code_of(view: View, robot: Robot, source: Source, time: float = 0.0) -> str:
 
 
 def _changes(settings: Settings, robot: Robot) -> list[str]:
-    """Lines of the changes of a robot by the settings."""
+    """Lines of Python for the changes of a robot by the settings."""
     lines = [] if settings.mass == robot.mass else [_weighed(settings.mass)]
     factors = {"linear_density": settings.density, "axial_stiffness": settings.stiffness}
     changed = [f"    {name}=cables.{name} * {factor!r}," for name, factor in factors.items() if factor != 1.0]
@@ -227,7 +227,7 @@ def _weighed(mass: float) -> str:
 
 
 def _planned(snapshot: Snapshot, view: View) -> list[str]:
-    """Lines of the plan of a pose."""
+    """Lines of Python for the plan of a pose."""
     settings, pose = view.settings, snapshot.pose
     angles = ", ".join(number_text(angle, ".6g") for angle in pose.rotation.as_euler("ZYX", degrees=True))
     arguments = [
@@ -247,8 +247,8 @@ def _planned(snapshot: Snapshot, view: View) -> list[str]:
 
 
 def _constructor(choice: Any) -> str:
-    """Call that makes a cable model or a tension distribution method, without default arguments."""
-    kind = QuadraticProgram if isinstance(choice, QuadraticProgram) else type(choice)  # by hand or not
+    """Call that creates a cable model or a tension distribution method, without default arguments."""
+    kind = QuadraticProgram if isinstance(choice, QuadraticProgram) else type(choice)  # or tensions by hand
     default = kind()
     values = {field.name: (getattr(choice, field.name), getattr(default, field.name)) for field in fields(default)}
     arguments = [f"{name}={_plain(value)}" for name, (value, usual) in values.items() if not _same(value, usual)]

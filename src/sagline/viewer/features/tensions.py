@@ -27,7 +27,7 @@ from sagline.viewer.server import chosen_by
 from sagline.viewer.snapshot import METHODS, Snapshot, method_name
 from sagline.viewer.tension_scale import force_unit, number_text
 
-NEAR: Final = 10.0  # px: marks that are closer are joined
+NEAR: Final = 10.0  # closer marks are joined [px]
 
 
 class _MethodMark(NamedTuple):
@@ -40,10 +40,10 @@ class _MethodMark(NamedTuple):
 
 
 class MethodMarks:
-    """Results of all tension distribution methods at a pose, kept while only the chosen method changes.
+    """Results of all tension distribution methods at a pose; they remain valid if only the chosen method changes.
 
-    A robot that moves gets its own solvers, which are a dozen times as fast. Making them takes longer than a single
-    solution, so a robot whose mass follows a slider has none.
+    For a moving robot, prepared solvers are about twelve times as fast. Their preparation takes longer than one
+    solution. A robot whose mass follows a slider therefore does not have prepared solvers.
     """
 
     def __init__(self) -> None:
@@ -69,7 +69,7 @@ class MethodMarks:
 
 
 def grouped(marks: tuple[_MethodMark, ...], field: DotField) -> list[tuple[tuple[float, float], list[_MethodMark]]]:
-    """Marks with a result, in groups of those at the same position, with the position [px]."""
+    """Groups of marks at the same position, and the positions [px]; only methods with a result have a mark."""
     groups: list[tuple[tuple[float, float], list[_MethodMark]]] = []
     for mark in marks:
         if mark.missing:
@@ -108,14 +108,14 @@ def _mark(plan: Plan, name: str, letter: str, solver: InverseSolver | None) -> _
     return _MethodMark(name, letter, tension, "" if status is PoseStatus.SOLVED else status.text)
 
 
-MOST_REDUNDANT: Final = 2  # redundant cables of a drawing
+MOST_REDUNDANT: Final = 2  # numbers of redundant cables with a drawing
 SHARING: Final = "sharing"  # topic of a chosen tension distribution method
 
 
 def polygon_figure(
     snapshot: Snapshot, marks: tuple[_MethodMark, ...] = (), field: DotField | None = None, back: str = ""
 ) -> str:
-    """HTML: the polygon with the chosen tensions in it; for one redundant cable the interval; else a sentence."""
+    """HTML: polygon with the chosen tensions; interval for one redundant cable; otherwise a sentence."""
     if remark := _why_not_drawn(snapshot):
         return sentence(remark)
     drawn = dot_field_of(snapshot) if field is None else field
@@ -137,7 +137,7 @@ def _why_not_drawn(snapshot: Snapshot) -> str:
 
 
 def dot_field_of(snapshot: Snapshot, before: DotField | None = None) -> DotField | None:
-    """Feasible tensions of a pose, with the sag forces of its cables; None if there are none."""
+    """Feasible tensions of a pose, with the sag forces of its cables; None without feasible tensions."""
     polygon = _polygon(snapshot)
     if polygon is None or not len(polygon.vertices):
         return None
@@ -154,7 +154,7 @@ def _polygon(snapshot: Snapshot) -> TensionPolygon | None:
         return polygon_at(robot, snapshot.pose, options, state.wrench, state.chord_tension, state.pull, feasible=True)
     try:
         return tension_polygon(robot, snapshot.pose, state.cables.model, state.wrench)
-    except InvalidValueError:  # a pose without a balance
+    except InvalidValueError:  # a pose without force balance
         return None
 
 
@@ -176,7 +176,7 @@ def _drawing(snapshot: Snapshot, field: DotField, marks: tuple[_MethodMark, ...]
 
 
 def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
-    """The dot of the chosen tensions, with a target large enough for a finger; "" without tensions."""
+    """The dot of the chosen tensions, clickable in an area as large as a finger; "" without tensions."""
     point = field.polygon.coordinates(snapshot.tension)
     if not np.isfinite(point).all():  # the method has no solution
         return ""
@@ -197,7 +197,7 @@ def _dot(snapshot: Snapshot, field: DotField, *, movable: bool) -> str:
 
 
 def _marks(field: DotField, marks: tuple[_MethodMark, ...]) -> str:
-    """A mark for each tension distribution method, with its letter; those in one place share it."""
+    """A mark with the letter of each tension distribution method; methods with equal results have a common mark."""
     parts = []
     for (x, y), group in grouped(marks, field):
         letters, names = "".join(mark.letter for mark in group), ", ".join(mark.name for mark in group)
@@ -251,20 +251,20 @@ def _key(snapshot: Snapshot, marks: tuple[_MethodMark, ...], back: str) -> str:
 
 
 def _side(field: DotField, k: int, start: tuple[float, float], end: tuple[float, float]) -> str:
-    """Name of a side, outside of it; "" for a short side, or one that is not a limit."""
+    """Name of a side, drawn outside of it; "" for a short side or a side that is not a limit."""
     side = field.sides[k]
     if side is None or np.hypot(end[0] - start[0], end[1] - start[1]) < 22.0:
         return ""
     x, y = 0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1])
-    nx, ny = start[1] - end[1], end[0] - start[0]  # outward: corners go around counter-clockwise, and y points down
+    nx, ny = start[1] - end[1], end[0] - start[0]  # outward direction: corners are counter-clockwise, and y points down
     nx, ny = nx / np.hypot(nx, ny), ny / np.hypot(nx, ny)
-    anchor = "start" if nx > 0.35 else "end" if nx < -0.35 else "middle"  # the text leaves its side, not along it
+    anchor = "start" if nx > 0.35 else "end" if nx < -0.35 else "middle"  # direction of the text away from its side
     x, y = x + 7.0 * nx, y + 9.0 * ny + 3.0
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{side.cable} {side.limit}</text>'
 
 
 def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, float]) -> str:
-    """Name of an end of an interval, below it; an arrow head for an unbounded end."""
+    """Name of an end of an interval, drawn below it; an arrow head if the end is unbounded."""
     side, (x, y) = field.sides[k], at
     if side is None:
         back = 8.0 if other[0] > x else -8.0
@@ -273,20 +273,20 @@ def _end(field: DotField, k: int, at: tuple[float, float], other: tuple[float, f
     return f'{tick}<text x="{x:.1f}" y="{y + 22:.1f}" text-anchor="middle">{side.cable} {side.limit}</text>'
 
 
-DOT: Final = "dot"  # topic of the dot: {"at": coordinates [N]}, or {"by": steps, in shares of the drawing}
-OVER: Final = 2e-3  # of the drawing: step beyond a side
-FARTHEST: Final = 1.0  # of the drawing: largest step
+DOT: Final = "dot"  # topic of the dot: {"at": coordinates [N]} or {"by": steps as shares of the drawing}
+OVER: Final = 2e-3  # step beyond a side, as a share of the drawing
+FARTHEST: Final = 1.0  # largest step, as a share of the drawing
 
 
 class TensionsFeature(Feature):
-    """Drawing of the feasible tensions, with a dot to choose some."""
+    """Drawing of the feasible tensions, with a movable dot for the choice of tensions."""
 
     def __init__(self, page: Page) -> None:
         """Build nothing yet."""
         self._panel = page.panel
         self._marks = MethodMarks()
-        self._field: DotField | None = None  # in which the dot moves
-        self._key: tuple[object, ...] = ()  # of the pose that the field is of
+        self._field: DotField | None = None  # drawing in which the dot moves
+        self._key: tuple[object, ...] = ()  # key of the pose of the drawing
         self._aim: Array | None = None  # last chosen coordinates, (r,)
         page.channel.on(DOT, self._on_dot)
         page.channel.on(SHARING, self._on_method)
@@ -327,18 +327,18 @@ class TensionsFeature(Feature):
 
     @staticmethod
     def _beyond(field: DotField, away: Array) -> Array:
-        """Small step outward: with other sag forces the sides are a little farther."""
+        """Small step outward, because the sides are slightly farther with other sag forces."""
         far = float(np.linalg.norm(away))
         return away * min(1.0, OVER * float(np.max(field.high - field.low)) / far) if far > 0.0 else away
 
     def _on_method(self, value: Any, _: int) -> None:
-        """Choose a tension distribution method by its mark."""
+        """Choose the tension distribution method of a clicked mark."""
         if self._field is not None and isinstance(value, str) and value in METHODS:
             self._panel.choose_method(value)
 
 
 def _numbers(value: Any, count: int) -> Array | None:
-    """A number of finite numbers; None for anything else."""
+    """A given number of finite numbers from a message; None for invalid data."""
     if not isinstance(value, list) or len(value) < count:
         return None
     if not all(type(part) in (int, float) and abs(part) < 1e12 for part in value):

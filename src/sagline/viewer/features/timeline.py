@@ -17,19 +17,19 @@ from sagline.viewer.robot_scene import GHOST, GHOST_WIDTH, NEAR, Nodes, cable_se
 from sagline.viewer.tension_scale import linear
 from sagline.viewer.timeline import COLORS, Track, timeline_message
 
-_WIDTH: Final = 8.0  # px
+_WIDTH: Final = 8.0  # height of the timeline [px]
 _COLORS: Final = linear(np.array([[int(color[i : i + 2], 16) for i in (1, 3, 5)] for color in COLORS], dtype=np.uint8))
 
 
 SPEEDS: Final = (0.25, 1.0, 4.0, 16.0)
-PERIOD: Final = 1.0 / 30.0  # s: least time between messages of the clock
-TURN: Final = 0.5  # s: least time between moves of the window
-NARROWEST: Final = 1e-6  # of the duration: least width of a window
+PERIOD: Final = 1.0 / 30.0  # shortest time between messages of the clock [s]
+TURN: Final = 0.5  # shortest time between moves of the window [s]
+NARROWEST: Final = 1e-6  # smallest width of a window, relative to the duration
 _MOST_STEPS: Final = 1_000_000
 
 
 class TimelineFeature(Feature):
-    """The timeline of browser/timeline.js: charts of what is played, and the control of its clock."""
+    """The timeline of browser/timeline.js: charts of the played motion, and the control of its clock."""
 
     def __init__(self, page: Page) -> None:
         """Register the messages of browser/timeline.js."""
@@ -37,34 +37,34 @@ class TimelineFeature(Feature):
         self._channel, self._player = channel, player
         self._nodes, self._body = Nodes(page.server.scene), shapes.platform_solid(page.robot)
         self._above = float(self._body.vertices[:, 2].max()) + NEAR * page.size
-        self._played: Played | None = None  # source of the track
+        self._played: Played | None = None  # played motion of the track
         self._number = player.number
         self._track: Track | None = None
-        self._other: Track | None = None  # of the second run
-        self._chart = 0  # which is shown
-        self._window: tuple[float, float] | None = None  # visible times [s]; None for all
-        self._sent: Any = None  # last state that was sent
+        self._other: Track | None = None  # track of the second run
+        self._chart = 0  # index of the shown chart
+        self._window: tuple[float, float] | None = None  # visible range of times [s]; None for all
+        self._sent: Any = None  # last message of the state
         self._clock: Any = None
         self._sent_at = -PERIOD
         self._moved_at = -TURN
-        self._was_playing = False  # true if the clock was running at the last tick
-        self._cable: int | None = None  # that is pointed at
+        self._was_playing = False  # True if the clock was running at the last tick
+        self._cable: int | None = None  # cable under the pointer
         for topic in ("scrub", "step", "play", "speed", "follow", "chart", "point", "window"):
             channel.on(topic, getattr(self, f"_on_{topic}"))
         self.tick()
 
     @property
     def waiting(self) -> bool:
-        """True if the time of the clock has not been sent."""
+        """True if the present time of the clock is not sent yet."""
         return bool(self._clock != self._now())
 
     def depends(self, view: View) -> Hashable:
-        """The view while a cable is pointed at, or a second run is drawn."""
+        """Key: the view if a cable is under the pointer or a second run is drawn."""
         beside = view.played is not None and self._player.beside is not None
         return view if beside or self._cable is not None else None
 
     def follow(self, view: View) -> None:
-        """Draw the second run, and the cable that is pointed at."""
+        """Draw the second run and the cable under the pointer."""
         beside = self._player.beside if view.played is not None else None
         sag_scale = view.settings.sag_scale
         if beside is None:
@@ -82,7 +82,7 @@ class TimelineFeature(Feature):
             self._nodes.lines("/pointed", points, _COLORS[cable % len(_COLORS)], _WIDTH)
 
     def tick(self) -> None:
-        """Send what has changed, the clock once a `PERIOD` at most."""
+        """Send all changes, and the clock at most once per `PERIOD`."""
         if self._player.played is not self._played:
             self._restart()
         self._move_window()
@@ -93,16 +93,16 @@ class TimelineFeature(Feature):
             self._channel.send("clock", self._clock)
 
     def _restart(self) -> None:
-        """Update the tracks for what is played, or a longer version of it."""
+        """Update the tracks for the played motion or a longer version of it."""
         played, beside = self._player.played, self._player.beside
         self._track = None if played is None else played.track()
         self._other = None if beside is None else self._other or beside.played.track()
-        if self._number != self._player.number:  # not only a longer version
+        if self._number != self._player.number:  # a new motion, not only a longer version
             self._chart, self._window = 0, None
         self._played, self._number = played, self._player.number
 
     def _move_window(self) -> None:
-        """Move the window when the clock has left it; at once when the clock has come to its end."""
+        """Move the window after the clock has left it; without delay if the clock has reached its end."""
         clock = self._player.clock
         ended, self._was_playing = self._was_playing and clock.time >= clock.duration, clock.playing
         if self._window is None or not (clock.playing or ended):
