@@ -42,9 +42,9 @@ def calibrate(
     folds: int = 5,
     progress: Progress | None = None,
 ) -> Calibration:
-    """Actual anchors, zeros and cables of a robot, from its own readings, with their standard errors.
+    """Actual anchors, length zeros and cable properties of a robot, from its own readings, with standard errors.
 
-    One nonlinear least squares on exact cables estimates all parameters together with the unknown true lengths at every
+    One nonlinear least-squares problem with exact cables estimates all parameters and the unknown true lengths at every
     pose. Reported lengths are weighted by the deviation in `log.sensors`. Parameters that the readings do not observe
     keep the values of the robot, and are listed.
 
@@ -54,13 +54,13 @@ def calibrate(
         log: Readings at poses at rest.
         unknowns: Parameters to estimate: names of `KINDS` in `sagline.calibration.parameters`, or `Unknown`s.
         model: Cable model: the exact or the weightless one.
-        robust: True to give less weight to poses that do not fit the rest.
+        robust: True to reduce the weight of poses that do not fit the other poses.
         folds: Number of parts of the poses for the cross-validation, at most one per pose; each part costs one
             calibration. 0 for no cross-validation.
         progress: Called with the number of finished poses of a pass and the number of all poses.
 
     Returns:
-        Calibration; its `robot` is the one to use.
+        Calibration; its `robot` is the calibrated robot.
 
     Raises:
         InvalidValueError: If an unknown has another name, or neither readings nor a prior; if the log is not of this
@@ -135,7 +135,7 @@ def _check_model(robot: Robot, model: CableModel) -> None:
 
 
 def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters: Parameters, model: CableModel) -> None:
-    """Reject a log with a likely mistake, and measured poses that disagree while everything else fits."""
+    """Reject a log with a likely mistake, and measured poses that are the only readings without a fit."""
     if not {"measuring_frame", "target"}.isdisjoint(parameters.names):
         log = log.replace(position=None, rotation=None)  # the axes of the measuring system are not known yet
     _refuse(diagnose_log(robot, log, model))
@@ -144,7 +144,7 @@ def _refuse_mistakes(robot: Robot, log: WinchLog, fit_log: WinchLog, parameters:
 
 
 def _refuse(sentences: Iterable[str]) -> None:
-    """Reject a log that no similar robot can have written; the message is the first of the reasons."""
+    """Reject a log that no similar robot can have written; the message is the first reason."""
     for sentence in sentences:
         what, _, step = sentence.partition("; " if "; " in sentence else ": ")
         step = f"{step[:1].upper()}{step[1:]}."

@@ -1,4 +1,4 @@
-"""Candidates of calibration poses: feasible poses of a box, each with several sets of tensions; short tours."""
+"""Candidates of calibration poses: feasible poses of a box, each with several sets of tensions; and short tours."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from sagline.tension.method import TensionMethod
 from sagline.tension.methods import MinimumNorm, QuadraticProgram
 
 MOST_SETS: Final = 5  # number of sets of tensions at one pose
-ROUNDS: Final = 6  # of drawing poses, in boxes of which a large part is not feasible
-KEPT: Final = 0.02  # share of the range between the limits; actual tensions differ from the commanded ones
+ROUNDS: Final = 6  # attempts to draw poses, for boxes of which a large part is not feasible
+KEPT: Final = 0.02  # margin at both limits, as a share of their range; actual tensions differ from the commanded ones
 GROUP: Final = 20  # number of poses whose sets of tensions are near the same corners
-UNLIMITED: Final = 3.0  # times the largest tension of least norm; replaces an infinite upper limit
+UNLIMITED: Final = 3.0  # upper limit in place of an infinite one, relative to the largest minimum-norm tension
 SAME: Final = 1e-6  # share of the largest tension: sets closer than this count as one
 
 
@@ -35,7 +35,7 @@ class CandidatePoses(NamedTuple):
         lengths: All cable off the drums [m], shape (N, m).
         tensions: Tensions at the frame ends [N], shape (N, m).
         place: Index of the pose, shape (N,); sets of tensions at one pose have one index.
-        usual: True if the pose is drawn evenly from the box, shape (N,).
+        usual: True if the pose belongs to the uniform distribution over the box, shape (N,).
     """
 
     poses: Array
@@ -54,8 +54,8 @@ def candidates_of(
 ) -> CandidatePoses:
     """Feasible poses of a box, at most `count`, each with several sets of tensions near corners of the feasible set.
 
-    Every second pose is drawn evenly from the box. The others are nearer to its faces and to the largest tilt, where
-    readings are most informative. Raises an error with the reason if no pose is feasible.
+    Every second pose is uniformly distributed in the box. The other poses are nearer to its faces and to the largest
+    tilt, where readings are most informative. Raises an error with the reason if no pose is feasible.
     """
     rng = np.random.default_rng(seed)
     sets = min(MOST_SETS, 1 + 2 * max(robot.cable_count - robot.degrees_of_freedom, 0))
@@ -111,7 +111,7 @@ def _with_margins(robot: Robot, model: CableModel, poses: Pose, kept: float) -> 
 def _feasible(
     robot: Robot, model: CableModel, poses: Pose, sets: int, rng: np.random.Generator, progress: Progress | None
 ) -> tuple[CandidatePoses, Codes]:
-    """Feasible ones among poses with sets of tensions, and the solution status of each pose."""
+    """Feasible candidates among poses with sets of tensions, and the solution status of each pose."""
     found, statuses = [], []
     for part in blocks(len(poses), GROUP, progress):
         corners = np.where(rng.uniform(size=(sets, robot.cable_count)) < 0.5, robot.tension_min, robot.tension_max)
@@ -134,21 +134,21 @@ def _solve(robot: Robot, model: CableModel, poses: Pose, method: TensionMethod) 
     """Status, lengths and frame-end tensions of each pose."""
     try:
         plan = inverse(robot, poses, model, method)
-    except CableGeometryError:  # a cable starts inside an anchor or a pulley
+    except CableGeometryError:  # at this pose a cable starts inside an anchor or a pulley
         missing = np.full((len(poses), robot.cable_count), np.nan)
         return np.full(len(poses), PoseStatus.NO_CHORD, dtype=np.int8), missing, missing
     return plan.status, plan.unstrained_length, plan.state.cables.frame_end_tension
 
 
 def _different(tensions: Array) -> Flags:
-    """Flags of the sets of tensions (N, sets, m) that differ from those before them at their pose, (N, sets)."""
+    """Flags of the sets of tensions (N, sets, m) that differ from all previous sets at their pose, (N, sets)."""
     apart = np.abs(tensions[:, :, None] - tensions[:, None]).max(axis=-1)
     same = apart <= SAME * np.nanmax(tensions, initial=0.0)
     return np.asarray(~np.tril(same, -1).any(axis=-1))
 
 
 def _in_range(robot: Robot, lengths: Array, tensions: Array) -> Flags:
-    """Flags of lengths and tensions (..., m) within the winches' cable and the range of their load cells."""
+    """Flags of lengths and tensions (..., m) within the cable on the winches and the range of the load cells."""
     winches = robot.winches
     fits = np.ones(lengths.shape, dtype=np.bool_)
     if winches is not None and winches.cable_length is not None:
@@ -169,8 +169,8 @@ def _none_feasible(robot: Robot, statuses: Codes) -> InvalidValueError:
     return InvalidValueError("box", value, "a box with feasible poses", "Give box=PoseBox(low, high, tilt) of others.")
 
 
-PASSES: Final = 50  # over all pairs of edges; a tour of a hundred places takes fewer than ten
-_ROUNDING: Final = 1e-9  # share of the largest distance
+PASSES: Final = 50  # passes over all pairs of edges; a tour of a hundred places takes fewer than ten
+_ROUNDING: Final = 1e-9  # smallest improvement, relative to the largest distance
 
 
 def shortest_tour(places: Array) -> Indices:
@@ -191,7 +191,7 @@ def tour_length(places: Array, order: Indices) -> float:
 
 
 def _nearest_neighbor_tour(apart: Array) -> Indices:
-    """Tour from the farthest place, always to the nearest place that is left."""
+    """Tour that starts at the farthest place and always continues to the nearest remaining place."""
     order = np.empty(len(apart), dtype=np.int64)
     left = np.ones(len(apart), dtype=np.bool_)
     here = int(np.argmax(apart.sum(axis=1)))
@@ -203,7 +203,7 @@ def _nearest_neighbor_tour(apart: Array) -> Indices:
 
 
 def _reverse_segments(order: Indices, apart: Array, floor: float) -> bool:
-    """Reverse every segment whose reversal shortens the tour, in place; True if there was one."""
+    """Reverse every segment whose reversal shortens the tour, in place; True if any segment was reversed."""
     changed = False
     for i in range(len(order) - 2):
         before, first, lasts, after = order[i], order[i + 1], order[i + 1 : -1], order[i + 2 :]

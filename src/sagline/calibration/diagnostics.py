@@ -18,24 +18,24 @@ from sagline.core.arrays import Array, Flags, Indices
 from sagline.robot.robot import Robot
 
 _CATENARY = Catenary()
-UNIT: Final = 50.0  # ratio to the expected value, between 1 and the 1000 of a wrong unit
-GOOD: Final = 5.0  # sum of squares per reading of a log that a robot fits; slips and rope errors raise it above 1
-POOR: Final = 50.0  # upper limit instead of GOOD if it is also a hundredth of the previous one
-NEAR: Final = 0.25  # departure from the priors: a robot with anchors 0.25 m off may fit swapped cables by chance
-ROUGH: Final = 10.0  # ratio to a deviation: beyond a tenth of the robot's size, a length is not informative
-FAR: Final = 0.25  # share of a cable's length: a larger error of a zero exceeds that of any tape measure
-SHIFTS: Final = 5  # largest number of rows by which load cells may be early or late
+UNIT: Final = 50.0  # ratio to the expected value above which a unit is wrong; between 1 and 1000
+GOOD: Final = 5.0  # largest sum of squares per reading for a good fit; slips and rope errors raise it above 1
+POOR: Final = 50.0  # larger limit in place of GOOD if the sum is also at most a hundredth of the previous one
+NEAR: Final = 0.25  # largest departure from the priors; with anchors 0.25 m off, swapped cables may fit by chance
+ROUGH: Final = 10.0  # relative to the robot's size: lengths with a larger deviation are not informative
+FAR: Final = 0.25  # error of a zero relative to a cable's length; a larger one exceeds that of any tape measure
+SHIFTS: Final = 5  # largest tested number of rows by which load cells are early or late
 _FULLY: Final = 3  # number of most promising changes that are fitted to convergence
 
 
 def diagnose_log(robot: Robot, log: WinchLog, model: CableModel = _CATENARY) -> tuple[str, ...]:
     """Likely mistakes in a log, as sentences with the next step; empty for a consistent log.
 
-    The first check compares the sizes of readings: lengths and positions in mm, load cells in kN. Then a robot similar
-    to the given one is fitted to about 24 rows. If none fits, the readings are changed by one mistake at a time:
-    columns of two cables exchanged (encoders, load cells or both), an encoder that counts backward, zeros far off, load
-    cells up to five rows early or late. The first mistake whose correction gives a fit is reported. Zeros far off, and
-    lengths with the wrong sign, are found only with commanded poses.
+    The first check compares the sizes of readings, to detect lengths and positions in mm, and load cells in kN. Then a
+    robot similar to the given one is fitted to about 24 rows. If none fits, the readings are changed by one mistake at
+    a time: columns of two cables exchanged (encoders, load cells or both), an encoder that counts backward, zeros with
+    large errors, or load cells up to five rows early or late. The first mistake whose correction gives a fit is
+    reported. Zeros with large errors, and lengths with the wrong sign, are found only with commanded poses.
     """
     instance(robot, Robot, "robot")
     instance(log, WinchLog, "log")
@@ -124,7 +124,7 @@ def _extent(robot: Robot) -> float:
 
 
 def _spread(position: Array) -> float:
-    """Largest difference of measured coordinates [m]; for a single position, its size."""
+    """Largest difference of measured coordinates [m]; for a single position, its largest coordinate."""
     there = ~np.isnan(position).all(axis=0)
     if not there.any():
         return 0.0
@@ -155,7 +155,7 @@ def _single_mistake(trial: Trial) -> Iterator[str]:
 
 
 def _length_changes(trial: Trial) -> Iterator[Hypothesis]:
-    """Possible mistakes in lengths or counts, alone or together with the load cells of these cables."""
+    """Possible mistakes in lengths or counts, alone or together with mistakes in the load cells of the same cables."""
     m = trial.robot.cable_count
     for two in combinations(range(m), 2):
         yield Hypothesis(lengths=two)
@@ -197,7 +197,7 @@ def _far(trial: Trial, zeros: Array) -> Flags:
 
 
 def _zero_text(zeros: Array, far: Flags) -> str:
-    """Text of the cables whose zeros are far off."""
+    """Text of the cables with large errors of their zeros."""
     cables = np.flatnonzero(far).tolist()
     listed = ", ".join(
         f"{abs(zeros[i]):.2f} m too {'short' if zeros[i] > 0.0 else 'long'} on cable {i}" for i in cables

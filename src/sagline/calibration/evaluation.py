@@ -24,12 +24,13 @@ from sagline.core.progress import blocks
 from sagline.robot.pose import Pose
 from sagline.robot.tolerances import UNCERTAIN, Provenance
 
-# probability that chance gives a chi squared so far from its expected value; below it the result is doubtful
+# smallest probability that chance explains the distance of chi squared from its expected value; below it the result is
+# doubtful
 DOUBTFUL: Final = 1e-4
-ODD: Final = 0.1  # share of the poses that may fit badly before the whole result is in doubt
+ODD: Final = 0.1  # largest share of poses that fit badly; above it the whole result is doubtful
 ODD_WEIGHT: Final = 0.5  # a pose with a lower weight fits badly
-TOLERATED: Final = 1.1  # ratio of chi squared to its expected value: in a large log, no model is better than that
-LITTLE: Final = 1e-6  # share of a direction: a parameter with a smaller share of it is still observable
+TOLERATED: Final = 1.1  # ratio of chi squared to its expected value: in a large log, no model reaches a smaller one
+LITTLE: Final = 1e-6  # a parameter with a smaller share of an unobservable direction is still observable
 
 
 def calibration_of(
@@ -126,8 +127,8 @@ def covariance_of(problem: FitProblem, triangle: Array, slopes: Array) -> tuple[
 def _is_doubtful(chi_squared: float, free: int, readings: Indices, *, robust: bool) -> bool:
     """True if residuals contradict the deviations of the sensors.
 
-    Without the poses that fit badly, the rest fits better than chance: the mean of a chi squared distribution truncated
-    at a quantile c is r F(c; r + 2)/F(c; r).
+    Without the poses that fit badly, the other poses fit better than by chance. The expected value is then the mean of
+    a chi squared distribution truncated at a quantile c, r F(c; r + 2)/F(c; r).
     """
     if free <= 0:
         return False

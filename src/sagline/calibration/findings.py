@@ -30,7 +30,7 @@ class CalibrationStatus(Status):
 
 
 class Omission(Status):
-    """Reason for the omission of a row of a log; `text` describes one row."""
+    """Reason for the omission of a row of a log; `text` describes it for one row."""
 
     NOT_A_NUMBER = 0, "a reading is missing that the rest of the log has"
     REPEATED = 1, "the readings of an earlier row again"
@@ -59,7 +59,7 @@ class Direction(Result):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlier(Result):
-    """A pose, or one cable of a pose, that does not fit the other readings.
+    """A pose, or a cable at a pose, that does not fit the other readings.
 
     Attributes:
         row: Row of the log.

@@ -1,4 +1,4 @@
-"""Hypotheses on a log that no robot fits: each change of the readings is tested on some of the rows."""
+"""Hypotheses about a log without a fitting robot. Each change of the readings is tested on some of the rows."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ from sagline.robot.drum import drums_of
 from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 
-MOST_ROWS: Final = 24  # for the trials of changes: three readings of a load cell for each unknown
-STEPS: Final = 12  # of the least squares: if a robot fits, half of them are sufficient
-TOLERANCE: Final = 1.0  # of the sum of squares: the quality of a fit is needed to a few percent only
+MOST_ROWS: Final = 24  # number of rows for the trials of changes; three load cell readings per unknown
+STEPS: Final = 12  # least-squares iterations; if a robot fits, half of them are sufficient
+TOLERANCE: Final = 1.0  # relative tolerance of the sum of squares; a few percent are sufficient for a decision
 FEWEST_ROWS: Final = 8  # number of rows without commanded poses
-# Prior deviations, wider than usual: the test asks if any similar robot fits. They are shares of the values if
+# Prior deviations are wider than usual, because the test is for any similar robot. They are shares of the values if
 # logarithms are estimated.
 _WIDE: Final = {
     "frame_anchors": 0.3,
@@ -101,7 +101,7 @@ class Trial:
         problem, poses, moved = self._problem(change, MOST_ROWS)
         try:
             state, normal = _fitted(problem, start_of(problem, poses))
-        except (InvalidValueError, np.linalg.LinAlgError):  # with such readings the search diverges
+        except (InvalidValueError, np.linalg.LinAlgError):  # the search diverges with such readings
             return _TrialResult(np.inf, np.inf, moved)
         quality = float(np.median(normal.squares / np.maximum(normal.readings, 1)))
         off = state.numbers - problem.prior
@@ -110,7 +110,7 @@ class Trial:
         return _TrialResult(quality, departure, moved + off[zeros])
 
     def promise(self, change: Hypothesis, steps: int) -> float:
-        """Predicted sum of squares per row, one step beyond some least-squares steps; infinite without a fit."""
+        """Sum of squares per row, predicted one step after some least-squares steps; infinite without a fit."""
         most = FEWEST_ROWS if self.log.commanded is None else MOST_ROWS
         problem, poses, _ = self._problem(change, most)
         kept, step = np.ones(len(problem.log.cells), dtype=np.bool_), None
@@ -156,7 +156,7 @@ class Trial:
         poses = self._poses(problem, change, most) if log.commanded is None else log.commanded[rows]
         moved = np.zeros(m)
         shifted = list(change.moved)
-        if change.flipped is not None and not counted:  # the length at which a reversed encoder counts zero is unknown
+        if change.flipped is not None and not counted:  # the length at zero counts of a reversed encoder is unknown
             shifted.append(change.flipped)
         if shifted and poses is not None:
             moved[shifted] = -_offsets(problem, poses)[0][shifted]
@@ -180,7 +180,7 @@ class Trial:
         return name != "linear_density" or bool((self.robot.cables.linear_density > 0.0).all())
 
     def _counts_of_length(self) -> Array:
-        """Counts per meter of cable paid out, (m,), on the lowest layer of each drum."""
+        """Counts per meter of cable paid out, (m,), for the lowest layer of each drum."""
         drums = drums_of(self.robot)
         rate = drums.zero_and_rate()[1]
         _, travel = drums.turns(drums.starts[:, :1].T)

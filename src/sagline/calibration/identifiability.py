@@ -15,10 +15,10 @@ from sagline.core.arrays import Array, Indices, locked
 from sagline.kernels.calibration import kinds
 from sagline.robot.robot import Robot
 
-OPEN: Final = 1e-12  # share of the largest singular value: rounding of slopes that cancel
-_SPREAD: Final = 1e-9  # share of the largest singular value: larger ones are always observable
-_FIXED: Final = 5e-2  # share of the usual deviation: a parameter with a smaller stated deviation counts as known
-_WIDE: Final = 1e3  # times the usual deviation of an unknown value: limit for wider priors
+OPEN: Final = 1e-12  # relative to the largest singular value: rounding errors of slopes that cancel
+_SPREAD: Final = 1e-9  # relative to the largest singular value: directions with larger ones are always observable
+_FIXED: Final = 5e-2  # relative to the usual deviation: a parameter with a smaller stated deviation counts as known
+_WIDE: Final = 1e3  # largest prior deviation, relative to the usual deviation of an unknown value
 _SAME: Final = 1e-6  # sine of the angle below which two directions are equal
 _TINY: Final = 1e-300
 _NAMED: Final = 3  # number of components in the text of a direction without a name
@@ -51,7 +51,7 @@ def append_rows(triangle: Array, matrix: Array) -> Array:
 def prior_units(parameters: Parameters) -> PriorUnits:
     """Priors as units of directions; the usual deviation of an unknown value if there is no prior.
 
-    A much wider prior is limited to `_WIDE`: otherwise the other parameters would be lost in rounding.
+    A much wider prior is limited to `_WIDE`. Otherwise rounding would hide the other parameters.
     """
     usual = np.array([KINDS[name].assumed for name in parameters.names])
     usual = np.where(parameters.logarithmic, usual * np.abs(parameters.prior), usual)
@@ -77,7 +77,7 @@ def _open_directions(triangle: Array, frame: PriorUnits) -> Array:
 
 
 def numerical_rank(values: Array) -> int:
-    """Number of singular values (decreasing) above rounding, that is, before the widest gap near `OPEN`."""
+    """Number of singular values (descending) above rounding, that is, before the widest gap near `OPEN`."""
     largest = values[0] if values.size else 0.0
     if largest == 0.0:
         return 0
@@ -93,7 +93,7 @@ def numerical_rank(values: Array) -> int:
 def gauge_of(
     triangle: Array, parameters: Parameters, values: Array, robot: Robot, sensors: Sensors
 ) -> tuple[Direction, ...]:
-    """Unobservable directions of the unknowns, each with its name; along them the values follow from the priors."""
+    """Unobservable directions of the unknowns, each with its name; along these the values follow from the priors."""
     frame = prior_units(parameters)
     size = np.linalg.norm(triangle, axis=0) * frame.scale
     alone = [int(index) for index in frame.free if size[index] <= OPEN * size.max()]
@@ -141,10 +141,10 @@ def _symmetric_part(
 
 
 def _admissible_symmetries(frame: PriorUnits, where: Indices, known: Symmetries) -> tuple[Array, Array]:
-    """Combinations of symmetries that change only unknowns: vectors (P, k), and shares of the symmetries (g, k).
+    """Combinations of symmetries that change only unknowns: vectors (P, k), and coefficients of the symmetries (g, k).
 
-    Both in standard deviations. Known values do not change, shared values change together, and the drums pay out the
-    lengths that the symmetries require.
+    Both are in standard deviations. Known values do not change, and shared values change together. The drums pay out
+    the lengths that the symmetries require.
     """
     free = np.isin(where, frame.free)
     conditions = [known.table[known.matters & ~free], known.lengths]
@@ -188,7 +188,7 @@ def _echelon(rows: Array) -> Array:
 
 
 def _named(shares: Array, known: Sequence[Generator]) -> tuple[str, str]:
-    """Name and step of a combination of symmetries: those of the first one, and names of others except shifts."""
+    """Name and step of a combination of symmetries: those of the first symmetry, and names of others except shifts."""
     size = np.abs(shares)
     taken = [known[index] for index in map(int, np.flatnonzero(size > _SAME * size.max()))]
     first = taken[0]
@@ -231,7 +231,7 @@ STEPS: Final = {  # the easiest measurement first
 
 
 def measurement_rank(name: str) -> int:
-    """Rank of a kind of parameter by ease of measurement."""
+    """Rank of a kind of parameter; easier measurements come first."""
     return list(STEPS).index(name)
 
 

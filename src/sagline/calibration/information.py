@@ -16,11 +16,11 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import n
 from sagline.robot.robot import Robot
 
-FEW: Final = 8  # readings per parameter: with more, exchanges reduce no error by more than 1 %
-OPEN: Final = 1e-12  # share of the largest singular value: a direction with less is unobservable
-ROUNDING: Final = 1e-6  # share of a direction's square: a parameter with a smaller share is not part of it
-CONDITION: Final = 1e-13  # share of the information of all candidates: a smaller prior is lost in rounding
-_WORTH: Final = 1e-9  # of the log det: an exchange that gains less is rounding
+FEW: Final = 8  # readings per parameter above which exchanges reduce errors by less than 1 %
+OPEN: Final = 1e-12  # relative to the largest singular value: directions with a smaller one are unobservable
+ROUNDING: Final = 1e-6  # parameters with a smaller share of a direction's square do not belong to it
+CONDITION: Final = 1e-13  # smallest prior relative to the information of all candidates; rounding hides smaller ones
+_WORTH: Final = 1e-9  # smallest increase of the log det by an exchange; smaller ones are rounding
 
 
 class Information:
@@ -63,7 +63,7 @@ class Information:
         self.chosen.append(candidate)
 
     def leave(self, candidate: int) -> None:
-        """Remove a candidate; everything is summed again, because a difference would be lost in rounding."""
+        """Remove a candidate; the sum is computed again, because rounding would hide a difference."""
         self.chosen.remove(candidate)
         self.covariance, self._heard = self._recompute()
 
@@ -75,7 +75,7 @@ class Information:
 
 
 def prior_information(rows: Array) -> Array:
-    """Prior information (P, P) in units of the priors: 1, but not less than the rounding of the observations."""
+    """Prior information (P, P) in units of the priors: 1, or the rounding error of the observations if larger."""
     return np.eye(rows.shape[-1]) * max(1.0, CONDITION * float((rows**2).sum()))
 
 
@@ -94,10 +94,10 @@ class Choice(NamedTuple):
 
 
 def choose_informative(rows: Array, known: Array, count: int) -> Choice:
-    """D-optimal choice of `count` candidates: greedy; a small choice is then improved by exchanges.
+    """D-optimal choice of `count` candidates: greedy; exchanges then improve small choices.
 
-    The greedy choice alone is within 1 - 1/e of the best, as log det is submodular (Nemhauser, Wolsey & Fisher 1978);
-    exchanges after Fedorov 1972.
+    The greedy choice alone reaches at least the share 1 - 1/e of the best one, because log det is submodular
+    (Nemhauser, Wolsey & Fisher 1978); exchanges after Fedorov 1972.
     """
     found = Information(rows, known)
     for _ in range(count):
@@ -140,10 +140,10 @@ def information_of(rows: Array) -> Array:
     return np.asarray(flat.T @ flat)
 
 
-TOTAL_STATION: Final = 1e-3  # m, of each coordinate
-CELL_SHARE: Final = 0.01  # share of the median tension: a typical load cell
-NEARLY: Final = 0.9  # share of the largest decrease of the log errors: a cheaper measurement is sufficient with it
-WORTH: Final = 0.99  # share of the errors: a measurement that leaves more is not recommended
+TOTAL_STATION: Final = 1e-3  # standard deviation of each coordinate [m]
+CELL_SHARE: Final = 0.01  # standard deviation of a typical load cell, relative to the median tension
+NEARLY: Final = 0.9  # share of the largest decrease of the log errors that is sufficient for a cheaper measurement
+WORTH: Final = 0.99  # largest remaining share of the errors for a recommendation
 
 
 # by kind: the measurement, its standard deviation in the unit of the kind, and True if the deviation is a share of the
@@ -202,7 +202,7 @@ def most_helpful(situation: Situation) -> str:
     before = _deviations(situation.information)
     best: Option | None = None
     most = -np.log(WORTH)
-    for option in _options(situation):  # the least costly option of each kind first
+    for option in _options(situation):  # the cheapest option of each kind comes first
         fall = float(np.log(before / _deviations(option[1])).mean())
         if fall > most / (1.0 if best is None else NEARLY):
             best, most = option, fall
@@ -258,7 +258,8 @@ def _best_subset(
 ) -> Iterator[Option]:
     """Most informative subset of some rows, for each number of rows with a text.
 
-    rows: information of each measurement alone; beside: information added to it; instead: replaced readings.
+    rows: information of each measurement alone; beside: information that is added; instead: readings that the
+        measurements replace.
     """
     found = Information(rows, situation.information)
     for _ in range(min(max(words), len(rows))):

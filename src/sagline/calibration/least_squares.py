@@ -1,7 +1,7 @@
-"""The least squares of a calibration: Gauss-Newton on exact cables, the true lengths eliminated pose by pose.
+"""The least squares of a calibration: Gauss-Newton method with exact cables; true lengths are eliminated pose by pose.
 
-The objective has two sums over the poses, ((reading - prediction)/sigma)^2 and ((length - reported length)/sigma_L)^2,
-and one over the internal parameters, ((value - prior)/its deviation)^2; docs/model.md, section 14.
+The objective consists of three sums: ((reading - prediction)/sigma)^2 and ((length - reported length)/sigma_L)^2 over
+the poses, and ((value - prior)/deviation)^2 over the internal parameters; docs/model.md, section 14.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.robot import Robot
 
-SIGNIFICANT: Final = 1e-13  # share of the largest eigenvalue: smaller ones are rounding
+SIGNIFICANT: Final = 1e-13  # relative to the largest eigenvalue: smaller eigenvalues count as zero
 STEPS: Final = 60
 HALVINGS: Final = 12
-TOLERANCE: Final = 1e-5  # share of the sum of squares: smaller steps end within 3e-3 standard deviations of the minimum
-ROUNDING: Final = 1e-12  # share of the sum of squares
-QUANTILE: Final = 0.99  # of the chi squared of a pose: beyond it the pose has less weight
-NEARLY: Final = 1e-3  # share of the sum of squares: sufficient accuracy if rounding hides further decrease
+TOLERANCE: Final = 1e-5  # relative decrease of the sum of squares; ends within 3e-3 standard deviations of the minimum
+ROUNDING: Final = 1e-12  # relative rounding error of the sum of squares
+QUANTILE: Final = 0.99  # quantile of the chi squared of a pose, above which the pose has less weight
+NEARLY: Final = 1e-3  # sufficient relative decrease of the sum of squares if rounding hides further decrease
 GROSS: Final = 0.1  # weight of a pose that would spoil the first step
-LESS: Final = 0.9  # share of the misfit scale: if it falls below, the weights are computed again
+LESS: Final = 0.9  # the weights are computed again if the misfit scale falls below this share
 
 
 def whitened_at(
@@ -61,10 +61,10 @@ def whitened_at(
     *,
     free_of_noise: bool = False,
 ) -> WhitenedRows:
-    """Whitened readings of some poses at a state, with their slopes; reported lengths [m], (n, m).
+    """Whitened readings of some poses at a state, with their slopes; reported: lengths [m], (n, m).
 
-    With a direction (P,), only the slopes along it. `free_of_noise` computes slopes at the true lengths: at the
-    reported lengths the scale of all lengths would seem observable, because it scales the noise too.
+    With a direction (P,), only the slopes along it are computed. `free_of_noise` takes slopes at the true lengths. At
+    the reported lengths the scale of all lengths would seem observable, because it also scales the noise.
     """
     log, parameters, machine = problem.log, problem.parameters, state.machine
     counts, along = (None if log.counts is None else log.counts[part]), reported
@@ -96,7 +96,7 @@ def _squares_of(sensors: Sensors, rows: WhitenedRows, reported: Array, lengths: 
 
 
 def _limits_of(readings: Indices, scale: float) -> Array:
-    """Sums of squares beyond which poses have less weight, (N,): quantile of chi squared times a scale."""
+    """Sums of squares above which poses have less weight, (N,): quantile of chi squared times a scale."""
     return np.asarray(scale * exceeded_with(1.0 - QUANTILE, readings))
 
 
@@ -188,7 +188,7 @@ def evaluate_step(
 
 
 def _cost_of(problem: FitProblem, current: Evaluated, kept: Flags, scale: float) -> float:
-    """Objective function; infinite if a pose that counts has no equilibrium."""
+    """Objective function; infinite if a pose with weight has no equilibrium."""
     state, normal = current
     squares = normal.squares[kept]
     if np.isfinite(scale):
@@ -209,10 +209,10 @@ def solve(
     tolerance: float = TOLERANCE,
     progress: Progress | None = None,
 ) -> Fit:
-    """Gauss-Newton from a state, steps halved until the sum of squares falls.
+    """Gauss-Newton steps from a state; each step is halved until the sum of squares falls.
 
-    Converged if the predicted decrease is below the tolerance. With `robust`, poses that fit worse than the others have
-    less weight; the scale of the misfit is updated after each step.
+    The search has converged if the predicted decrease is below the tolerance. With `robust`, poses that fit worse than
+    the others have less weight; the scale of the misfit is updated after each step.
     """
     scale = np.inf
     if robust:
@@ -246,7 +246,7 @@ def solve(
 def best_step(problem: FitProblem, state: SearchState, normal: Normal) -> tuple[Array, float]:
     """Gauss-Newton step of the internal parameters (P,) within their lower bounds, and the predicted decrease.
 
-    Zero along directions with neither observations nor a prior.
+    The step is zero along directions with neither observations nor a prior.
     """
     scale, deviation = problem.scale, problem.prior_deviation
     known = np.where(np.isfinite(deviation), scale / deviation, 0.0) ** 2
@@ -266,20 +266,20 @@ def _lowest(matrix: Array, downhill: Array, *, positive: bool) -> Array:
     if positive:
         try:
             return np.asarray(cho_solve(cho_factor(matrix), downhill))
-        except LinAlgError:  # the priors are lost in rounding relative to the readings
+        except LinAlgError:  # rounding hides the priors beside the readings
             pass
     values, vectors = _significant_eigenpairs(matrix)
     return np.asarray(vectors @ ((vectors.T @ downhill) / values))
 
 
 def _lowest_within(matrix: Array, downhill: Array, lower: Array) -> Array:
-    """Minimizer of the same function with x >= lower (P,); lower is zero or negative."""
+    """Minimizer of x^T M x - 2 b^T x with x >= lower (P,); lower is zero or negative."""
     from scipy.optimize import lsq_linear  # rarely needed, and the import takes a quarter of a second
 
     values, vectors = _significant_eigenpairs(matrix)
     root = np.sqrt(values)
     found = lsq_linear(root[:, None] * vectors.T, vectors.T @ downhill / root, (lower, np.inf), method="bvls")
-    return np.where(found.active_mask < 0, lower, found.x)  # exactly at the bound, not near it
+    return np.where(found.active_mask < 0, lower, found.x)  # exactly at the bound
 
 
 def _significant_eigenpairs(matrix: Array) -> tuple[Array, Array]:

@@ -17,7 +17,7 @@ from sagline.core.results import Result, Saved
 from sagline.robot.pose import Pose, unit
 from sagline.robot.robot import Robot
 
-LENGTH_DEVIATION = 5e-4  # m, for an unmeasured length off a drum: rope on a grooved drum
+LENGTH_DEVIATION = 5e-4  # [m], typical for a length off a grooved drum with rope
 
 
 def _world_if_none(frame: Pose | None) -> Pose:
@@ -54,7 +54,7 @@ class Sensors(_Replaceable):
     """Accuracy of a robot's sensors, and the pose of its measuring system.
 
     Attributes:
-        length_deviation: Standard deviation of a length off a drum, counted or given [m], > 0, shape () or (m,).
+        length_deviation: Standard deviation of a counted or reported length off a drum [m], > 0, shape () or (m,).
         tension_deviation: Standard deviation of a load cell [N], > 0, shape () or (m,); None without load cells.
         position_deviation: Standard deviation of each coordinate of a measured position [m], > 0, shape () or (3,),
             along the axes of the measuring system; None if positions are not measured.
@@ -114,7 +114,7 @@ def load_cells_of(robot: Robot) -> tuple[Array | float, Array | float]:
 
 
 _BY_ROW = ("counts", "unstrained_length", "load_cells", "position", "rotation", "time", "commanded")
-_UNIT = 1e-6  # tolerance of the length of a quaternion: one printed with seven digits is accepted
+_UNIT = 1e-6  # tolerance of the length of a quaternion, sufficient for printed quaternions of seven digits
 
 
 @frozen(eq=False, repr=False, weakref_slot=False)
@@ -122,8 +122,8 @@ class WinchLog(_Replaceable, Saved):
     """Readings of a robot at rest at N poses; NaN where a reading is missing.
 
     Attributes:
-        counts: Encoder counts, shape (N, m), or None. Exactly one of counts and lengths is given. A row without the
-            count of every cable is left out of a calibration.
+        counts: Encoder counts, shape (N, m), or None. Either counts or lengths are given, not both. A calibration omits
+            rows without the counts of all cables.
         unstrained_length: Reported lengths off the drums [m], shape (N, m), or None.
         load_cells: Readings of the load cells at the frame ends [N], may be negative, shape (N, m), NaN if missing; or
             None.
@@ -133,7 +133,7 @@ class WinchLog(_Replaceable, Saved):
             not measured; or None.
         time: Time of each row [s], shape (N,), in any order; or None.
         commanded: Commanded poses, near the actual ones, N of them; or None.
-        sensors: Standard deviations of all readings; None for `Sensors()`, which has length deviations only.
+        sensors: Standard deviations of all readings; None for `Sensors()`, which only has length deviations.
         source: Origin of the readings.
 
     Raises:
@@ -200,7 +200,7 @@ class WinchLog(_Replaceable, Saved):
             which: Flags (N,), row indices, or a slice.
 
         Raises:
-            NoSuchEntryError: If a row does not exist; it is an IndexError too.
+            NoSuchEntryError: If a row does not exist; the error is also an IndexError.
         """
         part = part_of(which, (len(self),), "single row")
         part = np.array([part]) if isinstance(part, int) else part
@@ -228,7 +228,7 @@ class WinchLog(_Replaceable, Saved):
 
 
 def _lengths_or_counts(counts: ArrayLike | None, lengths: ArrayLike | None) -> tuple[str, str, ArrayLike]:
-    """Name, unit and values of the given one."""
+    """Name, unit and values of the given counts or lengths."""
     if (counts is None) == (lengths is None):
         value = "neither given" if counts is None else "both given"
         step = "Give what the drives report: counts, or lengths that they computed from them."

@@ -23,8 +23,8 @@ from sagline.robot.robot import Robot
 from sagline.robot.winch import Winch
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-STEP: Final = 1e-4  # relative step of a drum radius or a zero for differences: lengths are nearly linear in both
-SLOPES: Final = 3  # by length_zero, drum_radius and axial_stiffness, in the order of `kernels.calibration.observe`
+STEP: Final = 1e-4  # relative step of a drum radius or zero for difference quotients, which are nearly linear
+SLOPES: Final = 3  # length_zero, drum_radius and axial_stiffness, in the order of `kernels.calibration.observe`
 BLOCK: Final = 1 << 9  # number of poses per kernel call: some 10 MB
 NO_LOAD: Final = locked(np.zeros((1, 6)))  # only cable forces and weight act on the platform
 
@@ -60,7 +60,7 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
         if with_radius:
             radius, pitch = _known_field(winches, "drum_radius"), _known_field(winches, "groove_pitch")
             circle = 2.0 * np.pi * (radius + 0.5 * _known_field(robot.cables, "diameter"))
-            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # of a helix, with respect to the radius
+            turn_slope = 2.0 * np.pi * circle / np.hypot(circle, pitch)  # derivative of a helix length by the radius
             turns = (counts - winches.count_zero) / (winches.gear * _known_field(winches, "counts_per_turn"))
             slopes[1] = turns * turn_slope / (1.0 + strain)
         return slopes
@@ -74,7 +74,7 @@ def winch_slopes(robot: Robot, parameters: Parameters, counts: Array | None, len
 
 
 def _known_field(of: Winch | Cable, name: str) -> Array:
-    """Value of a field whose presence `drums_of` has checked."""
+    """Value of a field that `drums_of` has checked."""
     return np.asarray(getattr(of, name))
 
 
@@ -84,14 +84,14 @@ class WhitenedRows(NamedTuple):
     R is m + 6, or m if no system measures positions or rotations.
 
     Attributes:
-        matrix: Derivatives by the internal parameters (logarithms where `logarithmic`), with the lengths adapted, (N,
+        matrix: Derivatives by the internal parameters (logarithms where `logarithmic`), with adapted true lengths, (N,
             R, P); rows without a reading are zero.
         misfit: Readings minus predictions, (N, R).
         residual: Residuals in physical units [N, m, rad] at the given lengths, (N, m + 6); NaN if missing.
         back: Change of the true lengths [m] by a misfit, (N, m, R).
-        motion: Motion of the platform about its center of mass [m, rad], world axes. One row per true length, and a
-            last row for the step along a direction, with the lengths adapted, (N, m + 1, 6); no rows without a
-            direction.
+        motion: Motion of the platform about its center of mass [m, rad], world axes. It has one row per true length,
+            and a last row for the step along a direction with adapted lengths, (N, m + 1, 6). Without a direction it
+            has no rows.
     """
 
     matrix: Array
@@ -102,7 +102,7 @@ class WhitenedRows(NamedTuple):
 
 
 def _locked_view(array: Array) -> Array:
-    """Write-locked contiguous view of an array, as the kernels are compiled for it."""
+    """Write-locked contiguous view of an array, the form for which the kernels are compiled."""
     return locked(np.ascontiguousarray(array).view())
 
 
@@ -155,7 +155,7 @@ def machine_of(
     robot: Robot, model: CableModel, parameters: Parameters, sensors: Sensors, offset: Array
 ) -> MachineTerms:
     """A robot and its sensors in the form of the kernel; an error if counts are read and drum data are missing."""
-    # unknown pulley radii and dead lengths have slopes, even if the robot has none yet
+    # unknown pulley radii and dead lengths have slopes, even if those of the robot are zero
     routed = has_routing(robot) or bool((parameters.where[[kinds.RADIUS, kinds.DEAD]] >= 0).any())
     return MachineTerms(
         robot,
@@ -230,7 +230,7 @@ def predicted_rows(
     return rows._replace(misfit=np.where(np.isnan(rows.misfit), np.nan, 0.0))
 
 
-_EXACT: Final = 1e-10  # m: deviation of lengths that is too small to affect the whitening
+_EXACT: Final = 1e-10  # [m], a deviation of lengths that is too small to affect the whitening
 
 
 def _unit_sensors(sensors: Sensors) -> Sensors:
@@ -257,7 +257,7 @@ class Reference(NamedTuple):
     Attributes:
         model: Cable model.
         machine: The robot with its sensors, in the form of the kernel.
-        parameters: A placeholder; its slopes are not used.
+        parameters: Placeholder, whose slopes are not used.
     """
 
     model: CableModel

@@ -19,16 +19,16 @@ from sagline.kernels.calibration.terms import PoseReadings
 from sagline.kinematics.forward_rows import solve_forward_rows
 
 CHANCE: Final = 0.01  # probability of one outlier among all poses of a log without errors
-EXAMINED: Final = 100  # number of worst poses; if more are bad, the calibration is wrong and not the poses
-_MOST: Final = 3  # largest number of errors at one pose; with more, the pose as a whole is the outlier
-_CLEAR: Final = 3.0  # difference in log probability: closer explanations are not distinguished
-_REST: Final = 0.1  # share of the squares that one error explains: allowance for errors of the calibration
-_WORTH: Final = 20.0  # difference in log probability, to first order: worse explanations are not computed exactly
-_NONLINEAR: Final = 0.6  # ratio of squares: large errors need only this linear improvement for an exact fit
-_DROP: Final = 500.0  # of chi squared
+EXAMINED: Final = 100  # largest number of examined poses; if more are bad, the calibration is wrong
+_MOST: Final = 3  # largest number of errors at one pose; with more errors, the whole pose is the outlier
+_CLEAR: Final = 3.0  # smallest difference in log probability of distinguishable explanations
+_REST: Final = 0.1  # allowance for errors of the calibration, relative to the squares that one error explains
+_WORTH: Final = 20.0  # first-order difference in log probability above which explanations are not computed exactly
+_NONLINEAR: Final = 0.6  # ratio of squares: linear improvement that is sufficient for an exact fit of large errors
+_DROP: Final = 500.0  # quantile of chi squared
 _ITERATIONS: Final = 10
 _QUANTITIES: Final = ("length", "load cell", "position", "rotation")
-_TOLERANCE: Final = 1e-3  # of the sum of squares
+_TOLERANCE: Final = 1e-3  # relative tolerance of the sum of squares
 _HALVINGS: Final = 6
 
 
@@ -47,7 +47,7 @@ class _Suspect(NamedTuple):
 
 
 class _SuspectFit(NamedTuple):
-    """Best fit of a pose with free errors of the suspects.
+    """Best fit of a pose if the errors of the suspects are free.
 
     Attributes:
         squares: Remaining sum of squares.
@@ -86,7 +86,7 @@ class _Case(NamedTuple):
 
 
 def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _SuspectFit:
-    """Best fit of a pose with free errors of the suspects: linear with one iteration, else nonlinear."""
+    """Best fit of a pose with free errors of the suspects, linear for one iteration, else nonlinear."""
     which = np.concatenate([one.which for one in taken]).astype(np.int64) if taken else np.zeros(0, dtype=np.int64)
     counts = np.concatenate((np.ones(case.lengths.shape[1], dtype=np.bool_), case.read))
     counts[which] = False
@@ -103,7 +103,7 @@ def _fit_suspects(case: _Case, taken: Sequence[_Suspect], iterations: int) -> _S
 
 
 def _squares(case: _Case, counts: Flags) -> float:
-    """Sum of squares of the terms that count."""
+    """Sum of squares of the terms without suspects."""
     return float(np.sum((case.misses()[0] / case.deviation)[counts] ** 2))
 
 
@@ -135,7 +135,7 @@ def _linear_fit(
 
 
 def _improved(case: _Case, counts: Flags, wanted: Array, squares: float) -> _Case | None:
-    """Case at lengths between the present and the wanted ones, with a smaller sum of squares; None if not found."""
+    """Case with a smaller sum of squares at lengths between the present and the target ones; None if not found."""
     reference = case.reference
     for halving in range(_HALVINGS):
         lengths = case.lengths + 0.5**halving * (wanted - case.lengths)
@@ -163,9 +163,9 @@ def outliers_in(
 ) -> tuple[Outlier, ...]:
     """Causes of misfit at some poses of a search, in the order of the rows of the log.
 
-    For every length, load cell, measured position or rotation of a pose, the error that fits the readings best is
-    computed. The most explaining error is taken first, then the most explaining one of the rest. If several cables
-    explain the misfit equally well, or none does, the pose as a whole is the outlier.
+    For every length, load cell, measured position or rotation of a pose, the best-fitting error is computed. The error
+    that explains most of the misfit is taken first, then the one that explains most of the rest. If several cables
+    explain the misfit equally well, or no cable does, the whole pose is the outlier.
     """
     log, machine, m = problem.log, state.machine, state.lengths.shape[1]
     reported = reported_lengths(problem, machine, slice(None))
@@ -207,7 +207,7 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
         limit = _limit(case.read, (*taken, close[best]), count)
         enough = fits[best].squares <= max(limit, 0.0 if taken else _REST * whole.squares)
         if not alone:
-            if enough and not taken and len(near) == 1:  # the readings do not identify the cable
+            if enough and not taken and len(near) == 1:  # the readings do not identify one cable
                 return [Outlier(row, None, near.pop(), abs(fits[best].sizes[0]), fits[best].deviations[0])]
             break
         taken.append(close[best])
@@ -220,17 +220,17 @@ def _outliers_at(case: _Case, row: int, count: int) -> list[Outlier]:
 
 
 def _limit(there: Flags, taken: Sequence[_Suspect], count: int) -> float:
-    """Largest sum of squares that chance allows for the worst of `count` poses, without some suspects."""
+    """Largest sum of squares that chance explains for the worst of `count` poses, without some suspects."""
     used = sum(len(one.which) for one in taken)
     return float(exceeded_with(CHANCE / count, int(there.sum()) - used))
 
 
 def _rarity(before: float, after: _SuspectFit, suspect: _Suspect) -> float:
-    """Log probability that chance alone improves the fit by this amount."""
+    """Log probability of an improvement of the fit by this amount by chance alone."""
     half, drop = 0.5 * len(suspect.which), max(before - after.squares, 0.0)
     if drop < _DROP:
         return float(np.log(chdtrc(len(suspect.which), drop)))
-    return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # of the tail, which underflows
+    return float((half - 1.0) * np.log(0.5 * drop) - 0.5 * drop - gammaln(half))  # asymptote of the tail
 
 
 def _suspects(m: int, there: Flags) -> list[_Suspect]:

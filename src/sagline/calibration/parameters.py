@@ -29,9 +29,9 @@ class _Kind(NamedTuple):
         each: True if every cable has its own value.
         shared: True if all cables share one value by default.
         logarithmic: True if the logarithm is estimated: a positive value with a relative deviation.
-        deviation: Standard deviation of a drawing or data sheet value, relative if logarithmic.
-        assumed: Standard deviation of a value that the robot's source does not give.
-        needs: The readings that observe it: "counts", "load cells", "positions"; "" for any.
+        deviation: Standard deviation of a value from a drawing or data sheet, relative if logarithmic.
+        assumed: Standard deviation of a value that is missing in the robot's source.
+        needs: The readings that observe the kind: "counts", "load cells", "positions"; "" for any readings.
     """
 
     owner: str
@@ -71,14 +71,14 @@ KINDS: Final[dict[str, _Kind]] = {
 class Unknown:
     """One kind of unknown parameter, and its prior.
 
-    Pulley radii and dead length have zero as a lower bound.
+    Pulley radii and dead lengths have a lower bound of zero.
 
     Attributes:
         name: Name of a kind in `KINDS`.
         shared: True if the cables share one value; None for the default of the kind.
         deviation: Standard deviation of the robot's value, in the unit of the kind (a share of the value for drum
-            radius, linear density, axial stiffness and mass); infinite without a prior; None for that of the robot's
-            tolerances, or the usual one.
+            radius, linear density, axial stiffness and mass); infinite without a prior; None for the robot's tolerance,
+            or for the usual deviation of the kind.
     """
 
     name: str
@@ -106,7 +106,7 @@ class Parameters(Result):
         names: Kind of each parameter, (P,).
         labels: Name of each parameter, for example "frame_anchors[3].x", "axial_stiffness", "measuring_frame.about z".
         units: Unit of each parameter.
-        cables: Cable of each parameter, or -1 for one of all cables or of the platform.
+        cables: Cable of each parameter, or -1 for a parameter of all cables or of the platform.
         where: Index of the parameter of each row of `kernels.calibration.kinds` and cable, (KIND_ROWS, m), -1 for none.
         prior: Prior values, in the units of the parameters, (P,).
         prior_deviation: Standard deviations of the priors, in the same units, (P,); infinite without a prior.
@@ -200,7 +200,7 @@ def _value(robot: Robot, sensors: Sensors, name: str, counted: bool) -> Array:
 
 
 def _field(robot: Robot, name: str) -> Array | None:
-    """Values of a kind in a robot; None if the robot has none."""
+    """Values of a kind in a robot; None if the robot does not have them."""
     owner = KINDS[name].owner
     part = robot if owner == "robot" else getattr(robot, owner)
     value: Array | None = None if part is None else getattr(part, name)
@@ -314,7 +314,7 @@ def offset_with(robot: Robot, parameters: Parameters, values: Array) -> Array:
     return np.asarray(values[parameters.where[kinds.ZERO]])
 
 
-_SMALL = 1e-4  # rad: below it the first terms of the series are exact
+_SMALL = 1e-4  # [rad], below this angle the first terms of the series are sufficient
 
 
 def left_jacobian(vector: Array) -> Array:

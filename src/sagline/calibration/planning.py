@@ -38,11 +38,11 @@ from sagline.robot.pose import Pose, PoseBox
 from sagline.robot.robot import Robot
 
 WIDTH: Final = 80
-COLUMNS: Final = (20, 9, 13, 13, 15)  # of the table of errors
-NARROW: Final = (16, 8, 9, 11, 13)  # for a narrow terminal
+COLUMNS: Final = (20, 9, 13, 13, 15)  # width of the table of errors, in columns
+NARROW: Final = (16, 8, 9, 11, 13)  # width for a narrow terminal
 WIDE: Final = 2 + sum(COLUMNS)
-KILO: Final = 1e4  # N: larger tensions are written in kN
-FAR: Final = 100.0  # m: larger positions are written with one decimal less
+KILO: Final = 1e4  # [N], larger tensions are written in kN
+FAR: Final = 100.0  # [m], larger positions are written with one decimal less
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -59,8 +59,7 @@ class CalibrationPoses(Result, Saved):
         expected_error: Standard error of each parameter, in its unit, (P,).
         random_error: Median standard errors of sets of equally many random poses, (P,).
         share_of_random: Ratio of the errors to those of random poses in the observable directions, geometric mean.
-            Errors of single parameters hide this ratio if the readings leave a direction open, such as a shift of the
-            world.
+            Errors of single parameters hide this ratio if a direction, such as a shift of the world, is unobservable.
         gain: log det of the information of the first k poses, in the order of the choice, (N,).
         enough: Number of poses after which another one reduces no error by more than 1 %; N if there is no such number.
         most_helpful: Recommended measurement, in words.
@@ -98,7 +97,7 @@ def poses_text(plan: CalibrationPoses, width: int = WIDTH) -> str:
 
 
 def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
-    """Poses and tensions in driving order, one pose per line; excess cables continue on the next line."""
+    """Poses and tensions in driving order, one pose per line; cables that do not fit continue on the next line."""
     position, tension = plan.poses.position, plan.frame_end_tension
     angles = np.degrees(plan.poses.rotation.as_euler("ZYX"))
     decimals = 1 if np.abs(position).max() >= FAR else 2
@@ -123,7 +122,7 @@ def poses_table(plan: CalibrationPoses, width: int = WIDTH) -> str:
 
 
 def _column(head: str, values: Iterable[float], decimals: int) -> list[str]:
-    """Column of numbers below its heading, all of one width."""
+    """Column of numbers below its heading, with a common width."""
     cells = [head, *(f"{round(float(value), decimals) + 0.0:.{decimals}f}" for value in values)]
     width = 1 + max(map(len, cells))
     return [f"{cell:>{width}}" for cell in cells]
@@ -185,12 +184,12 @@ def _advice(plan: CalibrationPoses, width: int) -> Iterator[str]:
     yield from wrap(plan.most_helpful, width)
 
 
-MOST: Final = 1_000  # poses: more take days to measure
+MOST: Final = 1_000  # largest number of poses; more take days to measure
 MOST_CANDIDATES: Final = 20_000
 DRAWS: Final = 21  # sets of random poses, for a median
-ENOUGH: Final = 0.01  # share of an error: a smaller improvement does not matter
-SEEN: Final = 3.0  # ratio to the prior information: this much more reduces an error by half
-LOOSE: Final = 10.0  # usual deviations of an unknown value: unit of a parameter without a prior
+ENOUGH: Final = 0.01  # relative improvement of an error; smaller ones are irrelevant
+SEEN: Final = 3.0  # ratio to the prior information that reduces an error by half
+LOOSE: Final = 10.0  # unit of a parameter without a prior, in usual deviations of an unknown value
 _CATENARY: Final = Catenary()
 
 
@@ -207,14 +206,14 @@ def calibration_poses(
 ) -> CalibrationPoses:
     """Most informative poses and tension sets for the unknowns, before any measurement.
 
-    D-optimal choice among feasible poses of a box, each with several sets of tensions: greedy, with exchanges. Sets of
-    tensions at one pose follow each other.
+    The choice is D-optimal, greedy with exchanges, among feasible poses of a box with several sets of tensions each.
+    Sets of tensions at one pose follow each other.
 
     Args:
         robot: The robot before the calibration.
         count: Number of sets of readings, 1 to 1,000.
-        unknowns: Parameters to estimate, as of `calibrate`.
-        sensors: Sensors that read at every pose; None for load cells of 1 % of the median tension (or the
+        unknowns: Parameters to estimate, as in `calibrate`.
+        sensors: Sensors with readings at every pose; None for load cells of 1 % of the median tension (or the
             load_cell_deviation of the winches) and lengths with 0.5 mm.
         box: Box of poses; None for the robot's test_box.
         candidates: Number of poses and sets of tensions to choose from, `count` to 20,000.
@@ -236,7 +235,7 @@ def calibration_poses(
         40 True
 
     Source:
-        Fedorov 1972; Borm & Menq 1991 (poses to calibrate robots by); docs/model.md, section 14.
+        Fedorov 1972; Borm & Menq 1991 (choice of calibration poses); docs/model.md, section 14.
     """
     instance(robot, Robot, "robot")
     size = whole_number(count, "count", 1, MOST)
@@ -311,7 +310,7 @@ def _scale(parameters: Parameters, slopes: Array) -> tuple[Array, Array]:
 
 
 def _read(rows: Array) -> Array:
-    """Rows of sensors that observe something; one row of zeros if there is none."""
+    """Rows of sensors that observe something; one row of zeros without such sensors."""
     there = rows.any(axis=(0, 2))
     return np.ascontiguousarray(rows[:, there] if there.any() else rows[:, :1])
 
@@ -339,14 +338,14 @@ def _driving_order(chosen: CandidatePoses) -> Indices:
 
 
 def _random(rows: Array, usual: Flags, count: int, seed: int) -> list[Array]:
-    """Whitened rows at random poses, some draws of (count, k, P)."""
+    """Whitened rows at random poses: several sets of shape (count, k, P)."""
     rng = np.random.default_rng((seed, 1))
     pool = np.flatnonzero(usual) if usual.sum() >= count else np.arange(len(rows))
     return [rows[rng.choice(pool, count, replace=False)] for _ in range(DRAWS)]
 
 
 def _share(known: Array, rows: Array, random: list[Array]) -> float:
-    """Ratio of errors to those of random poses, in directions whose errors the random poses reduce by half or more."""
+    """Ratio of errors to those of random poses, in directions whose errors the random poses at least halve."""
     own, *others = (information_of(each) for each in (rows, *random))
     size, vectors = np.linalg.eigh(np.mean(others, axis=0))
     seen = vectors[:, size > SEEN]

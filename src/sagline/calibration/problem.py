@@ -20,9 +20,9 @@ from sagline.robot.pose import Pose
 from sagline.robot.robot import Robot
 from sagline.statics.tables import body_table, cable_table, pose_rows
 
-_PAIRS: Final = 3  # measured points needed to align a measuring system
-_LINE: Final = 1e-3  # share of the length: points closer than this to a line count as collinear
-_NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds for which zero is usual
+_PAIRS: Final = 3  # number of measured points that are required to align a measuring system
+_LINE: Final = 1e-3  # points closer to a line than this share of its length count as collinear
+_NONNEGATIVE: Final = ("pulley_radius", "dead_cable")  # kinds whose usual value is zero
 
 
 class ReadingsTable(NamedTuple):
@@ -87,7 +87,7 @@ class FitProblem(NamedTuple):
     def scale(self) -> Array:
         """Scale of each internal parameter (P,): the smaller of its prior and its usual deviation.
 
-        In wider units, sums of squares of well-observed parameters are lost in rounding.
+        In larger units, rounding would hide the sums of squares of well-observed parameters.
         """
         usual = np.array([KINDS[name].assumed for name in self.parameters.names])
         return np.asarray(np.fmin(self.prior_deviation, usual))
@@ -123,7 +123,7 @@ class Normal(NamedTuple):
         squares: Sum of squares of each pose, infinite without an equilibrium, (N,).
         readings: Number of readings at each pose, (N,).
         weights: Weights of the poses, (N,).
-        rows: Whitened readings if the log has one block; None for a longer log, which computes them again.
+        rows: Whitened readings if the log has one block; None for a longer log, for which they are computed again.
     """
 
     matrix: Array
@@ -174,8 +174,8 @@ def reported_lengths(problem: FitProblem, machine: MachineTerms, part: slice) ->
 def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
     """Initial state: the priors, with the platform at commanded poses or at those from the reported lengths.
 
-    The true lengths hold the platform there with the measured tensions. One millimeter of a steel cable changes its
-    tension by 90 N, so reported lengths say little about tensions before the anchors are known.
+    The true lengths are those with the measured tensions at these poses. One millimeter of a steel cable changes its
+    tension by 90 N. Before the anchors are known, reported lengths therefore do not determine the tensions.
     """
     numbers = problem.prior
     machine = machine_at(problem, numbers)
@@ -187,7 +187,7 @@ def start_of(problem: FitProblem, commanded: Pose | None) -> SearchState:
 
 
 def held_lengths(problem: FitProblem, machine: MachineTerms, poses: Array, reported: Array) -> Array:
-    """Unstrained lengths [m] of cables with the measured tensions at poses; reported ones without load cells."""
+    """Unstrained lengths [m] of cables with the measured tensions at poses; reported lengths without load cells."""
     if problem.sensors.tension_deviation is None:
         return reported.copy()
     robot, cells = machine.robot, problem.log.cells
@@ -237,7 +237,7 @@ def _poses(problem: FitProblem, machine: MachineTerms, reported: Array, commande
 def _aligned(problem: FitProblem, numbers: Array, poses: Array) -> Array:
     """Parameters with the measuring system aligned to the poses, if it is unknown and has enough readings.
 
-    Its rotation is the mean rotation between platform and measured rotations, or the one between measured points.
+    Its rotation is the mean rotation between platform and measured rotations, or the rotation between measured points.
     """
     where = problem.parameters.where[kinds.SHIFT : kinds.TURN + 3, 0]
     if where[0] < 0:

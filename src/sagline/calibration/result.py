@@ -29,15 +29,15 @@ from sagline.statics.tables import pose_rows
 class PoseError(Result):
     """Expected errors of poses, for a single pose or with a leading axis N.
 
-    Errors of the platform with the calibrated robot's lengths for a commanded pose. They follow from the covariance of
-    all parameters and the deviation of the winches' lengths.
+    The errors are those of the platform if the winches take the calibrated robot's lengths for a commanded pose. They
+    follow from the covariance of all parameters and the deviation of the winches' lengths.
 
     Attributes:
         pose: The commanded poses.
         covariance: Covariance of the displacement of the platform frame's origin and of its rotation vector, world
             axes, shape (..., 6, 6) [m^2, m rad, rad^2].
-        own_covariance: Covariance without the shift of the world and the rotation about the vertical that the poses of
-            the log have in common: errors relative to the robot itself.
+        own_covariance: Covariance of errors relative to the robot itself: without the shift of the world and the
+            rotation about the vertical that all poses of the log have in common.
     """
 
     pose: Pose
@@ -74,8 +74,8 @@ def _root_of_trace(covariance: Array) -> Array:
     return locked(np.asarray(np.sqrt(np.trace(covariance, axis1=-2, axis2=-1))))
 
 
-MOST = 300  # poses of a log that determine the motion common to all of them
-_NEGLIGIBLE = 1e-12  # share of the largest slope: smaller slopes are rounding
+MOST = 300  # largest number of poses for the motion that all poses have in common
+_NEGLIGIBLE = 1e-12  # relative to the largest slope: smaller slopes count as zero
 _WITHOUT_MOTION = ("measuring_frame", "target", "load_cell_gain", "load_cell_bias")  # unknowns without effect on poses
 
 
@@ -131,11 +131,11 @@ class Calibration(Findings, Saved):
         residuals: Readings minus predictions: lengths [m], load cells [N], position [m], rotation [rad], shape (N, 2 m
             + 6); NaN if missing.
         chi_squared_of_pose: Chi squared of each pose, (N,).
-        weights: Weights of the poses: less than 1 for one that does not fit the rest, (N,).
+        weights: Weights of the poses, (N,); less than 1 for a pose that does not fit the others.
         outliers: Readings that do not fit.
         gauge: Unobservable directions; along them the values follow from the priors.
         cannot_tell_apart: Weakly identifiable directions.
-        cross_validation: Errors at poses left out; None without cross-validation.
+        cross_validation: Errors at omitted poses; None without cross-validation.
         iterations: Number of iterations of the least squares.
         model: Cable model.
         log: Origin of the readings.
@@ -161,14 +161,14 @@ class Calibration(Findings, Saved):
     def pose_error(self, pose: Pose) -> PoseError:
         """Expected error of the platform at a commanded pose, with this calibration.
 
-        The true robot pays out the lengths that `inverse` gives the calibrated one. Errors of the calibration and of
-        the winches' lengths, `sensors.length_deviation`, move the platform.
+        The true robot takes the lengths that `inverse` computes for the calibrated robot. Errors of the calibration and
+        of the winches' lengths (`sensors.length_deviation`) displace the platform.
 
         Args:
             pose: A single pose or N.
 
         Returns:
-            PoseError; NaN where the pose is not feasible, infinite where it depends on an unobserved parameter.
+            PoseError; NaN if the pose is not feasible, infinite if it depends on an unobserved parameter.
 
         Raises:
             InvalidValueError: If `pose` is not a pose, or is outside the motion pattern of the robot.
@@ -205,7 +205,7 @@ class Calibration(Findings, Saved):
         covariance = np.full((len(rows), 6, 6), np.nan)
         covariance[there] = self._covariance(*self._slopes(pose_rows(found.pose)[there], rows[there]))
         reach = np.reshape(found.pose.matrix @ self.robot.center_of_mass, (-1, 3))
-        of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # motion of the center of mass by that of the origin
+        of_center = np.tile(np.eye(6), (len(rows), 1, 1))  # center of mass by origin
         for axis, unit in enumerate(np.eye(3)):
             of_center[:, :3, 3 + axis] = np.cross(unit, reach)
         covariance = _transformed_covariance(of_center, covariance)
@@ -215,7 +215,7 @@ class Calibration(Findings, Saved):
         return motion_slopes(self.robot, self.model, self.parameters, poses, lengths)
 
     def _covariance(self, by_values: Array, by_length: Array) -> Array:
-        """Covariance of origin and rotation vector (N, 6, 6), from those of the values and of the winches' lengths."""
+        """Covariance of origin and rotation vector (N, 6, 6), from those of the values and the winches' lengths."""
         size = np.abs(by_values).max(axis=(1, 2), keepdims=True)
         by_length = by_length * self.sensors.length_deviation
         known = _transformed_covariance(by_values, self.covariance, _NEGLIGIBLE * size)

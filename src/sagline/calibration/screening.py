@@ -16,11 +16,11 @@ from sagline.core.errors import InvalidValueError
 from sagline.kinematics.winches import lengths_from_counts
 from sagline.robot.robot import Robot
 
-SPEED_LIMIT: Final = 0.005  # m/s
-SOONEST: Final = 0.1 * (1.0 - 1e-9)  # s: over a shorter time, one encoder step looks as fast as a moving platform
-LATEST: Final = 1.0  # s: over a longer time the platform may have stopped between two rows
-PULLING: Final = 3.0  # standard deviations above zero that a load cell must read
-OTHERWISE: Final = 0.5  # share of the rows with a reading of a load cell above which the other rows must have it too
+SPEED_LIMIT: Final = 0.005  # [m/s], largest rate of a length at rest
+SOONEST: Final = 0.1 * (1.0 - 1e-9)  # [s], over a shorter time one encoder step looks like a moving platform
+LATEST: Final = 1.0  # [s], over a longer time the platform may have stopped between two rows
+PULLING: Final = 3.0  # smallest reading of a load cell, in standard deviations
+OTHERWISE: Final = 0.5  # if more than this share of the rows has a load cell's reading, all other rows must have it
 
 
 def screen(
@@ -28,9 +28,9 @@ def screen(
 ) -> tuple[WinchLog, Indices, Mapping[Omission, Indices]]:
     """Log of the rows with the platform at rest, taut cables and all readings, without repetitions.
 
-    Also returns the indices of these rows (N,), and those of the omitted rows by the first reason of each.
+    Also returns the indices of these rows (N,), and the indices of the omitted rows by their first reason.
 
-    These rows are left out, in this order:
+    These rows are omitted, in this order:
 
     - rows without a count or length of a cable, or without a reading of a load cell that more than half of the rows
       have (measured positions and rotations may be missing anywhere);
@@ -76,7 +76,7 @@ def lengths_of(robot: Robot, log: WinchLog) -> Array:
 
 
 def reading_count(log: WinchLog) -> int:
-    """Number of informative readings; lengths do not count, because every row has as many unknown lengths."""
+    """Number of informative readings; lengths are excluded, because every row has as many unknown lengths."""
     cells, positions, rotations = (
         0 if values is None else int(np.count_nonzero(~np.isnan(values)))
         for values in (log.load_cells, log.position, None if log.rotation is None else log.rotation[:, :3])
@@ -96,7 +96,7 @@ def _incomplete(log: WinchLog) -> Flags:
 def _repeated(log: WinchLog) -> Flags:
     """Flags of rows whose readings equal those of an earlier row, bit by bit."""
     read = [v for v in (log.readings, log.load_cells, log.position, log.rotation) if v is not None]
-    bits: list[NDArray[np.uint64]] = [np.ascontiguousarray(v + 0.0).view(np.uint64) for v in read]  # no -0.0
+    bits: list[NDArray[np.uint64]] = [np.ascontiguousarray(v + 0.0).view(np.uint64) for v in read]  # -0.0 to 0.0
     digest = np.zeros(len(log), dtype=np.uint64)
     odd = np.random.default_rng(0).integers(2**63, size=sum(b.shape[1] for b in bits), dtype=np.uint64) * 2 + 1
     for column, factor in zip((c for b in bits for c in b.T), odd, strict=True):
@@ -105,7 +105,7 @@ def _repeated(log: WinchLog) -> Flags:
     earlier = first[inverse]
     found: Flags = earlier != np.arange(len(log))
     late = np.flatnonzero(found)
-    found[late] = np.all([(b[late] == b[earlier[late]]).all(axis=1) for b in bits], axis=0)  # not their digests alone
+    found[late] = np.all([(b[late] == b[earlier[late]]).all(axis=1) for b in bits], axis=0)  # the rows themselves
     return found
 
 
@@ -121,13 +121,13 @@ def _moving(log: WinchLog, lengths: Array, limit: float) -> Flags:
         step = np.abs(time[other] - time)
         there = (near == other) & (step <= LATEST)
         change = np.abs(length[other] - length).max(axis=1, initial=0.0)
-        moving[order[there & (change > limit * step)]] = True  # NaN compares false; such rows are left out anyway
+        moving[order[there & (change > limit * step)]] = True  # NaN compares as false; such rows are omitted anyway
     return moving
 
 
 def _slack(robot: Robot, log: WinchLog) -> Flags:
     if log.load_cells is None:
         return np.zeros(len(log), dtype=np.bool_)
-    assert log.sensors.tension_deviation is not None  # checked by the log
+    assert log.sensors.tension_deviation is not None  # the log has checked this
     _, bias = load_cells_of(robot)
     return np.asarray((log.load_cells - bias <= PULLING * log.sensors.tension_deviation).any(axis=1))

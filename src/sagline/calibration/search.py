@@ -1,4 +1,4 @@
-"""Search of a calibration: poses that converge to another equilibrium are restarted once, then left out."""
+"""Search of a calibration. Poses that converge to another equilibrium are restarted once, then omitted."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from sagline.kinematics.forward import search
 from sagline.kinematics.forward_rows import solve_forward_rows
 from sagline.robot.pose import Pose
 
-STRANGE: Final = 1e-9  # probability of a sum of squares: smaller ones are not caused by noise
-FEW: Final = 0.1  # share of the poses: if more are at another equilibrium, slipped cables are not the cause
-FAR: Final = 0.03  # m from the pose by the reported lengths: beyond it another equilibrium
+STRANGE: Final = 1e-9  # smallest probability of a sum of squares due to noise
+FEW: Final = 0.1  # share of the poses; if more are at another equilibrium, slipped cables are not the cause
+FAR: Final = 0.03  # [m], a larger distance from the pose by the reported lengths means another equilibrium
 
 
 class SearchResult(NamedTuple):
@@ -41,7 +41,7 @@ class SearchResult(NamedTuple):
 
     Attributes:
         fit: Last fit.
-        kept: Poses that count, (N,).
+        kept: Flags of the poses that are used, (N,).
         left_out: Omitted poses, by reason.
     """
 
@@ -53,7 +53,7 @@ class SearchResult(NamedTuple):
 def search_from_priors(
     problem: FitProblem, commanded: Pose | None, *, robust: bool, progress: Progress | None = None
 ) -> SearchResult:
-    """Search from the priors; poses that end in another equilibrium are restarted once, then left out."""
+    """Search from the priors; poses that end in another equilibrium are restarted once, then omitted."""
     state = start_of(problem, commanded)
     kept = np.ones(len(state.poses), dtype=np.bool_)
     current = evaluate_step(problem, state, None, kept)
@@ -109,7 +109,7 @@ def _restart(problem: FitProblem, state: SearchState, which: Flags) -> SearchSta
 
 
 def _single_cable_outliers(problem: FitProblem, state: SearchState, which: Flags) -> Flags:
-    """Flags of the poses, among a few, that fit except for single cables: outliers with a small weight."""
+    """Flags of the poses, among a few, that fit except for single cables, which are outliers with a small weight."""
     rows, slipped = np.flatnonzero(which), np.zeros(len(which), dtype=np.bool_)
     if 0 < len(rows) <= min(EXAMINED, FEW * len(which)):
         found = outliers_in(problem, state, rows, rows, count=len(which))
@@ -129,10 +129,10 @@ def _other_equilibrium(problem: FitProblem, state: SearchState, which: Flags) ->
 def cross_validate(
     problem: FitProblem, found: SearchResult, folds: int, *, robust: bool, progress: Progress | None = None
 ) -> CrossValidation | None:
-    """Calibrate without each part of the poses, and predict the readings of this part from the reported lengths.
+    """Calibrate without each part of the poses in turn, and predict its readings from the reported lengths.
 
-    Parts are runs of consecutive poses, so that rows of one pose with several tensions remain together. None for fewer
-    than two poses.
+    Parts consist of consecutive poses, so that rows of one pose with several tensions remain together. The result is
+    None for fewer than two poses.
     """
     places = np.flatnonzero(found.kept)
     folds = min(folds, len(places))
@@ -170,7 +170,7 @@ def _prediction_errors(problem: FitProblem, machine: MachineTerms, starts: Array
         part = slice(whole.start + own.start, whole.start + own.stop)
         try:
             reported = reported_lengths(problem, machine, part)
-        except InvalidValueError:  # lengths out of range because the drum data are too wrong
+        except InvalidValueError:  # lengths out of range because of large errors in the drum data
             continue
         there = which[part] & np.isfinite(reported).all(axis=1) & (reported > 0.0).all(axis=1)
         asked = locked(np.where(there[:, None], reported, np.nan))

@@ -14,8 +14,8 @@ from sagline.core.arrays import Array, Indices
 from sagline.core.numbers import SPACE, counted, n, plus_minus
 
 WIDTH: Final = 80
-MOST_OUTLIERS: Final = 12  # listed ones; the rest are counted
-MOST_ROWS: Final = 8  # listed rows of the log; the rest are counted
+MOST_OUTLIERS: Final = 12  # largest number of listed items; the rest is counted
+MOST_ROWS: Final = 8  # largest number of listed rows of the log; the rest is counted
 UNITS: Final = {"length": "m", "load cell": "N", "position": "m", "rotation": "rad"}
 ANCHORS: Final[tuple[Anchors, ...]] = ("frame_anchors", "platform_anchors")
 
@@ -145,7 +145,7 @@ def _moved(found: Findings, mine: list[int]) -> str:
 
 
 def _coordinates(found: Findings, name: Anchors, columns: int) -> Iterator[str]:
-    """Lines with the anchors, one per line, and their errors relative to one another."""
+    """Lines with the anchors, one per line, and their errors relative to each other."""
     first = KINDS[name].first
     where = found.parameters.where[first : first + 3].T.astype(np.int64)
     anchors = getattr(found.robot, name)
@@ -271,9 +271,9 @@ def anchor_covariance(parameters: Parameters, covariance: Array, which: Anchors)
 def without_motion(points: Array, which: Anchors) -> Array:
     """Projection (3 m, 3 m) of small changes of anchors (m, 3) without their common rigid motion.
 
-    Removed are shifts and rotations that no reading observes: of the frame about the vertical, of the platform about
-    all axes, because its anchors define its own frame (S-transformation with equal weights of all anchors, Baarda
-    1973).
+    The projection removes shifts, and rotations that no reading observes: those of the frame about the vertical, and
+    those of the platform about all axes, because its anchors define its own frame. It is an S-transformation with equal
+    weights of all anchors (Baarda 1973).
     """
     m = len(points)
     ways = [np.tile(axis, m) for axis in np.eye(3)]

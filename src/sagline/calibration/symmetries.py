@@ -1,6 +1,6 @@
 """Symmetries of a robot: changes that no reading observes, as directions of the parameters.
 
-The origins of the world and of the platform frame, the meter and the newton are conventions: another choice changes
+The origins of the world and of the platform frame, the meter and the newton are conventions. Another choice changes
 every parameter that depends on it, but no reading. docs/model.md, section 14.
 """
 
@@ -64,7 +64,7 @@ class Symmetries(NamedTuple):
 
 
 def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) -> Symmetries:
-    """Symmetries of a robot and its sensors, most general first; turn: rotation vector of the frame [rad], (3,)."""
+    """Symmetries of a robot and its sensors, the most general first; turn: rotation vector of the frame [rad], (3,)."""
     m, turning = robot.cable_count, bool(robot.freedom[:, 3:].any())
     each = [_scale(robot, sensors), _force(robot), _yaw(robot, sensors, turn)]
     each += [_turned(robot, sensors, axis) for axis in range(3)]
@@ -81,7 +81,7 @@ def symmetries(robot: Robot, sensors: Sensors, turn: Array, *, counted: bool) ->
     shift, share = (np.einsum("rm,rmg->mg", term, table) for term in _length_terms(robot, counted))
     matters = np.ones((kinds.KIND_ROWS, m), dtype=np.bool_)
     matters[kinds.PER_CABLE :, 1:] = False
-    matters[kinds.SHIFT :] = False  # a few measured points leave more directions open than many do
+    matters[kinds.SHIFT :] = False  # with few measured points, more directions are unobservable than with many
     if sensors.tension_deviation is None:
         matters[[kinds.GAIN, kinds.BIAS]] = False
     if not turning:  # without rotations, the center of mass has no effect
@@ -101,7 +101,7 @@ def _length_terms(robot: Robot, counted: bool) -> tuple[Array, Array]:
     if zero is None or radius is None or diameter is None or pitch is None:  # counts need these data
         raise InvalidValueError("robot", "without counts", "with drums and their zeros", "Give them in the robot file.")
     circle = (2.0 * np.pi * (radius + 0.5 * diameter)) ** 2
-    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # of a turn, by the logarithm
+    by_radius = circle / (circle + pitch**2) * radius / (radius + 0.5 * diameter)  # by the logarithm
     shift[kinds.ZERO] = 1.0 / stretch
     shift[kinds.DRUM], share[kinds.DRUM] = -by_radius * zero / stretch, by_radius
     share[kinds.STIFFNESS] = drums.rest_strain / stretch
@@ -148,7 +148,7 @@ def _turned(robot: Robot, sensors: Sensors, axis: int) -> Generator:
 
 
 def _scale(robot: Robot, sensors: Sensors) -> Generator:
-    """Scale of all lengths, with lighter cables per meter: forces do not change."""
+    """Scale of all lengths, with lighter cables per meter, so that forces do not change."""
     change = _empty(robot)
     change[kinds.FRAME : kinds.FRAME + 3] = robot.frame_anchors.T
     change[kinds.PLATFORM : kinds.PLATFORM + 3] = robot.platform_anchors.T

@@ -13,11 +13,11 @@ from sagline.calibration.identifiability import PriorUnits, easiest_measurement,
 from sagline.calibration.parameters import Parameters
 from sagline.core.arrays import Array, Flags, Indices, locked
 
-LITTLE: Final = 0.5  # share of the prior's deviation: if more is left, the readings are not informative
-ALIKE: Final = 0.98  # correlation: above it two parameters are known five times worse than their sum or difference
-_MOST: Final = 0.8  # share of a direction's square that the named parameters must have
+LITTLE: Final = 0.5  # remaining share of the prior's deviation above which the readings are not informative
+ALIKE: Final = 0.98  # correlation at which two parameters have five times the error of their sum or difference
+_MOST: Final = 0.8  # share of a direction's square that the named parameters must contain
 _NAMES: Final = 3
-_SINGULAR: Final = 1e-10  # share of all variances: parameters with so similar effects count as one
+_SINGULAR: Final = 1e-10  # parameters whose effects differ by less than this share of all variances count as one
 _TINY: Final = 1e-300
 
 
@@ -27,8 +27,9 @@ Groups = dict[str, Indices]  # indices of the parameters of one kind and axis, b
 def weak_directions(triangle: Array, parameters: Parameters, gauge: tuple[Direction, ...]) -> tuple[Direction, ...]:
     """Weakly identifiable directions, without the unobservable ones.
 
-    First come directions with more than `LITTLE` of the prior deviation left, least known first. Then follow pairs of
-    parameters with a correlation above `ALIKE`, and single parameters that those of all cables substitute.
+    The first directions are those with more than `LITTLE` of the prior deviation left, the least known first. Then
+    follow pairs of parameters with a correlation above `ALIKE`, and single parameters that the parameters of all cables
+    can substitute.
     """
     frame = prior_units(parameters)
     complement = _complement(frame, gauge)
@@ -111,7 +112,7 @@ def _words(vector: Array, parameters: Parameters, groups: Groups, kinds: Indices
 
 
 def _substitutes(scaled: Array, index: int, groups: Groups) -> tuple[str, ...]:
-    """One or two other groups whose effect on the readings is nearly the same as that of a parameter."""
+    """One or two other groups with nearly the same effect on the readings as a parameter."""
     others = [name for name, members in groups.items() if index not in members]
     for count in (1, 2):
         best: tuple[str, ...] = ()
@@ -163,7 +164,7 @@ def _most_correlated(likeness: Array, first: Indices, second: Indices) -> tuple[
 
 
 def _is_substituted(scatter: Array, many: Indices) -> Flags:
-    """True for parameters (P,) whose multiple correlation with those of many cables exceeds `ALIKE`."""
+    """True for parameters (P,) whose multiple correlation with the parameters of many cables exceeds `ALIKE`."""
     within, between = scatter[np.ix_(many, many)], scatter[many]
     ridge = (_SINGULAR * float(np.trace(within)) + _TINY) * np.eye(len(many))
     share = np.sum(between * np.linalg.solve(within + ridge, between), axis=0)
@@ -171,7 +172,7 @@ def _is_substituted(scatter: Array, many: Indices) -> Flags:
 
 
 def _least_known_combination(scatter: Array, members: Indices, names: tuple[str, ...], frame: PriorUnits) -> Direction:
-    """Least known combination of some parameters."""
+    """Combination of some parameters with the largest error."""
     values, vectors = np.linalg.eigh(scatter[np.ix_(members, members)])
     left = float(np.sqrt(max(values[-1], 0.0)))
     vector = np.zeros(len(scatter))

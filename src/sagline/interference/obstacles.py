@@ -128,8 +128,7 @@ def frame_beams(robot: Robot, radius: float) -> tuple[Capsule, ...]:
     """The twelve edges of a robot's frame as beams with round ends.
 
     The frame is the frame of the drawings: a box with the robot's frame_size below its highest anchors, or the box of
-    its
-    anchors down to the floor. Frame anchors are on the frame or near it. Therefore, exclude the first part of each
+    its anchors down to the floor. Frame anchors are on the frame or near it. Therefore, exclude the first part of each
     cable with `from_anchor` of `clearance`.
 
     Args:

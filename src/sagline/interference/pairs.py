@@ -106,7 +106,7 @@ _NO_LENGTH = "cables and platform: give from_anchor, how much of a cable next to
 
 
 class Pairs(NamedTuple):
-    """Pairs of bodies. Their numbers count parts of cables, then the platform (with or without form), then obstacles.
+    """Pairs of bodies, which are numbered: parts of cables, then the platform (with or without shape), then obstacles.
 
     Attributes:
         parts: Parts of cables that occur in pairs.

@@ -2,10 +2,9 @@
 
 The pulley swivels about a vertical axis through the anchor A, where the cable enters it. It is therefore in the cable's
 vertical plane. The cable leaves the pulley at the point P in the direction of the force F_A = (T_x, T_zA) there. This
-force alone determines P.
-The model has no friction. H = T + T^2/(2 EA) - w z is therefore constant along the whole cable, and -H is the
-derivative of its energy by its length. With beta = w R/EA and E_A = 1 + T_A/EA, the neglected terms on the pulley are
-of the order R beta^2.
+force alone determines P. The model has no friction. H = T + T^2/(2 EA) - w z is therefore constant along the whole
+cable, and -H is the derivative of its energy by its length. With beta = w R/EA and E_A = 1 + T_A/EA, the neglected
+terms on the pulley are of the order R beta^2.
 """
 
 from __future__ import annotations

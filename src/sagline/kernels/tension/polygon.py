@@ -1,9 +1,8 @@
 """The polygon of feasible tensions in the null space of two redundant cables; docs/model.md, section 5.
 
 Cable i allows low_i <= t0_i + N_i . lambda <= high_i, which is a bound. A polygon is stored as its corners,
-counter-clockwise,
-each with the label of the side that leaves it: 2i for the lower limit of cable i, 2i + 1 for its upper limit, and from
-2m on for the sides of the box that replaces infinity.
+counter-clockwise, each with the label of the side that leaves it: 2i for the lower limit of cable i, 2i + 1 for its
+upper limit, and from 2m on for the sides of the box that replaces infinity.
 """
 
 from __future__ import annotations

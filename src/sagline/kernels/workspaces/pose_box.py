@@ -63,8 +63,7 @@ def set_cables_in_box(
 
     freedom: rows that select the free motions, (n, 6); geometry: rows of `cable_geometry` at the middle,
     (GEOMETRY_ROWS, m); rotation: platform -> world at the middle, (3, 3); center: center of mass in the platform frame
-    [m], (3,);
-    place: filled.
+    [m], (3,); place: filled.
     """
     n, m = place.matrix.shape
     fill_structure_matrix(geometry, place.full)
