@@ -65,9 +65,9 @@ class Page:
     Its state is used in the thread of `serve`; other threads call only `later`, `refresh`, `extend` and `stop`.
 
     Attributes:
-        server: A running server with nothing on it.
-        robot: The robot; that of what is played, if anything is.
-        channel: Messages to and from browsers.
+        server: A running server with an empty page.
+        robot: The robot; if a motion is played, its robot.
+        channel: Messages between the server and browsers.
         panel: Controls and displayed values; a feature adds a tab to `panel.readings`.
         scene: The robot in the scene.
         player: Player of a run, a simulation or a log.

@@ -51,11 +51,11 @@ class PushResponse:
     """Response of a platform to a force with constant unstrained lengths."""
 
     push: Push
-    state: Equilibrium  # without the force
-    loaded: Equilibrium | None  # with the force; None if none was found
-    reserve: Reserve  # largest force before a tension is at its limit, the lengths kept
+    state: Equilibrium  # equilibrium without the force
+    loaded: Equilibrium | None  # equilibrium with the force; None if none was found
+    reserve: Reserve  # largest force until a tension reaches its limit, at constant lengths
     redistributed: Reserve  # largest force with feasible tensions at this pose
-    compliance: Array  # of the point at which it acts, world axes [m/N], shape (3, 3); NaN if unknown
+    compliance: Array  # compliance of the point of application, world axes [m/N], shape (3, 3); NaN if unknown
 
     @property
     def force(self) -> float:
@@ -86,7 +86,7 @@ class PushResponse:
 
 
 def push_response(state: Equilibrium, push: Push) -> PushResponse:
-    """Response to a force, within the model of the state's cables."""
+    """Response to a force, with the model of the state's cables."""
     if isinstance(state.cables.model, Straight):
         raise InvalidValueError("push: cable model", "straight", "one that stretches", "Choose another cable model.")
     found = forward(state.one_robot, state.unstrained_length, state.pose, state.cables.model, push.wrench(state))

@@ -21,8 +21,8 @@ from sagline.viewer.shapes import dead_runs
 from sagline.viewer.snapshot import Snapshot
 from sagline.viewer.tension_scale import Color, Colors, ForceUnit, TensionScale, force_unit, number_text
 
-EXACT: Final = 1e-9  # m: smaller distances are rounding
-_ALONE = 1e-9  # of a robot's highest tension: distance to a limit that counts as at the limit
+EXACT: Final = 1e-9  # [m], smaller distances count as zero
+_ALONE = 1e-9  # smaller distances from a limit, relative to the robot's highest tension, count as at the limit
 
 
 def html_block(content: str) -> str:
@@ -36,7 +36,7 @@ def sentence(text: str) -> str:
 
 
 def verdict(snapshot: Snapshot) -> str:
-    """Feasible or not, in one colored box; where not, why."""
+    """HTML of the verdict on feasibility in a colored box, with the reason if infeasible."""
     if snapshot.feasible:
         return verdict_box("good", "Feasible", _summary(snapshot))
     return verdict_box("bad", headline(snapshot), escape(snapshot.reason))
@@ -133,7 +133,7 @@ def spaced_ticks(scale: TensionScale) -> list[tuple[float, float]]:
 
 
 def _summary(snapshot: Snapshot) -> str:
-    """Quantities of a feasible pose, with their names."""
+    """Names and texts of the quantities of a feasible pose."""
     unit = force_unit(snapshot.robot)
     tension = snapshot.tension
     rows = [
@@ -222,7 +222,7 @@ def _listed(frequencies: Array | None) -> str:
     if frequencies is None or not np.isfinite(frequencies).any():
         return ""
     words = [_pressed(k, value) for k, value in enumerate(frequencies)]
-    ends = [*[","] * (len(words) - 1), " Hz"]  # stay with the number before
+    ends = [*[","] * (len(words) - 1), " Hz"]  # these characters stay on the line of the number
     text = " ".join(f'<span class="whole">{word}{end}</span>' for word, end in zip(words, ends, strict=True))
     return f'<div style="margin-top:4px"><b>Natural frequencies</b> {text}</div>'
 

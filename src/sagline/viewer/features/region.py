@@ -72,7 +72,7 @@ class RegionFeature(Feature):
         """Build the tab."""
         self._server, self._size, self._nodes = page.server, page.size, Nodes(page.server.scene)
         self._task = BackgroundTask(page.later)
-        self._key: Hashable = None  # identifies the workspace
+        self._key: Hashable = None  # key of the workspace
         self._query: WorkspaceQuery | None = None
         self._levels: Levels | None = None
         self._region: Region | None = None

@@ -62,7 +62,7 @@ class MethodMarks:
                 self._solvers = {}
             elif not self._solvers:
                 self._solvers = _solvers(plan)
-            self._key, self._robot = key, state.robot  # the robot is kept, so that its id is not used again
+            self._key, self._robot = key, state.robot  # the robot is kept alive, so that its id remains unique
             ways = zip(METHODS, ascii_uppercase, strict=False)
             self._found = tuple(_mark(plan, name, letter, self._solvers.get(name)) for name, letter in ways)
         return self._found
@@ -84,7 +84,7 @@ def grouped(marks: tuple[_MethodMark, ...], field: DotField) -> list[tuple[tuple
 
 
 def _solvers(plan: Plan) -> dict[str, InverseSolver]:
-    """Solvers of the methods that are applicable to the robot of a plan."""
+    """Prepared solvers of the methods that are applicable to the robot of a plan."""
     robot, model = plan.state.one_robot, plan.state.cables.model
     found = {}
     for name, method in METHODS.items():
@@ -282,7 +282,7 @@ class TensionsFeature(Feature):
     """Drawing of the feasible tensions, with a movable dot for the choice of tensions."""
 
     def __init__(self, page: Page) -> None:
-        """Build nothing yet."""
+        """Begin without a drawing."""
         self._panel = page.panel
         self._marks = MethodMarks()
         self._field: DotField | None = None  # drawing in which the dot moves
